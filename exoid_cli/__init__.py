@@ -1,0 +1,1 @@
+"""The command line of exoid: reads, calls one function of pipelines, writes."""

@@ -1,0 +1,35 @@
+"""Every error a user can cause or meet, grouped by who has to act.
+
+The text of each says what was found, where, what was expected, and what to do.
+Only ``exoid_cli.app`` turns them into a line on the terminal and an exit code.
+"""
+
+
+class ExoidError(Exception):
+    """Root of the family; on its own, a fault of exoid itself."""
+
+    exit_code = 1
+
+
+class InputError(ExoidError):
+    """The user's files, settings or arguments cannot be used as they are."""
+
+    exit_code = 2
+
+
+class ContractError(InputError):
+    """A file does not keep its data contract."""
+
+
+class SettingsError(InputError):
+    """exoid.toml, a rig file or a command-line option asks for the impossible."""
+
+
+class NotIdentifiable(InputError):
+    """The motion cannot separate the parameters that were asked for."""
+
+
+class DeviceError(ExoidError):
+    """A drive, a sensor, the line to it, or a safety limit stopped the work."""
+
+    exit_code = 3
