@@ -1,0 +1,32 @@
+"""``candidates/1``: every cause that was tried, the best first."""
+
+import pyarrow as pa
+
+from pipelines.contracts.table import FLOAT, INTEGER, TEXT, Column, Contract, per_joint
+
+CANDIDATES = Contract(
+    name="candidates",
+    version=1,
+    purpose="every cause that was tried",
+    made_by="exoid diagnose",
+    columns=(
+        Column("rank", "", "1 is the best", dtype=INTEGER),
+        Column("causes", "", "the causes tried together, each as effect@joint", dtype=pa.list_(TEXT)),
+        Column(
+            "parameters", "", "what was fitted",
+            dtype=pa.list_(pa.struct([("name", TEXT), ("value", FLOAT), ("unit", TEXT)])),
+        ),
+        Column("train_score", "", "score on the train runs", nullable=True),
+        per_joint("rmse_before", "validate RMSE of the baseline", nullable=True),
+        per_joint("rmse_after", "validate RMSE with the causes", nullable=True),
+        Column("gain_nm", "N·m", "RMSE taken away on the validate runs", nullable=True),
+        Column("gain_low_nm", "N·m", "lower end of the gain's 95 % interval", nullable=True),
+        Column("gain_high_nm", "N·m", "upper end of the gain's 95 % interval", nullable=True),
+        Column("probability", "", "how likely the causes are the true ones, 0 to 1", nullable=True),
+        Column(
+            "verdict", "", "what became of it", dtype=TEXT,
+            choices=("named", "indistinguishable", "absorbed", "rejected"),
+        ),
+        Column("reason", "", "one sentence", dtype=TEXT),
+    ),
+)  # fmt: skip

@@ -1,0 +1,65 @@
+"""The joints of a machine, and how their columns are named: ``<joint>_<quantity>_<unit>``."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+Kind = Literal["revolute", "prismatic"]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Something measured or computed at a joint, as a pattern of column name and unit for each kind of joint."""
+
+    revolute: str
+    revolute_unit: str
+    prismatic: str
+    prismatic_unit: str
+
+
+QUANTITIES: dict[str, Quantity] = {
+    "angle": Quantity("{joint}_angle_rad", "rad", "{joint}_position_m", "m"),
+    "angle_measured": Quantity("{joint}_angle_measured_rad", "rad", "{joint}_position_measured_m", "m"),
+    "reference": Quantity("{joint}_reference_rad", "rad", "{joint}_reference_m", "m"),
+    "error": Quantity("{joint}_error_rad", "rad", "{joint}_error_m", "m"),
+    "velocity": Quantity("{joint}_velocity_rad_s", "rad/s", "{joint}_velocity_m_s", "m/s"),
+    "velocity_measured": Quantity("{joint}_velocity_measured_rad_s", "rad/s", "{joint}_velocity_measured_m_s", "m/s"),
+    "acceleration": Quantity("{joint}_acceleration_rad_s2", "rad/s²", "{joint}_acceleration_m_s2", "m/s²"),
+    "torque": Quantity("{joint}_torque_nm", "N·m", "{joint}_force_n", "N"),
+    "predicted": Quantity("{joint}_predicted_nm", "N·m", "{joint}_predicted_n", "N"),
+    "residual": Quantity("{joint}_residual_nm", "N·m", "{joint}_residual_n", "N"),
+    "network": Quantity("{joint}_network_nm", "N·m", "{joint}_network_n", "N"),
+    "rmse_before": Quantity("rmse_before_{joint}_nm", "N·m", "rmse_before_{joint}_n", "N"),
+    "rmse_after": Quantity("rmse_after_{joint}_nm", "N·m", "rmse_after_{joint}_n", "N"),
+    "current": Quantity("{joint}_current_a", "A", "{joint}_current_a", "A"),
+    "temperature": Quantity("{joint}_temperature_c", "°C", "{joint}_temperature_c", "°C"),
+}
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint of the machine."""
+
+    name: str
+    kind: Kind = "revolute"
+
+    def column(self, quantity: str) -> str:
+        """Return the column that holds a quantity: ``"angle"`` is ``hip_angle_rad`` or ``axis_position_m``."""
+        pattern = QUANTITIES[quantity]
+        chosen = pattern.revolute if self.kind == "revolute" else pattern.prismatic
+        return chosen.format(joint=self.name)
+
+    def unit(self, quantity: str) -> str:
+        """Return the unit of a quantity at this joint, as printed: ``"rad/s"``."""
+        pattern = QUANTITIES[quantity]
+        return pattern.revolute_unit if self.kind == "revolute" else pattern.prismatic_unit
+
+
+HIP_AND_KNEE = (Joint("hip"), Joint("knee"))
+
+
+def joints_of(metadata: Mapping[str, Any]) -> tuple[Joint, ...]:
+    """Return the joints a file speaks of; left out, they are hip and knee, both revolute."""
+    if "joints" not in metadata:
+        return HIP_AND_KNEE
+    return tuple(Joint(joint["name"], joint.get("kind", "revolute")) for joint in metadata["joints"])

@@ -1,0 +1,95 @@
+"""The parts of the ``exoid`` metadata that several tables share, as typed models; unknown keys are kept."""
+
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Matrix = list[list[Finite]]
+
+
+class Keys(BaseModel):
+    """A metadata object: what exoid knows is checked strictly, what it does not know is left alone."""
+
+    model_config = ConfigDict(extra="allow", strict=True, frozen=True)
+
+
+class JointKeys(Keys):
+    """One entry of ``joints``."""
+
+    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+    kind: Literal["revolute", "prismatic"] = "revolute"
+
+
+class InputKeys(Keys):
+    """One entry of ``inputs``: a file that this one was computed from."""
+
+    name: str
+    sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+
+
+class TableKeys(Keys):
+    """What the metadata of any table may hold."""
+
+    contract: str
+    joints: Annotated[list[JointKeys], Field(min_length=1)] | None = None
+    created_by: str | None = None
+    created_at: str | None = None
+    inputs: list[InputKeys] | None = None
+    config: dict[str, Any] | None = None
+
+    @field_validator("joints")
+    @classmethod
+    def _names_differ(cls, joints: list[JointKeys] | None) -> list[JointKeys] | None:
+        names = [joint.name for joint in joints or []]
+        if len(set(names)) < len(names):
+            raise ValueError(f"found joints {', '.join(names)}, expected each name once")
+        return joints
+
+    @field_validator("created_at")
+    @classmethod
+    def _is_a_time(cls, text: str | None) -> str | None:
+        try:
+            datetime.fromisoformat(text or "2000-01-01")
+        except ValueError as error:
+            raise ValueError(f"found {text!r}, expected an ISO 8601 time such as 2025-01-31T12:00:00+00:00") from error
+        return text
+
+
+class Geometry(Keys):
+    """Lengths of the leg and gravity, each optional; a recording's win over exoid.toml's."""
+
+    thigh_length_m: Positive | None = None
+    gravity_m_s2: NotNegative | None = None
+    thigh_cuff_distance_m: Positive | None = None
+    shank_cuff_distance_m: Positive | None = None
+
+
+class Controller(Keys):
+    """The drive's loop at one joint."""
+
+    type: str
+    kp_nm_rad: Finite | None = None
+    kd_nm_s_rad: Finite | None = None
+    rate_hz: Positive | None = None
+    limit_nm: Positive | None = None
+
+
+class RunKeys(TableKeys):
+    """What a run knows of itself."""
+
+    run: Literal["exo_alone", "with_human"]
+    purpose: Literal["train", "validate"]
+    sample_rate_hz: Positive
+    period_s: Positive | None = None
+    rig: str | None = None
+    subject: str | None = None
+    session: str | None = None
+    trajectory: str | None = None
+    gaps: list[tuple[Finite, Annotated[int, Field(gt=0)]]] | None = None
+    abort: str | None = None
+    controller: dict[str, Controller] | None = None
+    geometry: Geometry | None = None

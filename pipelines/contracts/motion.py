@@ -1,0 +1,51 @@
+"""``motion/1``: a recording made fit for regression."""
+
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from pipelines.contracts.metadata import Keys, Positive, RunKeys
+from pipelines.contracts.recording import CUFF_FORCES
+from pipelines.contracts.table import BOOLEAN, INTEGER, Column, Contract, per_joint
+
+
+class RegressionFilterKeys(Keys):
+    """What whoever fits applies to torque and to every regressor column alike, never across segments."""
+
+    kind: str
+    order: Annotated[int, Field(gt=0)] | None = None
+    cutoff_hz: Positive | None = None
+    decimation: Annotated[int, Field(gt=0)] | None = None
+
+
+class MotionKeys(RunKeys):
+    """The recording's metadata, and how it was filtered."""
+
+    filter: dict[str, Any] | None = None
+    regression_filter: RegressionFilterKeys | None = None
+
+
+MOTION = Contract(
+    name="motion",
+    version=1,
+    purpose="a recording made fit for regression",
+    made_by="exoid filter",
+    columns=(
+        Column("time_s", "s", "device time since the run began"),
+        per_joint("angle", "joint angle after zero-phase filtering"),
+        per_joint("angle_measured", "measured joint angle"),
+        per_joint("velocity", "derivative of the filtered angle"),
+        per_joint("acceleration", "second derivative of the filtered angle"),
+        per_joint("torque", "what the drive delivers at the joint, as measured"),
+        per_joint("velocity_measured", "the drive's own velocity estimate", required=False, nullable=True),
+        per_joint("reference", "commanded angle", required=False, nullable=True),
+        per_joint("current", "motor current", required=False, nullable=True),
+        per_joint("temperature", "drive or motor temperature", required=False, nullable=True),
+        *CUFF_FORCES,
+        Column("sequence", "", "the device's sample counter", dtype=INTEGER, required=False),
+        Column("segment", "", "number of the stretch without gaps", dtype=INTEGER),
+        Column("valid", "", "false at filter edges and where data were bad", dtype=BOOLEAN),
+    ),
+    metadata=MotionKeys,
+    time="time_s",
+)

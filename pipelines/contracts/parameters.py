@@ -1,0 +1,57 @@
+"""``parameters/1``: a model, one row a parameter."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import pandas as pd
+
+from pipelines.contracts.metadata import Geometry, Matrix, TableKeys
+from pipelines.contracts.table import TEXT, Column, Contract
+from pipelines.errors import ContractError
+
+
+class ParametersKeys(TableKeys):
+    """How sure the parameters are together, and what they describe."""
+
+    covariance: Matrix | None = None
+    mechanism: str | dict[str, Any] | None = None
+    geometry: Geometry | None = None
+    method: str | dict[str, Any] | None = None
+
+
+def _covariance_has_the_rows_shape(frame: pd.DataFrame, metadata: Mapping[str, Any], source: str) -> None:
+    covariance = metadata.get("covariance")
+    if covariance is None:
+        return
+    lengths = {len(row) for row in covariance}
+    if len(covariance) != len(frame) or lengths != {len(frame)}:
+        raise ContractError(
+            f"{source}: metadata covariance: found {len(covariance)} rows of {sorted(lengths)} values, expected "
+            f"{len(frame)} x {len(frame)}, one for each parameter in row order; write the whole matrix"
+        )
+
+
+PARAMETERS = Contract(
+    name="parameters",
+    version=1,
+    purpose="a model",
+    made_by="exoid identify",
+    columns=(
+        Column("name", "", "the parameter's name", dtype=TEXT),
+        Column("symbol", "", "its symbol in print", dtype=TEXT),
+        Column("joint", "", "its joint; null where shared", dtype=TEXT, nullable=True),
+        Column(
+            "run", "", "the kind of run it holds for; null where it holds for all", dtype=TEXT, nullable=True,
+            choices=("exo_alone", "with_human", "human"),
+        ),
+        Column("value", "", "its estimate, in the row's unit"),
+        Column("unit", "", "the unit of value, std_error and the interval", dtype=TEXT),
+        Column("std_error", "", "standard error; null where it was not estimated", nullable=True),
+        Column("ci95_low", "", "lower end of the 95 % interval", nullable=True),
+        Column("ci95_high", "", "upper end of the 95 % interval", nullable=True),
+        Column("step", "", "the fit it comes from", dtype=TEXT, choices=("friction", "inertia", "extension")),
+        Column("effect", "", "rigid_body, friction, or a cause's name", dtype=TEXT),
+    ),
+    metadata=ParametersKeys,
+    rules=(_covariance_has_the_rows_shape,),
+)  # fmt: skip

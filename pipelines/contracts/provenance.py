@@ -1,0 +1,39 @@
+"""Where a file came from: who made it, when, from which inputs, with which settings."""
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from pipelines import __version__
+
+
+def describe(inputs: Iterable[Path] = (), config: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Return the metadata that let a result be traced to its data and repeated.
+
+    Parameters
+    ----------
+    inputs : iterable of Path
+        The files this result was computed from. Never pass what a rig keeps sealed: the name and the hash
+        stand in the result for everyone to read.
+    config : mapping, optional
+        The stage's resolved settings, such as ``settings.model_dump(mode="json")``.
+
+    Returns
+    -------
+    dict
+        ``created_by``, ``created_at``, ``inputs`` and ``config``, to be merged into a table's metadata.
+    """
+    return {
+        "created_by": f"exoid {__version__}",
+        "created_at": datetime.now(UTC).isoformat(timespec="seconds"),
+        "inputs": [{"name": Path(path).name, "sha256": sha256(path)} for path in inputs],
+        "config": dict(config or {}),
+    }
+
+
+def sha256(path: Path) -> str:
+    """Return the SHA-256 of a file's bytes, in hexadecimal."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,0 +1,187 @@
+"""A data contract as code: columns with unit, meaning and type, checked on reading and on writing."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from pipelines import __version__
+from pipelines.contracts import checks, parquet
+from pipelines.contracts.joints import Joint, joints_of
+from pipelines.contracts.metadata import TableKeys
+from pipelines.errors import ContractError
+from pipelines.validation import explain
+
+FLOAT, INTEGER, BOOLEAN, TEXT = pa.float64(), pa.int64(), pa.bool_(), pa.string()
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table, or, with ``per_joint``, one for each joint, named by the joint and this quantity."""
+
+    name: str
+    unit: str
+    meaning: str
+    dtype: pa.DataType = FLOAT
+    required: bool = True
+    nullable: bool = False
+    """May values be missing (null or NaN)? Infinities never may."""
+    choices: tuple[str, ...] = ()
+    per_joint: bool = False
+
+    def at(self, joint: Joint) -> "Column":
+        """Return this quantity's column at one joint."""
+        return replace(self, name=joint.column(self.name), unit=joint.unit(self.name), per_joint=False)
+
+
+def per_joint(quantity: str, meaning: str, *, required: bool = True, nullable: bool = False) -> Column:
+    """Return a float column that every joint has; name and unit follow from the joint's kind."""
+    return Column(quantity, "", meaning, required=required, nullable=nullable, per_joint=True)
+
+
+@dataclass(frozen=True)
+class Table:
+    """A checked table in memory."""
+
+    frame: pd.DataFrame
+    metadata: dict[str, Any]
+    path: Path | None = None
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """The joints this table speaks of."""
+        return joints_of(self.metadata)
+
+    def stacked(self, quantity: str) -> NDArray[np.float64]:
+        """Return a quantity of all joints side by side, shape (rows, joints), in the quantity's SI unit."""
+        return self.frame[[joint.column(quantity) for joint in self.joints]].to_numpy(dtype=float)
+
+
+Rule = Callable[[pd.DataFrame, Mapping[str, Any], str], None]
+
+
+@dataclass(frozen=True)
+class Contract:
+    """What a table promises."""
+
+    name: str
+    version: int
+    purpose: str
+    made_by: str
+    """The command that makes such a table."""
+    columns: tuple[Column, ...]
+    metadata: type[TableKeys] = TableKeys
+    time: str | None = None
+    """The column that must strictly increase."""
+    restarts_with: tuple[str, ...] = ()
+    """Columns that start time anew when they change from one row to the next."""
+    angles_are_bounded: bool = True
+    """Is an angle of more than 1.5 turns taken for degrees? Not where a loop may diverge."""
+    rules: tuple[Rule, ...] = ()
+    """Further checks: rule(frame, metadata, source) raises ContractError."""
+
+    @property
+    def label(self) -> str:
+        """Name and version as written in a file: ``recording/1``."""
+        return f"{self.name}/{self.version}"
+
+    def columns_for(self, joints: tuple[Joint, ...]) -> tuple[Column, ...]:
+        """Return every column by its name in a file, those of the joints written out."""
+        expanded = ([column.at(joint) for joint in joints] if column.per_joint else [column] for column in self.columns)
+        return tuple(column for group in expanded for column in group)
+
+    def read(self, path: Path | str) -> Table:
+        """Return the table in a file, or raise a ContractError that says what is wrong with it."""
+        path = Path(path)
+        table, metadata = parquet.load(path)
+        self._refuse_other_contracts(metadata["contract"], path)
+        return Table(self._conform(table, metadata, str(path)).to_pandas(), metadata, path)
+
+    def write(self, path: Path | str, frame: pd.DataFrame, metadata: Mapping[str, Any]) -> None:
+        """Check a table and write it atomically; ``contract`` is added to the metadata."""
+        path = Path(path)
+        metadata = {**metadata, "contract": self.label}
+        parquet.save(path, self._conform(self._to_arrow(frame, str(path)), metadata, str(path)), metadata)
+
+    def check(self, frame: pd.DataFrame, metadata: Mapping[str, Any], source: str = "table") -> None:
+        """Raise a ContractError unless frame and metadata keep this contract; ``source`` starts its message."""
+        self._conform(self._to_arrow(frame, source), {**metadata, "contract": self.label}, source)
+
+    def _refuse_other_contracts(self, found: str, path: Path) -> None:
+        name, _, version = found.partition("/")
+        if name != self.name:
+            raise ContractError(
+                f"{path}: holds {found}, expected {self.label}; `{self.made_by}` makes a {self.name} file"
+            )
+        if version != str(self.version):
+            raise ContractError(
+                f"{path}: holds {found}, but exoid {__version__} knows {self.label}; "
+                f"update exoid, or make the file again with `{self.made_by}`"
+            )
+
+    def _to_arrow(self, frame: pd.DataFrame, source: str) -> pa.Table:
+        twice = frame.columns[frame.columns.duplicated()]
+        if len(twice):
+            raise ContractError(f"{source}: column {twice[0]} stands twice, expected each name once; rename one")
+        # Lists and structs need their type said: an empty list does not tell what it would hold.
+        nested = {column.name: column.dtype for column in self.columns if pa.types.is_nested(column.dtype)}
+        arrays = {}
+        for name in frame.columns:
+            try:
+                arrays[str(name)] = pa.Array.from_pandas(frame[name], type=nested.get(name))
+            except (pa.ArrowException, TypeError) as error:
+                raise ContractError(
+                    f"{source}: column {name}: its values have no common type ({error}); give them one"
+                ) from error
+        return pa.table(arrays)
+
+    def _conform(self, table: pa.Table, metadata: Mapping[str, Any], source: str) -> pa.Table:
+        """Return the table with every known column in its type, unit and meaning attached; refuse what cannot be."""
+        self._check_metadata(metadata, source)
+        if table.num_rows == 0:
+            raise ContractError(f"{source}: holds no rows, expected at least one; `{self.made_by}` makes it again")
+        for column in self.columns_for(joints_of(metadata)):
+            table = self._conform_column(table, column, source)
+        frame = table.to_pandas()
+        if self.time:
+            where = f"{source}: column {self.time}"
+            checks.refuse_time_that_does_not_increase(frame, self.time, self.restarts_with, where)
+        for rule in self.rules:
+            rule(frame, metadata, source)
+        return table
+
+    def _conform_column(self, table: pa.Table, column: Column, source: str) -> pa.Table:
+        index = table.schema.get_field_index(column.name)
+        if index < 0:
+            if not column.required:
+                return table
+            raise ContractError(
+                f"{source}: column {column.name} is missing, expected {_described(column)}; "
+                f"a {self.label} table must have it"
+            )
+        where = f"{source}: column {column.name}"
+        values = checks.convert(table.column(index), column.dtype, where)
+        checks.refuse_missing(values, column.nullable, where)
+        if column.choices:
+            checks.refuse_unknown_values(values, column.choices, where)
+        if column.unit == "rad" and self.angles_are_bounded:
+            checks.refuse_degrees(values, where)
+        field = pa.field(column.name, column.dtype, metadata={"unit": column.unit, "meaning": column.meaning})
+        return table.set_column(index, field, values)
+
+    def _check_metadata(self, metadata: Mapping[str, Any], source: str) -> None:
+        try:
+            self.metadata.model_validate_json(parquet.to_json(metadata, source))
+        except ValidationError as error:
+            fault = explain(error, dict(metadata))
+            raise ContractError(f"{source}: metadata {fault}; mend it in the file's `exoid` entry") from error
+
+
+def _described(column: Column) -> str:
+    return f"{column.meaning} ({column.unit})" if column.unit else column.meaning

@@ -1,0 +1,78 @@
+"""A pydantic complaint as one line a person can act on."""
+
+import difflib
+from typing import Any
+
+from pydantic import ValidationError
+
+
+def explain(error: ValidationError, data: Any, known_keys: dict[str, list[str]] | None = None) -> str:
+    """Say which key is wrong, what was found there and what was expected.
+
+    Parameters
+    ----------
+    error : pydantic.ValidationError
+        What pydantic found.
+    data : dict
+        The data it looked at, as read from TOML or JSON.
+    known_keys : dict of str to list of str, optional
+        Allowed keys of each table, by dotted path ("" is the top), for a suggestion after a typing error.
+
+    Returns
+    -------
+    str
+        The first fault, and how many more there are.
+    """
+    faults: dict[str, list[dict[str, Any]]] = {}
+    for fault in error.errors(include_url=False):
+        faults.setdefault(_key_path(fault, data), []).append(dict(fault))
+    path, about = next(iter(faults.items()))
+    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+    return _sentence(path, about, known_keys or {}) + more
+
+
+def suggestion(word: str, known: list[str]) -> str:
+    """Return ``did you mean ...?`` or, with nothing close, the list of what is known."""
+    close = difflib.get_close_matches(word, known, n=1)
+    return f"did you mean {close[0]}?" if close else f"known are {', '.join(known)}"
+
+
+def _sentence(path: str, faults: list[dict[str, Any]], known_keys: dict[str, list[str]]) -> str:
+    kind = faults[0]["type"]
+    if kind == "missing":
+        return f"{path}: missing; add it"
+    if kind == "extra_forbidden":
+        parent, _, key = path.rpartition(".")
+        known = known_keys.get(_without_indices(parent), [])
+        return f"{path}: unknown key" + (f"; {suggestion(key, known)}" if known else "; remove it")
+    if kind == "value_error":
+        return f"{path}: {faults[0]['ctx']['error']}" if path else str(faults[0]["ctx"]["error"])
+    # A union ("auto" or a number) complains once for each of its members.
+    expected = " or ".join(dict.fromkeys(_expectation(fault["msg"]) for fault in faults))
+    return f"{path}: found {_found(faults[0]['input'])}, expected {expected}"
+
+
+def _key_path(fault: Any, data: Any) -> str:
+    """Return the fault's dotted path as the user wrote it, without pydantic's names for members of a union."""
+    path = ""
+    for part in fault["loc"]:
+        if isinstance(data, dict) and part in data:
+            path, data = f"{path}.{part}" if path else str(part), data[part]
+        elif isinstance(data, list | tuple) and isinstance(part, int):
+            path, data = f"{path}[{part}]", data[part]
+        elif fault["type"] == "missing" and part == fault["loc"][-1]:
+            path = f"{path}.{part}" if path else str(part)
+    return path
+
+
+def _without_indices(path: str) -> str:
+    return ".".join(part.split("[")[0] for part in path.split(".")) if path else ""
+
+
+def _expectation(message: str) -> str:
+    return message.removeprefix("Input should be ").split(", unable to")[0]
+
+
+def _found(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
