@@ -1,5 +1,6 @@
 """What the values of a column must keep; each check names column, first bad row (counted from 0) and remedy."""
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -21,14 +22,21 @@ def convert(column: pa.ChunkedArray, dtype: pa.DataType, where: str) -> pa.Chunk
     """
     if column.type == dtype:
         return column
+    found, expected = type_name(column.type), type_name(dtype)
     if not _alike(column.type, dtype):
-        raise ContractError(f"{where}: found type {column.type}, expected {dtype}; write the column as {dtype}")
+        raise ContractError(f"{where}: found type {found}, expected {expected}; write the column as {expected}")
     try:
         return column.cast(dtype)
     except pa.ArrowException as error:
         raise ContractError(
-            f"{where}: found type {column.type} whose values {dtype} cannot hold ({error}); write it as {dtype}"
+            f"{where}: found type {found}, whose values {expected} cannot hold ({error}); "
+            f"write the column as {expected}"
         ) from error
+
+
+def type_name(dtype: pa.DataType) -> str:
+    """Return an Arrow type as this project and NumPy call it: float64, not double."""
+    return re.sub(r"\bfloat\b", "float32", str(dtype).replace("double", "float64"))
 
 
 def _alike(found: pa.DataType, expected: pa.DataType) -> bool:
@@ -60,7 +68,9 @@ def refuse_missing(column: pa.ChunkedArray, nullable: bool, where: str) -> None:
     if not nullable and missing.any():
         row = int(np.argmax(missing))
         number = pa.types.is_floating(column.type)
-        found, expected = ("NaN", "a finite number") if number else ("null", f"a value of type {column.type}")
+        found, expected = (
+            ("NaN", "a finite number") if number else ("null", f"a value of type {type_name(column.type)}")
+        )
         raise ContractError(f"{where}, row {row}: found {found}, expected {expected}; {_MEND_ROWS}")
     if pa.types.is_floating(column.type):
         infinite = np.isinf(column.to_numpy())

@@ -1,0 +1,122 @@
+"""The commands of exoid, and the one place where an error becomes a line and an exit code.
+
+0 is success, 1 a fault of exoid itself, 2 the user's to mend, 3 a device's, 130 a stop by Ctrl-C.
+"""
+
+import errno
+import os
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import typer
+from typer.exceptions import TyperException
+
+from exoid_cli.console import console
+from exoid_cli.show import show
+from pipelines import __version__
+from pipelines.errors import ExoidError
+
+app = typer.Typer(
+    name="exoid",
+    help="Identification experiments on an exoskeleton leg: what the model gets wrong, and why.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+app.command()(show)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"exoid {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors and warnings only.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Set what every command heeds; these options may also follow the command."""
+    console.configure(quiet=quiet, json=json)
+
+
+def main() -> NoReturn:
+    """Run exoid as the shell's command."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command line and return its exit code."""
+    console.configure()
+    try:
+        command = typer.main.get_command(app)
+        # Not standalone: typer would print a box of several lines for a mistyped option.
+        return command.main(args=_global_options_first(arguments), prog_name="exoid", standalone_mode=False) or 0
+    except ExoidError as error:
+        console.fail(str(error))
+        return error.exit_code
+    except TyperException as error:
+        return _usage_error(error)
+    except KeyboardInterrupt:
+        console.fail("stopped by Ctrl-C")
+        return 130
+    except OSError as error:
+        console.fail(_about_the_system(error))
+        return 2
+    except Exception as error:
+        console.fail(f"exoid itself failed: {type(error).__name__}: {error}; please report it, {_keep_traceback()}")
+        return 1
+
+
+def _global_options_first(arguments: Sequence[str]) -> list[str]:
+    """Let ``exoid show FILE --json`` mean ``exoid --json show FILE``."""
+    ours = [argument for argument in arguments if argument in ("--json", "--quiet", "-q")]
+    return ours + [argument for argument in arguments if argument not in ours]
+
+
+def _usage_error(error: TyperException) -> int:
+    context = getattr(error, "ctx", None)
+    message = error.format_message() if hasattr(error, "format_message") else str(error)
+    if message:  # without a command typer has printed the help, and has nothing to add
+        hint = f"; see `{context.command_path} --help`" if context else ""
+        console.fail(message.rstrip(".") + hint)
+    return getattr(error, "exit_code", 2)
+
+
+_REMEDIES = {
+    errno.EACCES: "you may not read or write there; change the permissions or choose another place",
+    errno.EPERM: "you may not read or write there; change the permissions or choose another place",
+    errno.ENOSPC: "free some space and run the command again",
+    errno.EDQUOT: "free some space and run the command again",
+    errno.EROFS: "choose a folder that can be written to",
+    errno.ENOENT: "check the name",
+}
+
+
+def _about_the_system(error: OSError) -> str:
+    place = f"{error.filename}: " if error.filename else ""
+    remedy = _REMEDIES.get(error.errno or 0)
+    return f"{place}{error.strerror or error}" + (f"; {remedy}" if remedy else "")
+
+
+def _keep_traceback() -> str:
+    """Show the traceback where EXOID_DEBUG asks for it, else keep it in a file; say where it is."""
+    if os.environ.get("EXOID_DEBUG"):
+        traceback.print_exc()
+        return "with the traceback above"
+    path = Path(tempfile.gettempdir()) / f"exoid-{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}.log"
+    path.write_text(traceback.format_exc(), encoding="utf-8")
+    return f"with {path}"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,100 @@
+"""What the user sees: text and tables, progress, or, with ``--json``, one JSON document on stdout.
+
+A command calls ``say`` and ``table`` for people and ``emit`` for programs, without asking which of them listens:
+people's output is silent under ``--json``, and ``emit`` is silent without it.
+"""
+
+import json
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from rich.console import Console as RichConsole
+from rich.console import RenderableType
+from rich.live import Live
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+from rich.text import Text
+
+
+class Console:
+    """The terminal of one invocation; results go to stdout, progress and warnings to stderr."""
+
+    def __init__(self) -> None:
+        self.configure()
+
+    def configure(self, *, quiet: bool = False, json: bool = False) -> None:
+        """Set what the global options ask for."""
+        self.quiet = quiet
+        self.json = json
+        self.out = RichConsole(highlight=False)
+        self.err = RichConsole(stderr=True, highlight=False)
+
+    @property
+    def speaks(self) -> bool:
+        """Does a person read along?"""
+        return not (self.quiet or self.json)
+
+    def say(self, text: str | Text) -> None:
+        """Print a sentence of result for a person."""
+        if self.speaks:
+            self.out.print(text if isinstance(text, Text) else Text(text))
+
+    def table(
+        self, headings: Sequence[str], rows: Iterable[Sequence[Any]], *, title: str | None = None, numbers: str = ""
+    ) -> None:
+        """Print a table for a person; headings named in ``numbers`` (comma-separated) are set to the right."""
+        if not self.speaks:
+            return
+        right = {name.strip() for name in numbers.split(",")}
+        table = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False)
+        for heading in headings:
+            table.add_column(heading, justify="right" if heading in right else "left", overflow="fold")
+        for row in rows:
+            table.add_row(*(Text("" if cell is None else str(cell)) for cell in row))
+        self.out.print(table)
+
+    def emit(self, data: Any) -> None:
+        """Print a result for a program, where ``--json`` asked for it."""
+        if self.json:
+            print(json.dumps(data, ensure_ascii=False, indent=2, default=_plain), file=sys.stdout)
+
+    def warn(self, text: str) -> None:
+        """Print a warning, in every mode."""
+        self.err.print(Text(f"warning: {text}", style="yellow"), soft_wrap=True)
+
+    def fail(self, text: str) -> None:
+        """Print the one line that an error is."""
+        self.err.print(Text(f"exoid: {' '.join(text.split())}", style="red"), soft_wrap=True)
+
+    @contextmanager
+    def progress(self, what: str, total: float) -> Iterator[Callable[..., None]]:
+        """Show a bar while the block runs; yields ``report(done, note="")`` with ``done`` out of ``total``."""
+        columns = (
+            TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}"),
+            TimeElapsedColumn(), TimeRemainingColumn(),
+        )  # fmt: skip
+        with Progress(*columns, console=self.err, transient=True, disable=not self._may_move) as bar:
+            task = bar.add_task(what, total=total, note="")
+            yield lambda done, note="": bar.update(task, completed=done, note=note)
+
+    @contextmanager
+    def live(self) -> Iterator[Callable[[RenderableType], None]]:
+        """Keep a picture on the terminal while the block runs; yields ``show(renderable)``."""
+        if not self._may_move:
+            yield lambda renderable: None
+            return
+        with Live(console=self.err, transient=True, refresh_per_second=10) as picture:
+            yield picture.update
+
+    @property
+    def _may_move(self) -> bool:
+        return self.speaks and self.err.is_terminal
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if hasattr(value, "tolist") else str(value)
+
+
+console = Console()

@@ -1,0 +1,52 @@
+"""``exoid show``: what a file is, where it came from, and what is in it."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from exoid_cli.console import console
+
+
+def show(
+    file: Annotated[Path, typer.Argument(help="A Parquet file of exoid's, verdict.json, or a trajectory as TOML.")],
+) -> None:
+    """Say what an exoid file is, where it came from, and its columns with units and ranges."""
+    from pipelines.contracts.inspection import inspect
+
+    found = inspect(file)
+    console.emit(found.as_json())
+    console.say(f"{file}: {found.contract}, {found.purpose}")
+    _show_facts("Where it came from", found.origin)
+    _show_facts("Metadata", found.metadata)
+    if found.columns:
+        headings = ("column", "unit", "type", "min", "max", "nulls")
+        rows = [[column[heading] for heading in headings] for column in found.columns]
+        console.say(f"\n{found.rows} rows")
+        console.table(headings, [_shortened(row) for row in rows], numbers="min, max, nulls")
+    if found.fault:
+        raise found.fault
+
+
+def _show_facts(title: str, facts: dict[str, Any]) -> None:
+    if facts:
+        console.say("")
+        console.table((title, ""), _lines(facts))
+
+
+def _lines(facts: dict[str, Any], prefix: str = "") -> list[tuple[str, str]]:
+    """Write nested objects as dotted keys, one line each."""
+    lines: list[tuple[str, str]] = []
+    for key, value in facts.items():
+        if isinstance(value, dict) and value:
+            lines += _lines(value, f"{prefix}{key}.")
+        elif isinstance(value, list) and value and all(isinstance(item, dict) for item in value):
+            for number, item in enumerate(value):
+                lines += _lines(item, f"{prefix}{key}[{number}].")
+        else:
+            lines.append((f"{prefix}{key}", str(value)))
+    return lines
+
+
+def _shortened(row: list[Any]) -> list[Any]:
+    return [f"{cell:.6g}" if isinstance(cell, float) else cell for cell in row]

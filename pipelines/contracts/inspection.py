@@ -1,0 +1,107 @@
+"""What any exoid file is, where it came from, and what is in it, without knowing beforehand."""
+
+import json
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from pipelines.contracts import checks, contract_of, parquet
+from pipelines.errors import ContractError
+
+ORIGIN = ("created_by", "created_at", "inputs", "config")
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """The description of one file."""
+
+    file: str
+    contract: str
+    purpose: str
+    origin: dict[str, Any] = field(default_factory=dict)
+    metadata: dict[str, Any] = field(default_factory=dict)
+    rows: int = 0
+    columns: list[dict[str, Any]] = field(default_factory=list)
+    """Each with column, unit, type, min, max, nulls and meaning."""
+    fault: ContractError | None = None
+    """Why the file does not keep its contract, if so."""
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the description for programs."""
+        fault = str(self.fault) if self.fault else None
+        return {**{key: value for key, value in vars(self).items() if key != "fault"}, "fault": fault}
+
+
+def inspect(path: Path) -> Inspection:
+    """Describe a Parquet file of exoid's, a verdict, or a trajectory as TOML, told apart by their content."""
+    for reader in (_verdict, _trajectory_toml):
+        found = reader(path)
+        if found:
+            return found
+    return _table(path)
+
+
+def _table(path: Path) -> Inspection:
+    contract = contract_of(path)
+    table, metadata = parquet.load(path)
+    fault = None
+    try:
+        contract.read(path)
+    except ContractError as error:
+        fault = error
+    return Inspection(
+        file=str(path),
+        contract=metadata["contract"],
+        purpose=contract.purpose,
+        origin={key: metadata[key] for key in ORIGIN if key in metadata},
+        metadata={key: value for key, value in metadata.items() if key not in (*ORIGIN, "contract")},
+        rows=table.num_rows,
+        columns=[_column(table, name) for name in dict.fromkeys(table.column_names)],
+        fault=fault,
+    )
+
+
+def _column(table: pa.Table, name: str) -> dict[str, Any]:
+    index = table.column_names.index(name)
+    column, about = table.column(index), table.schema.field(index).metadata or {}
+    low, high = None, None
+    if not pa.types.is_nested(column.type):
+        low, high = pc.min_max(column).as_py().values()
+    return {
+        "column": name,
+        "unit": about.get(b"unit", b"").decode(),
+        "type": checks.type_name(column.type),
+        "min": low,
+        "max": high,
+        "nulls": column.null_count,
+        "meaning": about.get(b"meaning", b"").decode(),
+    }
+
+
+def _verdict(path: Path) -> Inspection | None:
+    content = _parsed(path, json.loads)
+    if content.get("contract") != "verdict/1":
+        return None
+    origin = {key: content.pop(key) for key in ORIGIN if key in content}
+    contract = content.pop("contract")
+    return Inspection(str(path), contract, "the answer of `exoid diagnose`", origin, content)
+
+
+def _trajectory_toml(path: Path) -> Inspection | None:
+    content = _parsed(path, tomllib.loads)
+    if not {"a", "b", "omega_rad_s"} <= content.keys():
+        return None
+    return Inspection(str(path), "trajectory as TOML", "Fourier coefficients of an excitation", {}, content)
+
+
+def _parsed(path: Path, parse: Any) -> dict[str, Any]:
+    """Return the file's content as an object, empty where it is none."""
+    try:
+        content = parse(path.read_text(encoding="utf-8"))
+    except (ValueError, FileNotFoundError, IsADirectoryError):
+        return {}  # some other kind of file; its own reader says what is wrong with it
+    return content if isinstance(content, dict) else {}
