@@ -17,6 +17,8 @@ import typer
 from typer.exceptions import TyperException
 
 from exoid_cli.console import console
+from exoid_cli.init import init
+from exoid_cli.settings import settings
 from exoid_cli.show import show
 from pipelines import __version__
 from pipelines.errors import ExoidError
@@ -28,7 +30,9 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-app.command()(show)
+app.command("init")(init)
+app.command("show")(show)
+app.add_typer(settings, name="settings")
 
 
 def _print_version(wanted: bool) -> None:

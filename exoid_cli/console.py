@@ -33,7 +33,7 @@ class Console:
 
     @property
     def speaks(self) -> bool:
-        """Does a person read along?"""
+        """Whether a person reads along."""
         return not (self.quiet or self.json)
 
     def say(self, text: str | Text) -> None:

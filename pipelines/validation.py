@@ -1,12 +1,13 @@
 """A pydantic complaint as one line a person can act on."""
 
 import difflib
+from collections.abc import Callable
 from typing import Any
 
 from pydantic import ValidationError
 
 
-def explain(error: ValidationError, data: Any, known_keys: dict[str, list[str]] | None = None) -> str:
+def explain(error: ValidationError, data: Any, known_keys: Callable[[str], list[str]] = lambda path: []) -> str:
     """Say which key is wrong, what was found there and what was expected.
 
     Parameters
@@ -15,8 +16,8 @@ def explain(error: ValidationError, data: Any, known_keys: dict[str, list[str]] 
         What pydantic found.
     data : dict
         The data it looked at, as read from TOML or JSON.
-    known_keys : dict of str to list of str, optional
-        Allowed keys of each table, by dotted path ("" is the top), for a suggestion after a typing error.
+    known_keys : callable, optional
+        Returns the keys allowed in the table at a dotted path ("" is the top), to suggest one for a misspelt key.
 
     Returns
     -------
@@ -24,11 +25,12 @@ def explain(error: ValidationError, data: Any, known_keys: dict[str, list[str]] 
         The first fault, and how many more there are.
     """
     faults: dict[str, list[dict[str, Any]]] = {}
-    for fault in error.errors(include_url=False):
+    # A misspelt key comes first: the missing key it leaves behind is only its consequence.
+    for fault in sorted(error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden"):
         faults.setdefault(_key_path(fault, data), []).append(dict(fault))
     path, about = next(iter(faults.items()))
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
-    return _sentence(path, about, known_keys or {}) + more
+    return _sentence(path, about, known_keys) + more
 
 
 def suggestion(word: str, known: list[str]) -> str:
@@ -37,13 +39,13 @@ def suggestion(word: str, known: list[str]) -> str:
     return f"did you mean {close[0]}?" if close else f"known are {', '.join(known)}"
 
 
-def _sentence(path: str, faults: list[dict[str, Any]], known_keys: dict[str, list[str]]) -> str:
+def _sentence(path: str, faults: list[dict[str, Any]], known_keys: Callable[[str], list[str]]) -> str:
     kind = faults[0]["type"]
     if kind == "missing":
         return f"{path}: missing; add it"
     if kind == "extra_forbidden":
         parent, _, key = path.rpartition(".")
-        known = known_keys.get(_without_indices(parent), [])
+        known = known_keys(parent)
         return f"{path}: unknown key" + (f"; {suggestion(key, known)}" if known else "; remove it")
     if kind == "value_error":
         return f"{path}: {faults[0]['ctx']['error']}" if path else str(faults[0]["ctx"]["error"])
@@ -59,18 +61,15 @@ def _key_path(fault: Any, data: Any) -> str:
         if isinstance(data, dict) and part in data:
             path, data = f"{path}.{part}" if path else str(part), data[part]
         elif isinstance(data, list | tuple) and isinstance(part, int):
-            path, data = f"{path}[{part}]", data[part]
+            path, data = f"{path}[{part}]", data[part] if part < len(data) else None
         elif fault["type"] == "missing" and part == fault["loc"][-1]:
             path = f"{path}.{part}" if path else str(part)
     return path
 
 
-def _without_indices(path: str) -> str:
-    return ".".join(part.split("[")[0] for part in path.split(".")) if path else ""
-
-
 def _expectation(message: str) -> str:
-    return message.removeprefix("Input should be ").split(", unable to")[0]
+    expected = message.removeprefix("Input should be ").split(", unable to")[0]
+    return expected.replace("String should match pattern", "text matching")
 
 
 def _found(value: Any) -> str:

@@ -1,0 +1,61 @@
+# exoid. `make all` runs the default experiment on the embedded rig, `make test` the tests; both install what they need.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+INSTALLED := $(VENV)/.installed
+# Graph of the experiment: once, there; `exoid init` gives the same file to every new experiment.
+EXPERIMENT := $(MAKE) --no-print-directory -f datasets/experiments/experiment.mk \
+	EXOID=$(BIN)/exoid CONFIG=datasets/experiments/default.toml OUT=build/default
+
+.DEFAULT_GOAL := help
+.PHONY: help all test test-slow check format bench docs lock clean install
+
+help: ## this list
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | sort | expand -t 12
+
+all: $(INSTALLED) ## design, acquire, filter, identify and simulate the default experiment, into build/default
+	@$(EXPERIMENT) all
+
+test: $(INSTALLED) ## the tests
+	$(BIN)/pytest -n 2 -m "not slow"
+
+test-slow: $(INSTALLED) ## the statistical campaigns, minutes long
+	$(BIN)/pytest -n 2 -m slow
+
+check: $(INSTALLED) ## lint, formatting, types, direction of imports
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: $(INSTALLED) ## format the code
+	$(BIN)/ruff check --fix --select I
+	$(BIN)/ruff format
+
+bench: $(INSTALLED) ## measure speed
+	$(BIN)/python -m tests.bench
+
+docs: $(INSTALLED) ## bring the generated pages up to date
+	$(BIN)/python -m pipelines.settings.reference > docs/settings.md
+
+lock: ## pin the newest versions that fit pyproject.toml, in requirements.lock
+	rm -rf build/lock
+	$(PYTHON) -m venv build/lock
+	build/lock/bin/pip install --quiet ".[dev]" hatchling editables
+	build/lock/bin/pip freeze --exclude exoid > requirements.lock
+
+install: $(INSTALLED) ## make the environment in .venv
+
+$(INSTALLED): pyproject.toml requirements.lock
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "exoid needs Python 3.11 or newer, found $$($(PYTHON) --version 2>&1); name another: make PYTHON=python3.11" >&2; \
+	  exit 2; }
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $@
+
+clean: ## remove results and caches; the environment stays
+	rm -rf build .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis
+	find exoid_cli pipelines tests -name __pycache__ -prune -exec rm -rf {} +

@@ -1,0 +1,18 @@
+"""``exoid init``: a new experiment to edit and run."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from exoid_cli.console import console
+
+
+def init(folder: Annotated[Path, typer.Argument(help="Where the experiment shall live; made if need be.")]) -> None:
+    """Start a new experiment: a commented exoid.toml, the rig's description, and a Makefile."""
+    from pipelines.settings.template import create
+
+    command = Path(sys.argv[0])
+    create(folder, exoid=str(command.resolve()) if command.name == "exoid" else f"{sys.executable} -m exoid_cli.app")
+    console.say(f"{folder}: new experiment; edit {folder / 'exoid.toml'}, then run `make -C {folder}`")

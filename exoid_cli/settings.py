@@ -1,0 +1,32 @@
+"""``exoid settings``: an experiment's settings for make."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from exoid_cli.console import console
+
+settings = typer.Typer(help="Work with an experiment's settings.", no_args_is_help=True)
+
+
+@settings.command("check")
+def check(config: Annotated[Path, typer.Argument(help="The experiment's exoid.toml.")]) -> None:
+    """Say whether an experiment's file can be used; print it complete with --json."""
+    from pipelines.settings import Experiment
+
+    experiment = Experiment.load(config)
+    console.emit(experiment.model_dump(mode="json"))
+    console.say(f"{config}: {len(experiment.run)} runs, all settings are valid")
+
+
+@settings.command("split")
+def split(
+    config: Annotated[Path, typer.Argument(help="The experiment's exoid.toml.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for one file a section, written if changed.")],
+) -> None:
+    """Write one file a section, so that make re-runs only what a change touches."""
+    from pipelines.settings import Experiment
+    from pipelines.settings.split import split as split_settings
+
+    split_settings(Experiment.load(config), out)

@@ -1,0 +1,64 @@
+"""Settings read from TOML: typed, frozen, and refused in one line with the key's path."""
+
+import json
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from pipelines.errors import SettingsError
+from pipelines.validation import explain
+
+
+class Settings(BaseModel):
+    """One table of a settings file. Every field has a description; a unit stands at the end of its name."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+Model = TypeVar("Model", bound=Settings)
+
+
+def load_toml(path: Path | str, model: type[Model]) -> Model:
+    """Return the settings in a TOML file, or raise a SettingsError that names file, key and remedy."""
+    path = Path(path)
+    content = _content(path)
+    try:
+        # As JSON, because there strict means what a TOML file means: "5" is no number, [1, 2] is a pair.
+        return model.model_validate_json(json.dumps(content, default=str), strict=True)
+    except ValidationError as error:
+        raise SettingsError(f"{path}: {explain(error, content, lambda key: _keys_at(model, key))}") from error
+
+
+def _content(path: Path) -> dict[str, Any]:
+    if not path.exists():
+        raise SettingsError(f"{path}: no such file; `exoid init DIR` writes a commented one to start from")
+    if path.is_dir():
+        raise SettingsError(f"{path}: is a folder, expected a TOML file; name the file in it")
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except tomllib.TOMLDecodeError as error:
+        raise SettingsError(f"{path}: is not valid TOML: {error}; mend that line") from error
+    except UnicodeDecodeError as error:
+        raise SettingsError(f"{path}: is not UTF-8 text, expected a TOML file; save it as UTF-8") from error
+
+
+def _keys_at(model: type[BaseModel], path: str) -> list[str]:
+    """Return the keys that the table at a dotted path (``design.bounds``, ``run[0]``) may have."""
+    for part in path.split(".") if path else []:
+        field = model.model_fields.get(part.split("[")[0])
+        inner = next(models_in(field.annotation), None) if field else None
+        if inner is None:
+            return []
+        model = inner
+    return list(model.model_fields)
+
+
+def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Yield the models that a field's type mentions: of ``tuple[Run, ...] | None`` it is Run."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for argument in get_args(annotation):
+        yield from models_in(argument)

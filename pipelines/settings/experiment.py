@@ -1,0 +1,67 @@
+"""``exoid.toml``: one experiment, section by section."""
+
+from pathlib import Path
+from typing import Self
+
+from pydantic import Field, PrivateAttr, field_validator
+
+from pipelines.errors import SettingsError
+from pipelines.settings.acquire import AcquireSettings, RunSettings
+from pipelines.settings.base import Settings, load_toml
+from pipelines.settings.design import DesignSettings
+from pipelines.settings.filter import FilterSettings
+from pipelines.settings.identify import IdentifySettings
+from pipelines.settings.mechanism import MechanismSettings
+from pipelines.settings.simulate import SimulateSettings
+from pipelines.validation import suggestion
+
+
+def _four_runs() -> tuple[RunSettings, ...]:
+    """Return both kinds of run, each once to fit and once to judge the fit."""
+    return (
+        RunSettings(name="exo_alone_train", run="exo_alone", purpose="train", seed=1),
+        RunSettings(name="exo_alone_validate", run="exo_alone", purpose="validate", seed=2),
+        RunSettings(name="with_human_train", run="with_human", purpose="train", seed=3),
+        RunSettings(name="with_human_validate", run="with_human", purpose="validate", seed=4),
+    )
+
+
+class Experiment(Settings):
+    """All settings of one experiment; every key has a default."""
+
+    mechanism: MechanismSettings = Field(MechanismSettings(), description="The leg's geometry.")
+    design: DesignSettings = Field(DesignSettings(), description="The excitation.")
+    acquire: AcquireSettings = Field(AcquireSettings(), description="Recording.")
+    run: tuple[RunSettings, ...] = Field(default_factory=_four_runs, min_length=1, description="The runs, in order.")
+    filter: FilterSettings = Field(FilterSettings(), description="Filtering.")
+    identify: IdentifySettings = Field(IdentifySettings(), description="Identification.")
+    simulate: SimulateSettings = Field(SimulateSettings(), description="Simulation.")
+
+    _folder: Path = PrivateAttr(default=Path())
+
+    @field_validator("run")
+    @classmethod
+    def _names_differ(cls, runs: tuple[RunSettings, ...]) -> tuple[RunSettings, ...]:
+        names = [run.name for run in runs]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"found the name {name} twice, expected each once; rename one run")
+        return runs
+
+    @classmethod
+    def load(cls, path: Path | str) -> Self:
+        """Return the experiment in a file; names of files in it are taken from that file's folder."""
+        experiment = load_toml(path, cls)
+        experiment._folder = Path(path).parent
+        return experiment
+
+    def file(self, name: str) -> Path:
+        """Return the path of a file that the settings name."""
+        return self._folder / name
+
+    def run_named(self, name: str) -> RunSettings:
+        """Return one run's settings by its name."""
+        for run in self.run:
+            if run.name == name:
+                return run
+        raise SettingsError(f"run {name}: no such [[run]]; {suggestion(name, [run.name for run in self.run])}")

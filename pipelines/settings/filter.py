@@ -1,0 +1,16 @@
+"""``[filter]``: how a recording becomes fit for regression."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from pipelines.settings.base import Settings
+
+
+class FilterSettings(Settings):
+    """The zero-phase low-pass on the angle, from which the derivatives follow."""
+
+    cutoff_hz: Literal["auto"] | Annotated[float, Field(gt=0.0)] = Field(
+        "auto", description='Cut-off, or "auto": where the angle\'s spectrum meets its noise floor.'
+    )
+    order: int = Field(4, ge=1, le=10, description="Order of the Butterworth filter, before it runs both ways.")

@@ -1,0 +1,56 @@
+"""The page docs/settings.md, written from the settings themselves.
+
+``python -m pipelines.settings.reference > docs/settings.md`` brings it up to date; a test says when it is not.
+"""
+
+import json
+from collections.abc import Iterator
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from pipelines.settings.base import models_in
+from pipelines.settings.experiment import Experiment
+
+INTRODUCTION = """\
+# Settings: every key of exoid.toml
+
+Written by `make docs` from `pipelines/settings/`; change it there. Every key may be left out.
+`datasets/experiments/default.toml` is a complete file to start from.
+"""
+
+
+def reference() -> str:
+    """Return the page as Markdown."""
+    head = "| key | default | meaning |\n|---|---|---|\n"
+    sections = [
+        f"## {heading}\n\n{model.__doc__}\n\n{head}" + "\n".join(rows)
+        for heading, model in sections_of(Experiment)
+        if (rows := list(_rows(model)))
+    ]
+    return "\n\n".join([INTRODUCTION.rstrip(), *sections]) + "\n"
+
+
+def sections_of(model: type[BaseModel], path: str = "") -> Iterator[tuple[str, type[BaseModel]]]:
+    """Yield every table below a model with its heading, ``[design]`` or ``[[run]]``."""
+    for name, field in model.model_fields.items():
+        for inner in models_in(field.annotation):
+            heading = f"[{path}{name}]"
+            yield f"[{heading}]" if inner is not field.annotation else heading, inner
+            yield from sections_of(inner, f"{path}{name}.")
+
+
+def _rows(model: type[BaseModel]) -> Iterator[str]:
+    for name, field in model.model_fields.items():
+        if not any(models_in(field.annotation)):
+            yield f"| `{name}` | {_default(field)} | {field.description} |"
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "must be given"
+    return "none" if field.default is None else f"`{json.dumps(field.default)}`"
+
+
+if __name__ == "__main__":
+    print(reference(), end="")

@@ -1,0 +1,31 @@
+"""A new experiment: the default one, copied to be edited."""
+
+import shutil
+from pathlib import Path
+
+from pipelines.contracts.atomic import write_text
+from pipelines.errors import SettingsError
+from pipelines.settings.datasets import datasets
+
+
+def create(folder: Path, exoid: str) -> None:
+    """Write exoid.toml, rigs/ and Makefile into a folder; nothing that is there is overwritten.
+
+    Parameters
+    ----------
+    folder : Path
+        The experiment's folder, made if need be.
+    exoid : str
+        The command that the Makefile calls unless told otherwise.
+    """
+    source = datasets()
+    for name in ("exoid.toml", "rigs", "Makefile"):
+        if (folder / name).exists():
+            raise SettingsError(
+                f"{folder / name}: exists already, not overwritten; choose a new folder or move it away"
+            )
+    shutil.copytree(source / "rigs", folder / "rigs")
+    experiment = (source / "experiments" / "default.toml").read_text(encoding="utf-8")
+    write_text(folder / "exoid.toml", experiment.replace('"../rigs/', '"rigs/'))
+    graph = (source / "experiments" / "experiment.mk").read_text(encoding="utf-8")
+    write_text(folder / "Makefile", graph.replace("EXOID ?= exoid\n", f"EXOID ?= {exoid}\n"))
