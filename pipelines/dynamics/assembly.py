@@ -1,0 +1,111 @@
+"""A model laid out for compiled code: kernels in a tuple, values and memory in flat arrays."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.effects import Effect, Side
+from pipelines.effects.kernel import derivative, reaction, reading, spring
+from pipelines.errors import InputError
+from pipelines.mechanics.leg import Geometry
+from pipelines.model import Model
+
+MOST_TERMS = 16
+"""Length of every tuple of kernels. Fixed, so that one compilation serves all models."""
+
+
+@reaction
+def _no_reaction(at, state, values, geometry, joint, out):
+    pass
+
+
+@derivative
+def _no_memory(at, state, values, geometry, joint, out):
+    pass
+
+
+@spring
+def _no_spring(twist, twist_rate, values):
+    return 0.0
+
+
+@reading
+def _no_reading(angle, torque, values, joint):
+    pass
+
+
+class Assembly(NamedTuple):
+    """What the compiled dynamics needs of a model; made by ``assemble``.
+
+    Terms stand in the order: on links and inertial, on links, on drives and inertial, on drives;
+    ``bounds`` (5,) says where each group begins and the last ends. Per term i: its kernels, ``joint[i]`` (-1 for the whole leg), its values
+    ``values[value_at[i] : value_at[i + 1]]``, its memory ``state_at[i] : state_at[i + 1]``.
+    """
+
+    joints: int
+    bounds: np.ndarray
+    reactions: tuple
+    derivatives: tuple
+    springs: tuple
+    readings: tuple
+    joint: np.ndarray
+    values: np.ndarray
+    value_at: np.ndarray
+    state_at: np.ndarray
+    sprung: np.ndarray
+    """For each joint the term that is its transmission, -1 for a rigid one."""
+    motor_inertia: np.ndarray
+    geometry: np.ndarray
+
+
+def _padded(kernels: Sequence, blank) -> tuple:
+    return tuple(blank if kernel is None else kernel for kernel in kernels) + (blank,) * (MOST_TERMS - len(kernels))
+
+
+def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "knee")) -> Assembly:
+    """Lay a model out for the compiled dynamics.
+
+    ``model`` holds the terms of one kind of run (``Model.for_run``).
+    """
+    terms = sorted(model, key=lambda term: _group(term.effect))
+    effects = [term.effect for term in terms]
+    if len(effects) >= MOST_TERMS:
+        raise InputError(f"the model has {len(effects)} effects, the simulation takes {MOST_TERMS - 1} at most")
+    joint = np.array([joints.index(e.joint) if e.joint else -1 for e in effects], dtype=np.int64)
+    sprung = np.full(len(joints), -1, dtype=np.int64)
+    motor_inertia = np.zeros(len(joints))
+    for i, effect in enumerate(effects):
+        if effect.spring is None:
+            continue
+        if sprung[joint[i]] >= 0:
+            raise InputError(f"{effect.joint}: {effect.name} is a second transmission; a joint has one at most")
+        sprung[joint[i]], motor_inertia[joint[i]] = i, effect.motor_inertia
+    return Assembly(
+        joints=len(joints),
+        bounds=np.searchsorted([_group(e) for e in effects], np.arange(5)).astype(np.int64),
+        reactions=_padded([e.reaction for e in effects], _kernel(_no_reaction)),
+        derivatives=_padded([e.derivative for e in effects], _kernel(_no_memory)),
+        springs=_padded([e.spring for e in effects], _kernel(_no_spring)),
+        readings=_padded([e.reading for e in effects], _kernel(_no_reading)),
+        joint=joint,
+        values=np.concatenate([term.values for term in terms]).astype(float),
+        value_at=_offsets([len(term.values) for term in terms]),
+        state_at=_offsets([e.states for e in effects]),
+        sprung=sprung,
+        motor_inertia=motor_inertia,
+        geometry=geometry.array(),
+    )
+
+
+def _group(effect: Effect) -> int:
+    return 2 * (effect.side is Side.DRIVE) + (not effect.inertial)
+
+
+def _kernel(wrapped: staticmethod):
+    return wrapped.__func__
+
+
+def _offsets(lengths: Sequence[int]) -> NDArray:
+    return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)

@@ -1,0 +1,284 @@
+"""Forward dynamics of any model: acceleration from drive torque, and one step of time.
+
+A joint has two coordinates, the motor's and the link's, which are one where it is rigid. Motors
+carry the drive's effects and the encoder; links carry everything else. With T the torque passed on::
+
+    M(q) ddq + rest(q, dq) = T          links (structure, human)
+    J dd_theta + drive(theta, d_theta) + T = drive torque     motors; T from the spring
+
+and a rigid joint is the sum of its two rows.
+
+Dry friction is a set-valued function of speed. The step looks for the ``direction`` in [-1, 1]
+of each joint that is consistent with the speed at the step's end (projected Gauss-Seidel on the
+complementarity problem; Stewart and Trinkle, 1996), so joints stick without chatter.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pipelines.dynamics.assembly import Assembly
+from pipelines.effects.kernel import Instant
+
+STICTION_SWEEPS = 20
+STICTION_TOLERANCE = 1e-6
+
+HOT = {"cache": True, "_nrt": False}
+"""How the innermost functions are compiled. They allocate nothing, and numba's counting of references
+to arrays would take more than half of their time; ``_nrt`` is its switch for that."""
+
+Q, DQ, THETA, DTHETA = range(4)
+"""Rows of a state: link angle and speed, motor angle and speed, (4, J)."""
+
+
+def resting_state(q: NDArray) -> NDArray:
+    """Return the state (4, J) of a leg at rest at angles ``q`` (J,), springs relaxed."""
+    still = np.zeros_like(q, dtype=float)
+    return np.array([q, still, q, still], dtype=float)
+
+
+class Workspace(NamedTuple):
+    """Scratch arrays of one simulation, so that its inner loop allocates nothing."""
+
+    zero: np.ndarray
+    ddq: np.ndarray
+    mass: np.ndarray
+    motor_mass: np.ndarray
+    rest: np.ndarray
+    passed: np.ndarray
+    friction: np.ndarray
+    push: np.ndarray
+    column: np.ndarray
+    slope: np.ndarray
+    direction: np.ndarray
+    link_direction: np.ndarray
+
+
+@njit(cache=True)
+def workspace(joints):
+    """Make the scratch arrays for a number of joints."""
+    v = np.zeros((10, joints))
+    m = np.zeros((2, joints, joints))
+    return Workspace(v[0], v[1], m[0], m[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8], v[9])
+
+
+# Inlined: a call hands over the whole assembly, which costs as much as the equations do.
+@njit(cache=True, inline="always")
+def _react(a, first, last, at, memory, out):
+    """Add the reactions of terms ``first`` to ``last - 1`` to ``out`` (J,)."""
+    for i in range(first, last):
+        values = a.values[a.value_at[i] : a.value_at[i + 1]]
+        state = memory[a.state_at[i] : a.state_at[i + 1]]
+        a.reactions[i](at, state, values, a.geometry, a.joint[i], out)
+
+
+@njit(cache=True, inline="always")
+def _mass_and_rest(a, w, first, last, t, angle, speed, direction, load, memory, M, rest):
+    """Write inertial terms' mass matrix into ``M`` (J, J), their torque at no acceleration into ``rest`` (J,).
+
+    The mass matrix is the torque at unit acceleration less that at none (Walker and Orin, 1982).
+    """
+    rest[:] = 0.0
+    _react(a, first, last, Instant(t, angle, speed, w.zero, direction, load), memory, rest)
+    w.ddq[:] = 0.0
+    for k in range(a.joints):
+        w.ddq[k] = 1.0
+        w.column[:] = 0.0
+        _react(a, first, last, Instant(t, angle, speed, w.ddq, direction, load), memory, w.column)
+        w.ddq[k] = 0.0
+        for row in range(a.joints):
+            M[row, k] = w.column[row] - rest[row]
+
+
+@njit(cache=True, inline="always")
+def _solve(M, b, x):
+    """Solve M x = b for one or two joints."""
+    if b.shape[0] == 1:
+        x[0] = b[0] / M[0, 0]
+    else:
+        determinant = M[0, 0] * M[1, 1] - M[0, 1] * M[1, 0]
+        x[0] = (M[1, 1] * b[0] - M[0, 1] * b[1]) / determinant
+        x[1] = (M[0, 0] * b[1] - M[1, 0] * b[0]) / determinant
+
+
+@njit(cache=True, inline="always")
+def _prepare(a, w, t, state, memory, load):
+    """Compute all that does not depend on the direction of dry friction: masses, link torque, spring torque."""
+    link, after_inertial, drive = a.bounds[0], a.bounds[1], a.bounds[2]
+    for j in range(a.joints):
+        w.link_direction[j] = np.sign(state[DQ, j])
+    _mass_and_rest(a, w, link, after_inertial, t, state[Q], state[DQ], w.link_direction, load, memory, w.mass, w.rest)
+    if drive > after_inertial:
+        at = Instant(t, state[Q], state[DQ], w.zero, w.link_direction, load)
+        _react(a, after_inertial, drive, at, memory, w.rest)
+    if a.bounds[3] > drive:
+        _mass_and_rest(
+            a, w, drive, a.bounds[3], t, state[THETA], state[DTHETA], w.zero, load, memory, w.motor_mass, w.push
+        )
+    for j in range(a.joints):
+        term = a.sprung[j]
+        if term < 0:
+            w.mass[j, j] += w.motor_mass[j, j]
+        else:
+            values = a.values[a.value_at[term] : a.value_at[term + 1]]
+            w.passed[j] = a.springs[term](state[THETA, j] - state[Q, j], state[DTHETA, j] - state[DQ, j], values)
+
+
+@njit(cache=True, inline="always")
+def _finish(a, w, t, state, memory, direction, load, drive, rates):
+    """Write d(state)/dt for a direction of dry friction, after ``_prepare``."""
+    w.friction[:] = 0.0
+    at = Instant(t, state[THETA], state[DTHETA], w.zero, direction, load)
+    _react(a, a.bounds[2], a.bounds[4], at, memory, w.friction)
+    for j in range(a.joints):
+        if a.sprung[j] < 0:
+            w.push[j] = drive[j] - w.friction[j] - w.rest[j]
+        else:
+            w.push[j] = w.passed[j] - w.rest[j]
+            inertia = a.motor_inertia[j] + w.motor_mass[j, j]
+            rates[DTHETA, j] = (drive[j] - w.friction[j] - w.passed[j]) / inertia
+    _solve(w.mass, w.push, rates[DQ])
+    for j in range(a.joints):
+        rates[Q, j] = state[DQ, j]
+        rates[THETA, j] = state[DTHETA, j]
+        if a.sprung[j] < 0:
+            rates[DTHETA, j] = rates[DQ, j]
+
+
+@njit(**HOT)
+def accelerations(a, w, t, state, memory, direction, load, drive, rates):
+    """Write d(state)/dt into ``rates`` (4, J).
+
+    Parameters
+    ----------
+    a : Assembly
+    w : Workspace
+    t : float
+        Time, s.
+    state : (4, J) array
+        Rows Q, DQ, THETA, DTHETA.
+    memory : (m,) array
+        Memories of all effects.
+    direction : (J,) array
+        Sign of each motor's speed, or what holds it, in [-1, 1].
+    load : (J,) array
+        Torque passed on to the links, N·m, as of the last step.
+    drive : (J,) array
+        Drive torque, N·m.
+    """
+    _prepare(a, w, t, state, memory, load)
+    _finish(a, w, t, state, memory, direction, load, drive, rates)
+
+
+@njit(**HOT)
+def memory_rates(a, w, t, state, memory, direction, load, rates):
+    """Write the rates of all memories into ``rates`` (m,)."""
+    motor = Instant(t, state[THETA], state[DTHETA], w.zero, direction, load)
+    link = Instant(t, state[Q], state[DQ], w.zero, direction, load)
+    for i in range(a.bounds[4]):
+        first, last = a.state_at[i], a.state_at[i + 1]
+        if last > first:
+            values = a.values[a.value_at[i] : a.value_at[i + 1]]
+            at = motor if i >= a.bounds[2] else link
+            a.derivatives[i](at, memory[first:last], values, a.geometry, a.joint[i], rates[first:last])
+
+
+@njit(**HOT)
+def find_direction(a, w, t, h, state, memory, load, drive, rates):
+    """Write into ``w.direction`` (J,) the sign of each motor's speed over the next ``h`` seconds.
+
+    Where neither sign is consistent with the speed that it leads to, the value that stops the joint.
+    ``rates`` (4, J) is left holding d(state)/dt with that direction.
+    """
+    for j in range(a.joints):
+        w.direction[j] = np.sign(state[DTHETA, j])
+    accelerations(a, w, t, state, memory, w.direction, load, drive, rates)
+    crossing = False
+    for j in range(a.joints):
+        crossing |= (state[DTHETA, j] + h * rates[DTHETA, j]) * w.direction[j] <= 0.0
+    if not crossing:
+        return
+    for j in range(a.joints):
+        w.slope[j] = _grip(a, w, t, state, memory, load, drive, rates, j)
+    for _ in range(STICTION_SWEEPS):
+        change = 0.0
+        for j in range(a.joints):
+            _finish(a, w, t, state, memory, w.direction, load, drive, rates)
+            ahead = state[DTHETA, j] + h * rates[DTHETA, j]
+            before = w.direction[j]
+            if w.slope[j] < 0.0:
+                w.direction[j] = min(1.0, max(-1.0, before - ahead / (h * w.slope[j])))
+            else:
+                # No dry friction at this joint: nothing can hold it.
+                w.direction[j] = np.sign(ahead)
+            change = max(change, abs(w.direction[j] - before))
+        if change < STICTION_TOLERANCE:
+            break
+    _finish(a, w, t, state, memory, w.direction, load, drive, rates)
+
+
+@njit(**HOT)
+def _grip(a, w, t, state, memory, load, drive, rates, j):
+    """How much a motor's acceleration changes per unit of its direction, rad/s²: negative where friction is dry."""
+    now = w.direction[j]
+    w.direction[j] = -1.0
+    _finish(a, w, t, state, memory, w.direction, load, drive, rates)
+    backward = rates[DTHETA, j]
+    w.direction[j] = 1.0
+    _finish(a, w, t, state, memory, w.direction, load, drive, rates)
+    w.direction[j] = now
+    return 0.5 * (rates[DTHETA, j] - backward)
+
+
+class Stages(NamedTuple):
+    """Scratch of the Runge-Kutta step: four rates of state and of memory, and the stage's own."""
+
+    rates: np.ndarray
+    memory_rates: np.ndarray
+    state: np.ndarray
+    memory: np.ndarray
+
+
+@njit(cache=True)
+def stages(joints, memories):
+    """Make the scratch of the Runge-Kutta step."""
+    return Stages(np.zeros((4, 4, joints)), np.zeros((4, memories)), np.zeros((4, joints)), np.zeros(memories))
+
+
+@njit(**HOT)
+def step(a, w, s, t, h, state, memory, load, drive):
+    """Advance ``state`` (4, J), ``memory`` (m,) and ``load`` (J,) by ``h`` seconds under constant drive torque.
+
+    Classical Runge-Kutta with the direction of dry friction held over the step.
+    """
+    find_direction(a, w, t, h, state, memory, load, drive, s.rates[0])
+    memory_rates(a, w, t, state, memory, w.direction, load, s.memory_rates[0])
+    load[:] = 0.0
+    at = Instant(t, state[Q], state[DQ], s.rates[0, DQ], w.direction, w.zero)
+    _react(a, a.bounds[0], a.bounds[2], at, memory, load)
+    for i in range(1, 4):
+        reach = h if i == 3 else 0.5 * h
+        for row in range(4):
+            for j in range(a.joints):
+                s.state[row, j] = state[row, j] + reach * s.rates[i - 1, row, j]
+        for m in range(memory.shape[0]):
+            s.memory[m] = memory[m] + reach * s.memory_rates[i - 1, m]
+        accelerations(a, w, t + reach, s.state, s.memory, w.direction, load, drive, s.rates[i])
+        memory_rates(a, w, t + reach, s.state, s.memory, w.direction, load, s.memory_rates[i])
+    for row in range(4):
+        for j in range(a.joints):
+            state[row, j] += h / 6.0 * _weighted(s.rates[:, row, j])
+    for m in range(memory.shape[0]):
+        memory[m] += h / 6.0 * _weighted(s.memory_rates[:, m])
+
+
+@njit(cache=True, inline="always")
+def _weighted(k):
+    return k[0] + 2.0 * k[1] + 2.0 * k[2] + k[3]
+
+
+def memory_size(a: Assembly) -> int:
+    """Return how many memories the effects have together."""
+    return int(a.state_at[-1])

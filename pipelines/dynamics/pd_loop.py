@@ -1,0 +1,172 @@
+"""The leg under its drives' own position loops: sampled PD control of encoder counts.
+
+The same loop moves the virtual rig sample by sample and replays a recording under its references.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pipelines.dynamics.assembly import Assembly
+from pipelines.dynamics.forward import DQ, Q, THETA, memory_size, resting_state, stages, step, workspace
+
+SUBSTEPS = 6
+"""Integration steps per control period; even, so that the middle of a sample is one of them."""
+
+
+class Drives(NamedTuple):
+    """Position controllers of all joints: torque = kp (reference - angle) + kd (its rate - speed), limited.
+
+    The reference runs in a straight line from one set-point to the next; speed is the low-passed
+    difference of the counted angle.
+    """
+
+    kp: np.ndarray
+    """(J,) N·m/rad."""
+    kd: np.ndarray
+    """(J,) N·m·s/rad."""
+    limit: np.ndarray
+    """(J,) N·m."""
+    count: np.ndarray
+    """(J,) rad per encoder count; 0 for an ideal encoder."""
+    speed_share: float
+    """What a new speed adds to the low-passed one each control period, (0, 1]."""
+    periods: int
+    """Control periods per sample."""
+    step_s: float
+    """Integration step, s."""
+
+
+def make_drives(
+    kp: NDArray,
+    kd: NDArray,
+    limit: NDArray,
+    counts_per_turn: NDArray,
+    rate_hz: float,
+    sample_rate_hz: float,
+    speed_cutoff_hz: float = 100.0,
+) -> Drives:
+    """Lay drives out for the compiled loop; ``rate_hz`` is rounded to a multiple of the sample rate."""
+    periods = max(1, round(rate_hz / sample_rate_hz))
+    period = 1.0 / (sample_rate_hz * periods)
+    counts = np.asarray(counts_per_turn, float)
+    return Drives(
+        kp=np.asarray(kp, float),
+        kd=np.asarray(kd, float),
+        limit=np.asarray(limit, float),
+        count=np.divide(2 * np.pi, counts, out=np.zeros_like(counts), where=counts > 0),
+        speed_share=float(1.0 - np.exp(-2 * np.pi * speed_cutoff_hz * period)),
+        periods=periods,
+        step_s=period / SUBSTEPS,
+    )
+
+
+class LoopState(NamedTuple):
+    """All that changes while the loop runs."""
+
+    state: np.ndarray
+    """(4, J) links and motors."""
+    memory: np.ndarray
+    load: np.ndarray
+    angle: np.ndarray
+    """(J,) last counted angle."""
+    speed: np.ndarray
+    """(J,) the drive's estimate."""
+    torque: np.ndarray
+    """(J,) what the drives apply."""
+    reference: np.ndarray
+    """(J,) last set-point."""
+
+
+def loop_at_rest(a: Assembly, q: NDArray) -> LoopState:
+    """Return the loop with the leg at rest at link angles ``q`` (J,) and the set-point there."""
+    q = np.asarray(q, float)
+    angle, unused = q.copy(), np.zeros(a.joints)
+    _read(a, angle, unused)
+    zeros = [np.zeros(a.joints) for _ in range(3)]
+    return LoopState(resting_state(q), np.zeros(memory_size(a)), zeros[0], angle, zeros[1], zeros[2], angle.copy())
+
+
+@njit(cache=True)
+def _read(a, angle, torque):
+    """Turn true motor angles and drive torques into what the sensors say, in place."""
+    for i in range(a.bounds[4]):
+        a.readings[i](angle, torque, a.values[a.value_at[i] : a.value_at[i + 1]], a.joint[i])
+
+
+@njit(cache=True)
+def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth):
+    """Advance the loop by one sample period that begins at ``t``.
+
+    Parameters
+    ----------
+    a, d, w, s, loop
+        Assembly, Drives, workspace, stages, LoopState.
+    reference : (J,) array
+        Set-point to be reached at the end of the period.
+    enabled : (J,) array of bool
+        False for a drive that applies no torque.
+    angle, speed, torque : (J,) arrays, written
+        Measured angle and the drive's speed at the middle of the period, mean torque over it.
+    truth : (4, J) array, written
+        Link angle, speed, acceleration and motor angle at the middle of the period.
+    """
+    j_count = a.joints
+    begin = loop.reference.copy()
+    torque[:] = 0.0
+    unused = np.zeros(j_count)
+    counted = np.zeros(j_count)
+    period = d.step_s * SUBSTEPS
+    middle = d.periods * SUBSTEPS // 2
+    done = 0
+    before = loop.state
+    for c in range(d.periods):
+        counted[:] = loop.state[THETA]
+        unused[:] = 0.0
+        _read(a, counted, unused)
+        for j in range(j_count):
+            if d.count[j] > 0.0:
+                counted[j] = np.floor(counted[j] / d.count[j] + 0.5) * d.count[j]
+            loop.speed[j] += d.speed_share * ((counted[j] - loop.angle[j]) / period - loop.speed[j])
+            loop.angle[j] = counted[j]
+            wanted = begin[j] + (reference[j] - begin[j]) * c / d.periods
+            rate = (reference[j] - begin[j]) / (period * d.periods)
+            command = d.kp[j] * (wanted - counted[j]) + d.kd[j] * (rate - loop.speed[j])
+            loop.torque[j] = min(d.limit[j], max(-d.limit[j], command)) if enabled[j] else 0.0
+        for _ in range(SUBSTEPS):
+            if done == middle:
+                angle[:] = loop.state[THETA]
+                unused[:] = 0.0
+                _read(a, angle, unused)
+                for j in range(j_count):
+                    if d.count[j] > 0.0:
+                        angle[j] = np.floor(angle[j] / d.count[j] + 0.5) * d.count[j]
+                speed[:] = loop.speed
+                before = loop.state.copy()
+            step(a, w, s, t + done * d.step_s, d.step_s, loop.state, loop.memory, loop.load, loop.torque)
+            if done == middle:
+                truth[0], truth[1] = before[Q], before[DQ]
+                truth[2], truth[3] = s.rates[0, DQ], before[THETA]
+            done += 1
+        for j in range(j_count):
+            torque[j] += loop.torque[j] / d.periods
+    unused[:] = 0.0
+    _read(a, unused, torque)
+    loop.reference[:] = reference
+
+
+@njit(cache=True)
+def follow(a, d, loop, reference, start_s):
+    """Run the loop along set-points (n, J): measured angle, speed, torque (n, J) and truth (n, 4, J) of each sample."""
+    n, joints = reference.shape
+    w, s = workspace(joints), stages(joints, loop.memory.shape[0])
+    angle, speed, torque = np.empty((n, joints)), np.empty((n, joints)), np.empty((n, joints))
+    truth = np.empty((n, 4, joints))
+    enabled = np.ones(joints, dtype=np.bool_)
+    period = d.step_s * SUBSTEPS * d.periods
+    for k in range(n):
+        t = start_s + k * period
+        advance(a, d, w, s, loop, t, reference[k], enabled, angle[k], speed[k], torque[k], truth[k])
+    return angle, speed, torque, truth

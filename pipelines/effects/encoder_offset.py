@@ -1,0 +1,32 @@
+"""An encoder whose zero is not where the joint's is."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.effects.effect import Effect, Parameter, Side
+from pipelines.effects.kernel import reading
+from pipelines.mechanics.motion import Motion
+
+
+class EncoderOffset(Effect):
+    """The measured angle is the true one plus a constant."""
+
+    name = "encoder_offset"
+    title = "Encoder offset"
+    side = Side.SENSOR
+    equation = "measured angle = true angle + offset"
+    source = "Hollerbach, Khalil, Gautier (2016), Springer Handbook of Robotics, ch. 6 (joint offset calibration)"
+    looks_like = "gravity torque that leads or lags the angle: a residual like the cosine of the segment's angle"
+    confirm = "hang the leg freely and read the angles: both should be zero with the knee straight"
+    shape = (Parameter("offset", "rad", "measured less true angle", "q_o", (-0.15, 0.15)),)
+
+    @reading
+    def reading(angle, torque, values, joint):
+        """Shift the angle."""
+        angle[joint] += values[0]
+
+    def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
+        """Return the motion with the true angle."""
+        shift = np.zeros(len(motion.joints))
+        shift[motion.joint_index(self.joint)] = shape[0]
+        return motion.with_state(motion.q - shift, motion.dq, motion.ddq)

@@ -1,0 +1,44 @@
+"""A joint that twists: the encoder sits on the motor's side and the link hangs behind a spring."""
+
+from math import sqrt
+
+from numpy.typing import NDArray
+
+from pipelines.effects.effect import Effect, Parameter, Side
+from pipelines.effects.kernel import spring
+from pipelines.mechanics.motion import Motion
+
+MOTOR_INERTIA = 0.1
+"""kg·m², reflected to the joint; what little of a rigid drive's inertia stays with the motor."""
+
+DAMPING_RATIO = 0.1
+"""Of the motor's swing on the spring: a harmonic drive's flexspline."""
+
+
+class JointElasticity(Effect):
+    """A torsion spring between motor and link, the encoder on the motor."""
+
+    name = "joint_elasticity"
+    title = "Joint elasticity"
+    side = Side.DRIVE
+    equation = "load angle = motor angle - torque / k"
+    source = "Spong (1987), ASME J. Dyn. Sys. Meas. Control 109(4), eq. 8"
+    looks_like = "gravity and inertia torques too small or too large in step with the load itself"
+    confirm = "clamp the link, raise the motor's torque slowly and read the encoder"
+    shape = (Parameter("stiffness", "N·m/rad", "torque per angle of twist", "k", (100.0, 10000.0)),)
+    motor_inertia = MOTOR_INERTIA
+
+    @spring
+    def spring(twist, twist_rate, values):
+        """Return k twist + d twist_rate, d from the damping ratio."""
+        damping = 2.0 * DAMPING_RATIO * sqrt(values[0] * MOTOR_INERTIA)
+        return values[0] * twist + damping * twist_rate
+
+    def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
+        """Return the motion of the link behind the spring."""
+        j = motion.joint_index(self.joint)
+        load = motion.transmitted
+        q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
+        for state, load_rate in zip((q, dq, ddq), load, strict=True):
+            state[:, j] -= load_rate[:, j] / shape[0]
+        return motion.with_state(q, dq, ddq)

@@ -1,0 +1,131 @@
+"""The compiled form of an effect's equation, one scalar kernel each.
+
+A kernel is written once and used by everybody: ``columns`` evaluates it along a measured motion,
+the forward dynamics evaluates it at every integration step. All kernels of a kind share one
+signature, so that the dynamics can hold a tuple of them without being compiled anew for each model.
+"""
+
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit, types
+from numba.core.errors import NumbaExperimentalFeatureWarning
+from numba.core.types import float64, int64, void
+
+# Kernels as arguments are numba's "first-class functions", which it calls experimental; the
+# alternative, code generated for each model, costs seconds of compilation whenever a model changes.
+warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
+
+_vector = float64[::1]
+
+
+class Instant(NamedTuple):
+    """The machine at one instant, every array (J,) and in SI units.
+
+    ``direction`` is the sign of the velocity where a joint moves; where it sticks, the forward
+    dynamics puts the value in [-1, 1] that holds it. Equations use it wherever theirs says sgn v.
+    ``load`` is the torque that the drive train transmits to the link, N·m.
+    """
+
+    t: float
+    q: np.ndarray
+    dq: np.ndarray
+    ddq: np.ndarray
+    direction: np.ndarray
+    load: np.ndarray
+
+
+INSTANT = types.NamedTuple([float64, _vector, _vector, _vector, _vector, _vector], Instant)
+
+REACTION = void(INSTANT, _vector, _vector, _vector, int64, _vector)
+"""reaction(at, state, values, geometry, joint, out): add the torque the drives must supply to ``out``."""
+
+DERIVATIVE = void(INSTANT, _vector, _vector, _vector, int64, _vector)
+"""derivative(at, state, values, geometry, joint, out): write the rate of the effect's memory to ``out``."""
+
+SPRING = float64(float64, float64, _vector)
+"""spring(twist, twist_rate, values): torque that a transmission passes from motor to link, N·m."""
+
+READING = void(_vector, _vector, _vector, int64)
+"""reading(angle, torque, values, joint): turn what is into what a sensor says, in place."""
+
+
+def reaction(function):
+    """Compile a torque equation."""
+    return staticmethod(njit(REACTION, cache=True)(function))
+
+
+def derivative(function):
+    """Compile the rate of an effect's memory."""
+    return staticmethod(njit(DERIVATIVE, cache=True)(function))
+
+
+def spring(function):
+    """Compile a transmission's torque."""
+    return staticmethod(njit(SPRING, cache=True)(function))
+
+
+def reading(function):
+    """Compile what a sensor makes of the truth."""
+    return staticmethod(njit(READING, cache=True)(function))
+
+
+_table = float64[:, ::1]
+_MOTION = (_vector, _table, _table, _table, _table, _vector)  # time, q, dq, ddq, load, geometry
+# Signatures are spelt out so that one compilation serves every effect: the kernel is an argument.
+_ALONG = _table(types.FunctionType(REACTION), _vector, int64, *_MOTION)
+_ALONG_WITH_MEMORY = _table(
+    types.FunctionType(REACTION), types.FunctionType(DERIVATIVE), int64, _vector, int64, *_MOTION
+)
+
+MEMORY_SUBSTEPS = 8
+"""Steps per sample along a measured motion: a presliding state turns over within a few milliseconds."""
+
+
+@njit(cache=True)
+def _between(time, q, dq, ddq, load, k, share):
+    v = dq[k] + share * (dq[k + 1] - dq[k])
+    return Instant(
+        time[k] + share * (time[k + 1] - time[k]),
+        q[k] + share * (q[k + 1] - q[k]),
+        v,
+        ddq[k] + share * (ddq[k + 1] - ddq[k]),
+        np.sign(v),
+        load[k] + share * (load[k + 1] - load[k]),
+    )
+
+
+@njit(_ALONG, cache=True)
+def torque_along(kernel, values, joint, time, q, dq, ddq, load, geometry):
+    """Evaluate a reaction kernel without memory along a motion: (n, J) N·m."""
+    out = np.zeros(q.shape)
+    state = np.zeros(0)
+    for k in range(q.shape[0]):
+        at = Instant(time[k], q[k], dq[k], ddq[k], np.sign(dq[k]), load[k])
+        kernel(at, state, values, geometry, joint, out[k])
+    return out
+
+
+@njit(_ALONG_WITH_MEMORY, cache=True)
+def torque_along_with_memory(kernel, rate, states, values, joint, time, q, dq, ddq, load, geometry):
+    """Evaluate a reaction kernel along one unbroken stretch, integrating its memory from rest: (n, J) N·m.
+
+    Between samples the motion is taken as linear in time; the memory advances by the midpoint rule.
+    """
+    out = np.zeros(q.shape)
+    state = np.zeros(states)
+    slope = np.zeros(states)
+    for k in range(q.shape[0]):
+        at = Instant(time[k], q[k], dq[k], ddq[k], np.sign(dq[k]), load[k])
+        kernel(at, state, values, geometry, joint, out[k])
+        if k + 1 == q.shape[0]:
+            break
+        h = (time[k + 1] - time[k]) / MEMORY_SUBSTEPS
+        for i in range(MEMORY_SUBSTEPS):
+            start = _between(time, q, dq, ddq, load, k, i / MEMORY_SUBSTEPS)
+            rate(start, state, values, geometry, joint, slope)
+            middle = _between(time, q, dq, ddq, load, k, (i + 0.5) / MEMORY_SUBSTEPS)
+            rate(middle, state + 0.5 * h * slope, values, geometry, joint, slope)
+            state += h * slope
+    return out

@@ -1,0 +1,1 @@
+"""The machine without its imperfections: geometry, rigid-body equations, measured motion."""

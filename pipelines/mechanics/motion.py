@@ -1,0 +1,131 @@
+"""A measured motion: what regression, diagnosis and replay are computed from."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.contracts.joints import joints_of
+from pipelines.contracts.table import Table
+from pipelines.mechanics.leg import Geometry
+from pipelines.signals.low_pass import derivative, low_pass, shortest
+
+CUFFS = tuple(f"{segment}_{side}" for segment in ("thigh", "shank") for side in ("front", "back"))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """One run, every sample of it. n samples, J joints, SI units.
+
+    ``torque`` is as measured; ``q``, ``dq`` and ``ddq`` come from the zero-phase filter.
+    """
+
+    time: NDArray
+    q: NDArray
+    dq: NDArray
+    ddq: NDArray
+    torque: NDArray
+    segment: NDArray
+    valid: NDArray
+    run: str = "exo_alone"
+    purpose: str = "train"
+    sample_rate_hz: float = 200.0
+    period_s: float | None = None
+    joints: tuple[str, ...] = ("hip", "knee")
+    geometry: Geometry = field(default_factory=Geometry)
+    forces: NDArray | None = None
+    """(n, 4, 3) N, cuffs in the order of ``CUFFS``; None where they were not read."""
+    reference: NDArray | None = None
+    """(n, J) commanded angle."""
+    temperature: NDArray | None = None
+    """(n, J) deg C."""
+    cutoff_hz: float = 12.0
+    """Of the zero-phase filter that made q."""
+    load: NDArray | None = None
+    """(n, J) N·m that the drive trains pass on to the links, where a fit has estimated it."""
+    file: str = ""
+    metadata: dict[str, Any] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return len(self.time)
+
+    def joint_index(self, joint: str) -> int:
+        """Return the column of a joint in q, dq, ddq and torque."""
+        return self.joints.index(joint)
+
+    def segments(self) -> Iterator[slice]:
+        """Yield each stretch of samples without a gap."""
+        starts = np.flatnonzero(np.diff(self.segment, prepend=self.segment[0] - 1))
+        for start, stop in zip(starts, [*starts[1:], len(self)], strict=True):
+            yield slice(int(start), int(stop))
+
+    @cached_property
+    def transmitted(self) -> tuple[NDArray, NDArray, NDArray]:
+        """Torque passed on to the links, its first and its second derivative, (n, J) each.
+
+        The estimate where there is one; else the measured torque, which also holds the drive's own
+        friction. Smoothed like the angle: its derivatives would otherwise be those of the noise.
+        """
+        load = self.torque if self.load is None else self.load
+        smooth, rate, curvature = load.copy(), np.zeros_like(load), np.zeros_like(load)
+        for stretch in self.segments():
+            if stretch.stop - stretch.start < shortest(self.sample_rate_hz, self.cutoff_hz):
+                continue
+            smooth[stretch] = low_pass(load[stretch], self.sample_rate_hz, self.cutoff_hz)
+            rate[stretch] = derivative(smooth[stretch], self.sample_rate_hz, 1)
+            curvature[stretch] = derivative(smooth[stretch], self.sample_rate_hz, 2)
+        return smooth, rate, curvature
+
+    def with_state(self, q: NDArray, dq: NDArray, ddq: NDArray) -> "Motion":
+        """Return the same run with other kinematics, as a corrected measurement has."""
+        return replace(self, q=q, dq=dq, ddq=ddq)
+
+
+def geometry_of(metadata: dict[str, Any], default: Geometry | None = None) -> Geometry:
+    """Return the recording's geometry; what it does not say comes from ``default``."""
+    known = {k: v for k, v in metadata.get("geometry", {}).items() if k in Geometry.__dataclass_fields__}
+    return replace(default or Geometry(), **known)
+
+
+def motion_from_table(table: Table, default_geometry: Geometry | None = None) -> Motion:
+    """Take a ``motion/1`` table apart into arrays.
+
+    The recording's own geometry wins over ``default_geometry`` (exoid.toml's), which wins over the paper's.
+    """
+    frame, metadata = table.frame, table.metadata
+    joints = joints_of(metadata)
+
+    def per_joint(quantity: str) -> NDArray | None:
+        columns = [joint.column(quantity) for joint in joints]
+        if not set(columns) <= set(frame.columns):
+            return None
+        return np.ascontiguousarray(frame[columns].to_numpy(float))
+
+    force_columns = [f"{cuff}_force_{axis}_n" for cuff in CUFFS for axis in "xyz"]
+    has_forces = set(force_columns) <= set(frame.columns)
+    return Motion(
+        time=frame["time_s"].to_numpy(float),
+        q=per_joint("angle"),
+        dq=per_joint("velocity"),
+        ddq=per_joint("acceleration"),
+        torque=per_joint("torque"),
+        segment=frame["segment"].to_numpy(np.int64),
+        valid=frame["valid"].to_numpy(bool),
+        run=metadata["run"],
+        purpose=metadata["purpose"],
+        sample_rate_hz=float(metadata["sample_rate_hz"]),
+        period_s=metadata.get("period_s"),
+        joints=tuple(joint.name for joint in joints),
+        geometry=geometry_of(metadata, default_geometry),
+        forces=frame[force_columns].to_numpy(float).reshape(-1, 4, 3) if has_forces else None,
+        reference=per_joint("reference"),
+        temperature=per_joint("temperature"),
+        cutoff_hz=float(metadata["filter"]["cutoff_hz"]),
+        file=Path(table.path).name if table.path else "",
+        metadata=metadata,
+    )

@@ -1,0 +1,1 @@
+"""Signals as arrays: filtering, differentiation, blocks, noise floors. Knows nothing of legs."""
