@@ -39,7 +39,7 @@ class Console:
     def say(self, text: str | Text) -> None:
         """Print a sentence of result for a person."""
         if self.speaks:
-            self.out.print(text if isinstance(text, Text) else Text(text))
+            self.out.print(text if isinstance(text, Text) else Text(text), soft_wrap=True)
 
     def table(
         self, headings: Sequence[str], rows: Iterable[Sequence[Any]], *, title: str | None = None, numbers: str = ""

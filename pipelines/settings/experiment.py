@@ -32,7 +32,7 @@ class Experiment(Settings):
     mechanism: MechanismSettings = Field(MechanismSettings(), description="The leg's geometry.")
     design: DesignSettings = Field(DesignSettings(), description="The excitation.")
     acquire: AcquireSettings = Field(AcquireSettings(), description="Recording.")
-    run: tuple[RunSettings, ...] = Field(default_factory=_four_runs, min_length=1, description="The runs, in order.")
+    run: tuple[RunSettings, ...] = Field(default_factory=_four_runs, description="The runs, in order.")
     filter: FilterSettings = Field(FilterSettings(), description="Filtering.")
     identify: IdentifySettings = Field(IdentifySettings(), description="Identification.")
     simulate: SimulateSettings = Field(SimulateSettings(), description="Simulation.")
@@ -43,6 +43,8 @@ class Experiment(Settings):
     @classmethod
     def _names_differ(cls, runs: tuple[RunSettings, ...]) -> tuple[RunSettings, ...]:
         names = [run.name for run in runs]
+        if not names:
+            raise ValueError("found no run, expected at least one; add a [[run]]")
         for name in names:
             if names.count(name) > 1:
                 raise ValueError(f"found the name {name} twice, expected each once; rename one run")

@@ -1,0 +1,96 @@
+"""Errors become one line and an exit code; help is there and quick."""
+
+import subprocess
+import sys
+
+import pytest
+import typer
+
+from exoid_cli import app as application
+from pipelines.errors import DeviceError, ExoidError, SettingsError
+
+COMMANDS = sorted(typer.main.get_command(application.app).commands)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help(exoid, command):
+    outcome = exoid(command, "--help")
+    assert outcome.code == 0
+    assert command in outcome.out
+
+
+def test_help_loads_nothing_heavy():
+    code = (
+        "import sys, exoid_cli.app; print([m for m in ('numba', 'scipy', 'matplotlib', 'pandas') if m in sys.modules])"
+    )
+    assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "line"),
+    [
+        (SettingsError("exoid.toml: design.seed:\nfound -1"), 2, "exoid: exoid.toml: design.seed: found -1\n"),
+        (DeviceError("hip drive: no answer"), 3, "exoid: hip drive: no answer\n"),
+        (ExoidError("a sum did not add up"), 1, "exoid: a sum did not add up\n"),
+        (KeyboardInterrupt(), 130, "exoid: stopped by Ctrl-C\n"),
+        (
+            PermissionError(13, "Permission denied", "out.parquet"),
+            2,
+            "exoid: out.parquet: Permission denied; you may not read or write there; change the permissions or "
+            "choose another place\n",
+        ),
+        (
+            OSError(28, "No space left on device"),
+            2,
+            "exoid: No space left on device; free some space and run the command again\n",
+        ),
+    ],
+)
+def test_an_error_is_one_line_and_an_exit_code(exoid, monkeypatch, error, code, line):
+    def fails(command):
+        raise error
+
+    monkeypatch.setattr(application.typer.main, "get_command", fails)
+    outcome = exoid("show")
+    assert (outcome.code, outcome.out, outcome.err) == (code, "", line)
+
+
+def test_a_fault_of_exoid_keeps_its_traceback_in_a_file(exoid, monkeypatch, tmp_path):
+    def fails(command):
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setattr(application.typer.main, "get_command", fails)
+    monkeypatch.setattr(application.tempfile, "gettempdir", lambda: str(tmp_path))
+    outcome = exoid("show")
+    (log,) = tmp_path.glob("exoid-*.log")
+    assert outcome.code == 1
+    assert outcome.err == (
+        f"exoid: exoid itself failed: ZeroDivisionError: division by zero; please report it, with {log}\n"
+    )
+    assert "Traceback" in log.read_text()
+
+    monkeypatch.setenv("EXOID_DEBUG", "1")
+    assert "Traceback" in exoid("show").err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["shw"], "exoid: No such command 'shw'. Did you mean 'show'?; see `exoid --help`\n"),
+        (["show"], "exoid: Missing argument 'file'; see `exoid show --help`\n"),
+        (["show", "a", "--fast"], "exoid: No such option: --fast; see `exoid show --help`\n"),
+    ],
+)
+def test_a_mistyped_command_line_is_one_line_too(exoid, arguments, line):
+    outcome = exoid(*arguments)
+    assert (outcome.code, outcome.out, outcome.err) == (2, "", line)
+
+
+def test_exoid_alone_prints_its_help(exoid):
+    outcome = exoid()
+    assert "Usage: exoid" in outcome.out
+    assert outcome.err == ""
+
+
+def test_version(exoid):
+    assert exoid("--version").out == "exoid 0.1.0\n"

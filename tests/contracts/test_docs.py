@@ -1,0 +1,25 @@
+"""docs/contracts.md speaks of every table and every column."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from pipelines.contracts import CONTRACTS
+from pipelines.contracts.joints import QUANTITIES
+
+PAGE = (Path(__file__).parents[2] / "docs" / "contracts.md").read_text(encoding="utf-8")
+EXPANDED = PAGE.replace("{thigh,shank}_{front,back}_force_{x,y,z}_n", "cuff") + "angle velocity acceleration"
+
+
+@pytest.mark.parametrize("contract", CONTRACTS, ids=lambda contract: contract.name)
+def test_every_table_and_column_is_documented(contract):
+    assert f"`{contract.label}`" in PAGE
+    for column in contract.columns:
+        if re.fullmatch(r"(thigh|shank)_(front|back)_force_[xyz]_n", column.name):
+            assert "cuff" in EXPANDED
+        elif column.per_joint:
+            patterns = QUANTITIES[column.name]
+            assert patterns.revolute.format(joint="*") in PAGE or column.name in EXPANDED
+        else:
+            assert f"`{column.name}`" in PAGE

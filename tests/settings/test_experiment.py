@@ -1,0 +1,102 @@
+"""exoid.toml: what it refuses, in full, and that nothing in it is undocumented."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from pipelines.errors import SettingsError
+from pipelines.settings import Experiment, datasets
+from pipelines.settings.base import models_in
+from pipelines.settings.reference import reference, sections_of
+
+ROOT = Path(__file__).parents[2]
+DEFAULT = datasets() / "experiments" / "default.toml"
+RUN = '[[run]]\nname = "a"\nrun = "exo_alone"\npurpose = "train"\n'
+TABLES = list(sections_of(Experiment))
+
+
+def test_the_default_file_says_what_the_defaults_are():
+    assert Experiment.load(DEFAULT).model_dump() == Experiment().model_dump()
+
+
+def test_files_are_named_relative_to_the_experiment(tmp_path):
+    (tmp_path / "exoid.toml").write_text("")
+    assert Experiment.load(tmp_path / "exoid.toml").file("rigs/a.toml") == tmp_path / "rigs" / "a.toml"
+
+
+@pytest.mark.parametrize(("heading", "model"), TABLES, ids=[heading for heading, _ in TABLES])
+def test_every_key_stands_in_the_default_file_and_is_described(heading, model):
+    text = DEFAULT.read_text(encoding="utf-8")
+    keys = [name for name, field in model.model_fields.items() if not any(models_in(field.annotation))]
+    assert not keys or heading in text
+    for key in keys:
+        assert re.search(rf"^(# )?{key} = ", text, re.MULTILINE), f"{heading} {key}"
+    assert all(field.description for field in model.model_fields.values())
+
+
+def test_the_settings_page_is_current():
+    assert (ROOT / "docs" / "settings.md").read_text(encoding="utf-8") == reference(), "run `make docs`"
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("[desing]\n", "desing: unknown key; did you mean design?"),
+        ("[design]\nharmonic = 3\n", "design.harmonic: unknown key; did you mean harmonics?"),
+        (
+            "[design]\nbase_frequency_rad_s = 0.6\n",
+            "design.base_frequency_rad_s: unknown key; did you mean base_frequency_hz?",
+        ),
+        ("[design]\nharmonics = '3'\n", "design.harmonics: found '3', expected a valid integer"),
+        ("[design]\nseed = true\n", "design.seed: found True, expected a valid integer"),
+        ("[design]\nseconds = inf\n", "design.seconds: found inf, expected a finite number"),
+        ("[filter]\ncutoff_hz = 'none'\n", "filter.cutoff_hz: found 'none', expected 'auto' or a valid number"),
+        ("[filter]\ncutoff_hz = -1\n", "filter.cutoff_hz: found -1, expected 'auto' or greater than 0"),
+        (
+            "[design]\ncriterion = 'best'\n",
+            "design.criterion: found 'best', expected 'log_det', 'condition' or 'scaled_condition'",
+        ),
+        (
+            "[design.bounds.hip]\nangle_rad = [1.0, 0.5]\n",
+            "design.bounds.hip: angle_rad: found [1.0, 0.5], expected the lowest angle first; swap them",
+        ),
+        (
+            "[design.bounds.hip]\nangle_deg = [5, 70]\n",
+            "design.bounds.hip.angle_deg: unknown key; did you mean angle_rad? (and 1 more)",
+        ),
+        ("[design.bounds.hip]\nvelocity_rad_s = 1\n", "design.bounds.hip.angle_rad: missing; add it"),
+        ("run = []", "run: found no run, expected at least one; add a [[run]]"),
+        (RUN + RUN, "run: found the name a twice, expected each once; rename one run"),
+        (RUN.replace("name", "nam"), "run[0].nam: unknown key; did you mean name? (and 1 more)"),
+        (RUN.replace('"a"', '"a b"'), "run[0].name: found 'a b', expected text matching '^[a-z0-9][a-z0-9_]*$'"),
+    ],
+)
+def test_a_bad_key_is_one_line_with_its_path(tmp_path, text, told):
+    path = tmp_path / "exoid.toml"
+    path.write_text(text)
+    with pytest.raises(SettingsError) as caught:
+        Experiment.load(path)
+    assert str(caught.value) == f"{path}: {told}"
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (None, "no such file; `exoid init DIR` writes a commented one to start from"),
+        (b"a = [", "is not valid TOML: Invalid value (at end of document); mend that line"),
+        (b"\xff\xfe", "is not UTF-8 text, expected a TOML file; save it as UTF-8"),
+    ],
+)
+def test_what_is_no_toml_is_refused(tmp_path, content, told):
+    path = tmp_path / "exoid.toml"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(SettingsError) as caught:
+        Experiment.load(path)
+    assert str(caught.value) == f"{path}: {told}"
+
+
+def test_an_unknown_run_is_told_with_the_known_ones():
+    with pytest.raises(SettingsError, match="run with_human: no such"):
+        Experiment().run_named("with_human")

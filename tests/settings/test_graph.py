@@ -1,0 +1,114 @@
+"""The experiment's graph of files: what a change re-runs, with stand-ins for the commands that take minutes."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pipelines.errors import SettingsError
+from pipelines.settings import datasets
+from pipelines.settings.template import create
+
+# Settings are split by exoid itself; every other command only writes the file it was asked for.
+STAND_IN = f"""#!/bin/sh
+case "$1" in
+  settings) exec {sys.executable} -m exoid_cli.app "$@" ;;
+esac
+echo "$1 $2" >> "$LOG"
+for last in "$@"; do :; done
+case "$last" in
+  */) mkdir -p "$last"; touch "$last/parameters.parquet" "$last/rbf.parquet" ;;
+  *) mkdir -p "$(dirname "$last")"; touch "$last" ;;
+esac
+"""
+
+
+class Make:
+    """make in a new experiment's folder; each call returns the commands that ran, by their first word."""
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+        self.log = folder / "log"
+
+    def __call__(self, *arguments: str) -> list[str]:
+        self.log.write_text("")
+        environment = {**os.environ, "LOG": str(self.log), "MAKEFLAGS": ""}
+        subprocess.run(["make", "-C", str(self.folder), *arguments], check=True, env=environment, capture_output=True)
+        return [line.split()[0] for line in self.log.read_text().splitlines()]
+
+    def change(self, old: str, new: str) -> None:
+        path = self.folder / "exoid.toml"
+        text = path.read_text()
+        assert old in text
+        path.write_text(text.replace(old, new))
+
+
+@pytest.fixture
+def make(tmp_path, monkeypatch):
+    shipped = tmp_path / "datasets"
+    (shipped / "rigs").mkdir(parents=True)
+    (shipped / "rigs" / "default.toml").write_text("embedded = true\n")
+    (shipped / "experiments").symlink_to(datasets() / "experiments")
+    monkeypatch.setattr("pipelines.settings.template.datasets", lambda: shipped)
+    stand_in = tmp_path / "stand-in"
+    stand_in.write_text(STAND_IN)
+    stand_in.chmod(0o755)
+    create(tmp_path / "experiment", exoid=str(stand_in))
+    return Make(tmp_path / "experiment")
+
+
+FIT = ["identify", "simulate", "simulate", "simulate"]
+
+
+def test_a_first_make_runs_every_stage_and_a_second_none(make):
+    assert sorted(make()) == sorted(["design", *["acquire", "filter"] * 4, *FIT])
+    assert make() == []
+
+
+def test_only_what_depends_on_a_change_runs_again(make):
+    make()
+    (make.folder / "exoid.toml").touch()
+    assert make() == []
+    make.change("[design]  ", "[design] # a comment")
+    assert make() == []
+    make.change("feedback_gain_nm_s_rad = 300.0", "feedback_gain_nm_s_rad = 400.0")
+    assert make() == ["simulate"]
+    make.change("confidence = 0.95", "confidence = 0.9")
+    assert make() == FIT
+    make.change("order = 4", "order = 2")
+    assert sorted(make()) == sorted(["filter"] * 4 + FIT)
+    make.change("seed = 2", "seed = 22")
+    assert sorted(make()) == sorted(["acquire", "filter", *FIT])
+    make.change("harmonics = 5", "harmonics = 4")
+    assert sorted(make()) == sorted(["design", *["acquire", "filter"] * 4, *FIT])
+    assert make() == []
+
+
+def test_a_change_of_the_rig_records_again(make):
+    make()
+    (make.folder / "rigs" / "default.toml").write_text("embedded = false\n")
+    assert sorted(make()) == sorted(["acquire", "filter"] * 4 + FIT)
+
+
+def test_a_run_with_an_excitation_of_its_own_heeds_it_alone(make):
+    (make.folder / "mine.toml").write_text("a = 1\n")
+    make.change('# trajectory = "my_excitation.toml"', 'trajectory = "mine.toml"')
+    make()
+    make.change("harmonics = 5", "harmonics = 4")
+    assert make().count("acquire") == 3
+
+
+def test_clean_keeps_the_recordings(make):
+    make()
+    make("clean")
+    assert {path.name for path in make.folder.iterdir()} == {"Makefile", "exoid.toml", "log", "recordings", "rigs"}
+
+
+def test_init_overwrites_nothing(make):
+    with pytest.raises(SettingsError) as caught:
+        create(make.folder, exoid="exoid")
+    assert str(caught.value) == (
+        f"{make.folder / 'exoid.toml'}: exists already, not overwritten; choose a new folder or move it away"
+    )
