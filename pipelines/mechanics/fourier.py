@@ -1,0 +1,73 @@
+"""The excitation as a finite Fourier series: periodic, with exact derivatives and exact extrema."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.contracts.joints import HIP_AND_KNEE, Joint
+
+
+@dataclass(frozen=True)
+class FourierTrajectory:
+    """q(t) = theta0 + sum over k = 1..n of a_k sin(k w t) + b_k cos(k w t) (paper eq. 11, mended).
+
+    J joints, n harmonics, SI units.
+    """
+
+    theta0: NDArray
+    """(J,) mean angle, rad."""
+    a: NDArray
+    """(J, n) sine coefficients, rad."""
+    b: NDArray
+    """(J, n) cosine coefficients, rad."""
+    omega: float
+    """Angular frequency of the first harmonic, rad/s."""
+    joints: tuple[Joint, ...] = HIP_AND_KNEE
+
+    @property
+    def period_s(self) -> float:
+        """Time after which the motion repeats."""
+        return 2.0 * np.pi / self.omega
+
+    @property
+    def duration_s(self) -> float:
+        """How long the motion can go on."""
+        return np.inf
+
+    def at(self, time: NDArray | float) -> tuple[NDArray, NDArray, NDArray]:
+        """Angle (rad), velocity (rad/s) and acceleration (rad/s²) at times (n,), shape (n, J) each."""
+        phase = np.exp(1j * np.outer(np.atleast_1d(time), self._frequencies))
+        q, dq, ddq = ((phase @ amplitude.T).real for amplitude in self._amplitudes)
+        return self.theta0 + q, dq, ddq
+
+    def extrema(self) -> NDArray:
+        """Lowest and highest angle, velocity and acceleration of each joint over all time, (3, J, 2)."""
+        ranges = np.array([[_range(joint) for joint in amplitude] for amplitude in self._amplitudes])
+        ranges[0] += self.theta0[:, np.newaxis]
+        return ranges
+
+    @property
+    def _frequencies(self) -> NDArray:
+        return self.omega * np.arange(1, self.a.shape[1] + 1)
+
+    @cached_property
+    def _amplitudes(self) -> NDArray:
+        """Complex amplitudes of q, dq and ddq, (3, J, n): a sin x + b cos x = Re (b - i a) e^(i x)."""
+        angle = self.b - 1j * self.a
+        return np.array([angle * (1j * self._frequencies) ** order for order in range(3)])
+
+
+def _range(amplitude: NDArray) -> tuple[float, float]:
+    """Return the least and the greatest value of Re sum c_k e^(i k x) over all x.
+
+    With z = e^(ix) the derivative is a polynomial of degree 2n over z^n; every extremum lies at the
+    argument of a root. The other roots' arguments do no harm: each is one more place to look at.
+    """
+    n = len(amplitude)
+    slope = 1j * np.arange(1, n + 1) * amplitude
+    roots = np.roots(np.concatenate([slope[::-1], [0.0], slope.conj()]))
+    x = np.append(np.angle(roots), 0.0)
+    values = (np.exp(1j * np.outer(x, np.arange(1, n + 1))) @ amplitude).real
+    return float(values.min()), float(values.max())

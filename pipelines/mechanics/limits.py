@@ -1,0 +1,66 @@
+"""How far an excitation stays from what a joint may do."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.mechanics.trajectory import Trajectory
+from pipelines.settings.design import JointBounds
+
+QUANTITIES = ("angle", "velocity", "acceleration")
+
+# A design that touches its bound has been computed in floating point.
+TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class Margin:
+    """One joint's range in one quantity, against what it may have."""
+
+    joint: str
+    quantity: str
+    unit: str
+    low: float
+    high: float
+    """The bounds."""
+    lowest: float
+    highest: float
+    """What the motion reaches, between samples too."""
+
+    @property
+    def margin(self) -> float:
+        """Distance to the nearer bound; negative where it is overstepped."""
+        return min(self.lowest - self.low, self.high - self.highest)
+
+    @property
+    def kept(self) -> bool:
+        """Whether the motion stays within the bounds."""
+        return self.margin >= -TOLERANCE
+
+    def __str__(self) -> str:
+        """One sentence."""
+        return (
+            f"{self.joint} {self.quantity} goes from {self.lowest:.4g} to {self.highest:.4g} {self.unit}, "
+            f"allowed is {self.low:g} to {self.high:g}"
+        )
+
+
+def bounds_array(bounds: JointBounds) -> NDArray:
+    """Return the bounds as (3, 2, 2): angle, velocity, acceleration; hip, knee; low, high."""
+    table = [
+        [j.angle_rad for j in (bounds.hip, bounds.knee)],
+        [(-j.velocity_rad_s, j.velocity_rad_s) for j in (bounds.hip, bounds.knee)],
+        [(-j.acceleration_rad_s2, j.acceleration_rad_s2) for j in (bounds.hip, bounds.knee)],
+    ]
+    return np.array(table)
+
+
+def margins(trajectory: Trajectory, bounds: JointBounds) -> list[Margin]:
+    """Return each joint's margin in angle, velocity and acceleration, between samples too."""
+    allowed, reached = bounds_array(bounds), trajectory.extrema()
+    return [
+        Margin(joint.name, quantity, joint.unit(quantity), *allowed[i, j].tolist(), *reached[i, j].tolist())
+        for j, joint in enumerate(trajectory.joints)
+        for i, quantity in enumerate(QUANTITIES)
+    ]

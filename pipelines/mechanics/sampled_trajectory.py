@@ -1,0 +1,60 @@
+"""An excitation known only at samples, as other tools may write it: splines between them."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline, CubicSpline, PPoly
+
+from pipelines.contracts.joints import HIP_AND_KNEE, Joint
+
+
+@dataclass(frozen=True)
+class SampledTrajectory:
+    """A motion through n samples of J joints, with the interface of ``FourierTrajectory``.
+
+    Angle and velocity are Hermite splines that keep the samples and their given slopes.
+    """
+
+    time: NDArray
+    """(n,) s, from the first sample on."""
+    q: NDArray
+    dq: NDArray
+    ddq: NDArray
+    period_s: float | None = None
+    """Time after which the samples repeat; None where the motion runs once."""
+    joints: tuple[Joint, ...] = HIP_AND_KNEE
+
+    @property
+    def duration_s(self) -> float:
+        """How long the motion can go on."""
+        return np.inf if self.period_s else float(self.time[-1] - self.time[0])
+
+    def at(self, time: NDArray | float) -> tuple[NDArray, NDArray, NDArray]:
+        """Angle (rad), velocity (rad/s) and acceleration (rad/s²) at times (n,), shape (n, J) each."""
+        time = np.atleast_1d(np.asarray(time, dtype=float))
+        if self.period_s:
+            time = np.mod(time, self.period_s)
+        q, dq, ddq = (spline(time) for spline in self._splines)
+        return q, dq, ddq
+
+    def extrema(self) -> NDArray:
+        """Lowest and highest angle, velocity and acceleration of each joint, (3, J, 2)."""
+        return np.array([[_range(spline, joint) for joint in range(len(self.joints))] for spline in self._splines])
+
+    @cached_property
+    def _splines(self) -> tuple[PPoly, PPoly, PPoly]:
+        time, (q, dq, ddq) = self.time - self.time[0], (self.q, self.dq, self.ddq)
+        if self.period_s and time[-1] < self.period_s - 1e-9:
+            time = np.append(time, self.period_s)
+            q, dq, ddq = (np.vstack([x, x[:1]]) for x in (q, dq, ddq))
+        return CubicHermiteSpline(time, q, dq), CubicHermiteSpline(time, dq, ddq), CubicSpline(time, ddq)
+
+
+def _range(spline: PPoly, joint: int) -> tuple[float, float]:
+    """Return the least and the greatest value of one joint's piecewise cubic."""
+    of_joint = PPoly(spline.c[:, :, joint], spline.x)
+    turns = of_joint.derivative().roots(discontinuity=False, extrapolate=False)
+    values = of_joint(np.concatenate([of_joint.x, turns[np.isfinite(turns)]]))
+    return float(values.min()), float(values.max())

@@ -1,0 +1,132 @@
+"""Excitations from files: Fourier coefficients as TOML or in a table's metadata, or bare samples."""
+
+from pathlib import Path
+from typing import Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from pipelines.contracts.checks import LARGEST_ANGLE_RAD
+from pipelines.contracts.table import Table
+from pipelines.contracts.trajectory import TRAJECTORY
+from pipelines.errors import ContractError, SettingsError
+from pipelines.mechanics.fourier import FourierTrajectory
+from pipelines.mechanics.sampled_trajectory import SampledTrajectory
+from pipelines.settings.base import Settings, load_toml
+
+Trajectory = FourierTrajectory | SampledTrajectory
+
+COEFFICIENTS = ("omega_rad_s", "theta0_rad", "a", "b")
+
+# A table that was rounded to microradians is still the motion of its coefficients.
+ROUNDING_RAD = 1e-5
+
+Row = tuple[float, ...]
+
+
+class CoefficientFile(Settings):
+    """An excitation as TOML: rows of ``a`` and ``b`` are hip and knee, columns the harmonics from the first."""
+
+    unit: Literal["deg", "rad"] = Field(description="Unit of a and b.")
+    omega_rad_s: float = Field(gt=0.0, description="Angular frequency of the first harmonic.")
+    theta0_rad: tuple[float, float] = Field(description="Mean angle of hip and knee, in radians whatever the unit.")
+    a: tuple[Row, Row] = Field(description="Sine coefficients.")
+    b: tuple[Row, Row] = Field(description="Cosine coefficients.")
+
+    @model_validator(mode="after")
+    def _rows_have_equal_length(self) -> Self:
+        lengths = {len(row) for row in (*self.a, *self.b)}
+        if len(lengths) > 1 or 0 in lengths:
+            counts = ", ".join(
+                f"{name}[{joint}] {len(row)}" for name in "ab" for joint, row in enumerate(getattr(self, name))
+            )
+            raise ValueError(f"found rows of different length or empty ({counts}), expected as many harmonics in each")
+        return self
+
+    @model_validator(mode="after")
+    def _radians_are_radians(self) -> Self:
+        for name in "ab":
+            for joint, row in enumerate(getattr(self, name)):
+                for k, value in enumerate(row):
+                    if self.unit == "rad" and abs(value) > LARGEST_ANGLE_RAD:
+                        raise ValueError(
+                            f'{name}[{joint}][{k}]: found {value} with unit = "rad", which looks like degrees; '
+                            'write unit = "deg"'
+                        )
+        return self
+
+
+def read_trajectory(path: Path | str) -> Trajectory:
+    """Return the excitation in a TOML file of coefficients or in a ``trajectory/1`` table."""
+    path = Path(path)
+    if path.suffix == ".toml":
+        return _from_toml(path)
+    return trajectory_from_table(TRAJECTORY.read(path))
+
+
+def _from_toml(path: Path) -> FourierTrajectory:
+    if not path.exists():
+        raise SettingsError(f"{path}: no such file; check the name, or make one with `exoid design`")
+    file = load_toml(path, CoefficientFile)
+    to_rad = np.pi / 180.0 if file.unit == "deg" else 1.0
+    return FourierTrajectory(
+        theta0=np.array(file.theta0_rad),
+        a=to_rad * np.array(file.a),
+        b=to_rad * np.array(file.b),
+        omega=file.omega_rad_s,
+    )
+
+
+def trajectory_from_table(table: Table) -> Trajectory:
+    """Return the excitation in a ``trajectory/1`` table: its coefficients' where it has them, else its samples'.
+
+    Bare samples repeat where the metadata name ``omega_rad_s``, and run once where they do not.
+    """
+    metadata = table.metadata
+    missing = [key for key in COEFFICIENTS if metadata.get(key) is None]
+    if missing:
+        return _sampled(table)
+    trajectory = FourierTrajectory(
+        theta0=np.array(metadata["theta0_rad"], dtype=float),
+        a=np.array(metadata["a"], dtype=float),
+        b=np.array(metadata["b"], dtype=float),
+        omega=float(metadata["omega_rad_s"]),
+        joints=table.joints,
+    )
+    _refuse_other_motion(table, trajectory)
+    return trajectory
+
+
+def _sampled(table: Table) -> SampledTrajectory:
+    time = table.frame["time_s"].to_numpy(float)
+    if len(time) < 2:
+        raise ContractError(
+            f"{table.path}: holds one sample and no coefficients, expected a motion; "
+            "give at least two rows, or a, b, theta0_rad and omega_rad_s in the metadata"
+        )
+    omega = table.metadata.get("omega_rad_s")
+    return SampledTrajectory(
+        time=time,
+        q=table.stacked("angle"),
+        dq=table.stacked("velocity"),
+        ddq=table.stacked("acceleration"),
+        period_s=2.0 * np.pi / omega if omega else None,
+        joints=table.joints,
+    )
+
+
+def _refuse_other_motion(table: Table, trajectory: FourierTrajectory) -> None:
+    """Refuse a table whose coefficients and samples are different motions: nobody knows which one is meant."""
+    if trajectory.a.shape[0] != len(table.joints) or trajectory.theta0.shape != (len(table.joints),):
+        raise ContractError(
+            f"{table.path}: metadata a, b, theta0_rad: found {trajectory.a.shape[0]} rows and "
+            f"{trajectory.theta0.size} mean angles, expected one for each of the {len(table.joints)} joints"
+        )
+    told = trajectory.at(table.frame["time_s"].to_numpy(float))[0]
+    found = table.stacked("angle")
+    row, joint = np.unravel_index(np.argmax(np.abs(found - told)), found.shape)
+    if abs(found[row, joint] - told[row, joint]) > ROUNDING_RAD:
+        raise ContractError(
+            f"{table.path}: column {table.joints[joint].column('angle')}, row {row}: found {found[row, joint]:.6g}, "
+            f"but the metadata's coefficients give {told[row, joint]:.6g}; drop a and b, or compute the rows from them"
+        )
