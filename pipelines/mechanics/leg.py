@@ -32,24 +32,30 @@ class Geometry:
         return np.array([self.thigh_length_m, self.gravity_m_s2])
 
 
-@njit("UniTuple(UniTuple(f8, 4), 2)(f8[::1], f8[::1], f8[::1], f8, f8)", cache=True)
-def regressor_at(q, dq, ddq, thigh_length, gravity):
-    """Rows hip and knee of A(q, dq, ddq) at one instant: torque = A @ (X1, X2, X3, X4).
+@njit(cache=True)
+def regressor_rows(sin_hip, sin_leg, sin_knee, cos_knee, dq, ddq, thigh_length, gravity):
+    """Rows hip and knee of A(q, dq, ddq): torque = A @ (X1, X2, X3, X4).
 
-    Paper, appendix A, row 2 renumbered as docs/errata.md gives it. Tuples, because an array
-    made at every integration step would cost more than the equations.
+    Paper, appendix A, row 2 renumbered as docs/errata.md gives it. ``sin_leg`` is sin(q1 + q2). The sines
+    are arguments, because whoever evaluates thousands of motions has a faster way to them. Tuples, because
+    an array made at every integration step would cost more than the equations.
     """
-    cos_knee, sin_knee = cos(q[1]), sin(q[1])
-    shank_gravity = gravity * sin(q[0] + q[1])
+    shank_gravity = gravity * sin_leg
     hip = (
         ddq[0],
         ddq[1],
         thigh_length * ((2.0 * ddq[0] + ddq[1]) * cos_knee - (2.0 * dq[0] * dq[1] + dq[1] * dq[1]) * sin_knee)
         + shank_gravity,
-        gravity * sin(q[0]),
+        gravity * sin_hip,
     )
     knee = (0.0, ddq[0] + ddq[1], thigh_length * (ddq[0] * cos_knee + dq[0] * dq[0] * sin_knee) + shank_gravity, 0.0)
     return hip, knee
+
+
+@njit("UniTuple(UniTuple(f8, 4), 2)(f8[::1], f8[::1], f8[::1], f8, f8)", cache=True)
+def regressor_at(q, dq, ddq, thigh_length, gravity):
+    """Rows hip and knee of A(q, dq, ddq) at one instant."""
+    return regressor_rows(sin(q[0]), sin(q[0] + q[1]), sin(q[1]), cos(q[1]), dq, ddq, thigh_length, gravity)
 
 
 @njit(cache=True)
