@@ -10,7 +10,7 @@ from pipelines.effects import Effect, Side
 from pipelines.effects.kernel import derivative, reaction, reading, spring
 from pipelines.errors import InputError
 from pipelines.mechanics.leg import Geometry
-from pipelines.model import Model
+from pipelines.model import Model, Term
 
 MOST_TERMS = 16
 """Length of every tuple of kernels. Fixed, so that one compilation serves all models."""
@@ -69,7 +69,7 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
 
     ``model`` holds the terms of one kind of run (``Model.for_run``).
     """
-    terms = sorted(model, key=lambda term: _group(term.effect))
+    terms = in_order(model)
     effects = [term.effect for term in terms]
     if len(effects) >= MOST_TERMS:
         raise InputError(f"the model has {len(effects)} effects, the simulation takes {MOST_TERMS - 1} at most")
@@ -97,6 +97,11 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
         motor_inertia=motor_inertia,
         geometry=geometry.array(),
     )
+
+
+def in_order(model: Model) -> list[Term]:
+    """Return a model's terms in the order in which an assembly holds them."""
+    return sorted(model, key=lambda term: _group(term.effect))
 
 
 def _group(effect: Effect) -> int:

@@ -1,0 +1,35 @@
+"""Forces in the cuffs: how the exoskeleton hands its torque to the leg."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.settings.plant import PlantSettings
+
+
+def cuff_forces(human_torque: NDArray, q: NDArray, plant: PlantSettings) -> NDArray:
+    """Return what the four sensors feel without error, (n, 4, 3) N: thigh front, back, shank front, back; x, y, z.
+
+    The inverse of ``mechanics.leg.cuff_torque``, made unique by how the limb hangs in its cuffs: along its
+    axis it carries a share of its weight, across it front and back cuff press, never pull.
+
+    Parameters
+    ----------
+    human_torque : (n, 2) array
+        Torque of the exoskeleton on the leg, N·m about hip and knee.
+    q : (n, 2) array
+        Angles of the links, rad.
+    """
+    cuff = plant.cuff
+    shank_x = -cuff.carried_share * cuff.shank_weight_n * np.cos(q[:, 0] + q[:, 1])
+    shank_y = human_torque[:, 1] / plant.shank_cuff_distance_m
+    at_knee = shank_y * np.cos(q[:, 1]) + shank_x * np.sin(q[:, 1])
+    about_hip = human_torque[:, 0] - human_torque[:, 1] - plant.thigh_length_m * at_knee
+    thigh_y = about_hip / plant.thigh_cuff_distance_m
+    thigh_x = -cuff.carried_share * cuff.thigh_weight_n * np.cos(q[:, 0])
+    forces = np.zeros((len(q), 4, 3))
+    for first, along, across in ((0, thigh_x, thigh_y), (2, shank_x, shank_y)):
+        forces[:, first : first + 2, 0] = along[:, np.newaxis] / 2
+        squeeze = np.hypot(across / 2, cuff.preload_n)
+        forces[:, first, 1] = across / 2 - squeeze
+        forces[:, first + 1, 1] = across / 2 + squeeze
+    return forces

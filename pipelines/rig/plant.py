@@ -1,0 +1,221 @@
+"""The machine behind the virtual rig: a leg under its drives' position loops, and what its sensors say of it."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pipelines.dynamics.assembly import MOST_TERMS, Assembly, assemble, in_order
+from pipelines.dynamics.forward import DQ, Q, stages, workspace
+from pipelines.dynamics.pd_loop import advance, loop_at_rest, make_drives
+from pipelines.effects import Side
+from pipelines.effects.friction import Friction
+from pipelines.effects.kernel import Instant
+from pipelines.effects.rigid_body import RigidBody
+from pipelines.errors import SettingsError
+from pipelines.mechanics.leg import Geometry, unrealizable
+from pipelines.model import Model, Term, effect_named
+from pipelines.rig.cuffs import cuff_forces
+from pipelines.settings.plant import PlantEffect, PlantSettings
+
+JOINTS = ("hip", "knee")
+
+
+@dataclass(frozen=True)
+class Samples:
+    """What the rig's devices measured at n instants, SI units."""
+
+    time: NDArray
+    """(n,) s, the middle of each sample's window."""
+    sequence: NDArray
+    """(n,) sample counter."""
+    angle: NDArray
+    """(n, J) rad, latched at the middle of the window."""
+    velocity: NDArray
+    """(n, J) rad/s, the drives' own estimate."""
+    torque: NDArray
+    """(n, J) N·m, mean over the window."""
+    temperature: NDArray
+    """(n, J) °C."""
+    reference: NDArray
+    """(n, J) rad, set-point at the window's end."""
+    forces: NDArray
+    """(n, 4, 3) N; all zero with nobody in the machine."""
+    truth: NDArray
+    """(n, 4, J) link angle, speed, acceleration, motor angle: what no device knows, for tests."""
+
+
+class Plant:
+    """A leg in motion; each call of ``run`` carries it on from where it stood."""
+
+    def __init__(
+        self,
+        settings: PlantSettings,
+        run: str,
+        seed: int = 0,
+        effects: Iterable[Term] = (),
+        sample_rate_hz: float | None = None,
+    ) -> None:
+        """Build the leg at rest.
+
+        Parameters
+        ----------
+        settings : PlantSettings
+        run : str
+            ``exo_alone`` or ``with_human``.
+        seed : int
+            Seed of this run's noise.
+        effects : iterable of Term
+            Effects beside those that the settings name, such as sealed ones.
+        sample_rate_hz : float, optional
+            Samples a second, where not the settings'.
+        """
+        self.settings = settings
+        self.has_human = run == "with_human"
+        self.sample_rate_hz = sample_rate_hz or settings.sample_rate_hz
+        self.geometry = Geometry(
+            settings.thigh_length_m,
+            settings.gravity_m_s2,
+            settings.thigh_cuff_distance_m if self.has_human else None,
+            settings.shank_cuff_distance_m if self.has_human else None,
+        )
+        self.model = _model(settings, self.geometry, effects).for_run(run)
+        self._assembly = assemble(self.model, self.geometry, JOINTS)
+        self._of_human = np.zeros(MOST_TERMS, dtype=np.bool_)
+        for i, term in enumerate(in_order(self.model)):
+            self._of_human[i] = term.effect.side is Side.HUMAN or term.effect.run == "with_human"
+        self._drives = make_drives(
+            np.array(settings.kp_nm_rad), np.array(settings.kd_nm_s_rad), np.array(settings.limit_nm),
+            np.array(settings.counts_per_turn), settings.drive_rate_hz, self.sample_rate_hz,
+        )  # fmt: skip
+        self._loop = loop_at_rest(self._assembly, np.array(settings.rest_rad))
+        self._scratch = workspace(len(JOINTS)), stages(len(JOINTS), len(self._loop.memory))
+        self._noise = np.random.default_rng(seed)
+        self._ripple = np.zeros(len(JOINTS))
+        self._temperature = np.full(len(JOINTS), settings.temperature.ambient_c)
+        self._zeros = np.random.default_rng(settings.seed).normal(0.0, settings.cuff.zero_n, (4, 3))
+        self._samples = 0
+
+    @property
+    def reference(self) -> NDArray:
+        """Last set-point, (J,) rad: to begin with, where the leg stands."""
+        return self._loop.reference.copy()
+
+    def run(self, reference: NDArray, enabled: NDArray) -> Samples:
+        """Move the leg along set-points and measure.
+
+        Parameters
+        ----------
+        reference : (n, J) array
+            Set-point at each sample's end, rad.
+        enabled : (J,) array of bool
+            Which drives follow theirs; the others apply no torque.
+        """
+        n = len(reference)
+        period = 1.0 / self.sample_rate_hz
+        reference = np.ascontiguousarray(reference, dtype=float)
+        out = _run(
+            self._assembly, self._drives, *self._scratch, self._loop, self._samples, period, reference, enabled,
+            self._of_human,
+        )  # fmt: skip
+        angle, velocity, torque, truth, human = out
+        sequence = self._samples + np.arange(n)
+        self._samples += n
+        torque = torque + self._torque_error(n)
+        return Samples(
+            time=(sequence + 0.5) * period,
+            sequence=sequence,
+            angle=angle,
+            velocity=velocity,
+            torque=torque,
+            temperature=self._warm(torque, period),
+            reference=reference,
+            forces=self._felt(human, truth) if self.has_human else np.zeros((n, 4, 3)),
+            truth=truth,
+        )
+
+    def _torque_error(self, n: int) -> NDArray:
+        """Return coloured noise with the settings' rms and correlation time, (n, J) N·m."""
+        settings = self.settings
+        memory = 0.0
+        if settings.ripple_correlation_s > 0:
+            memory = np.exp(-1.0 / (self.sample_rate_hz * settings.ripple_correlation_s))
+        white = self._noise.standard_normal((n, len(JOINTS))) * settings.ripple_nm
+        return _first_order(np.sqrt(1.0 - memory**2) / (1.0 - memory) * white, 1.0 - memory, self._ripple)
+
+    def _warm(self, torque: NDArray, period: float) -> NDArray:
+        """Return the motors' temperature, driven by the square of their torque, (n, J) °C."""
+        settings = self.settings.temperature
+        final = settings.ambient_c + settings.heating_c_nm2 * torque**2
+        return _first_order(final, period / settings.time_constant_s, self._temperature)
+
+    def _felt(self, human_torque: NDArray, truth: NDArray) -> NDArray:
+        forces = cuff_forces(human_torque, truth[:, Q], self.settings)
+        return forces + self._zeros + self._noise.normal(0.0, self.settings.cuff.noise_n, forces.shape)
+
+
+def term_of(effect: PlantEffect, source: str) -> Term:
+    """Return a setting as a term of the model; ``source`` starts the message of a refusal."""
+    made = effect_named(effect.effect)(joint=effect.joint)
+    names = [parameter.name for parameter in made.parameters]
+    if set(names) != set(effect.values):
+        raise SettingsError(
+            f"{source}: {made.label} has values {', '.join(effect.values) or 'none'}, expected "
+            f"{', '.join(names)}; correct them"
+        )
+    if (effect.joint is None) != made.whole_leg:
+        wanted = "no joint: it acts on the whole leg" if made.whole_leg else "a joint"
+        raise SettingsError(f"{source}: {made.name} has joint {effect.joint}, expected {wanted}")
+    return Term(made, np.array([effect.values[name] for name in names]))
+
+
+def _model(settings: PlantSettings, geometry: Geometry, effects: Iterable[Term]) -> Model:
+    """Return the whole machine's model, the person a rigid body of their own."""
+    exo, human = np.array(settings.exo_inertial), np.array(settings.human_inertial)
+    for name, X in (("exo_inertial", exo), ("exo_inertial + human_inertial", exo + human)):
+        if broken := unrealizable(X, geometry):
+            raise SettingsError(f"plant.{name}: no real leg has these: {broken[0]}; correct them")
+    frictions = zip(JOINTS, settings.coulomb_nm, settings.viscous_nm_s_rad, strict=True)
+    return Model(
+        (
+            Term(RigidBody(), exo),
+            Term(RigidBody(run="with_human"), human),
+            *(Term(Friction(joint), np.array([coulomb, viscous])) for joint, coulomb, viscous in frictions),
+            *(term_of(effect, f"plant.effects[{i}]") for i, effect in enumerate(settings.effects)),
+            *effects,
+        )
+    )
+
+
+@njit(cache=True)
+def _first_order(wanted, share, state):
+    """Let ``state`` (J,) follow ``wanted`` (n, J), closing ``share`` of the distance at each sample."""
+    out = np.empty_like(wanted)
+    for k in range(len(wanted)):
+        state += share * (wanted[k] - state)
+        out[k] = state
+    return out
+
+
+@njit(cache=True)
+def _run(a: Assembly, d, w, s, loop, first, period, reference, enabled, of_human):
+    """Carry the loop on along set-points (n, J).
+
+    Returns measured angle, speed and torque (n, J), truth (n, 4, J), and the torque that the terms marked in
+    ``of_human`` take of the drives' (n, J).
+    """
+    n, joints = reference.shape
+    angle, speed, torque = np.empty((n, joints)), np.empty((n, joints)), np.empty((n, joints))
+    truth, human = np.empty((n, 4, joints)), np.zeros((n, joints))
+    for k in range(n):
+        t = (first + k) * period
+        advance(a, d, w, s, loop, t, reference[k], enabled, angle[k], speed[k], torque[k], truth[k])
+        at = Instant(t + 0.5 * period, truth[k, Q], truth[k, DQ], truth[k, 2], np.sign(truth[k, DQ]), loop.load)
+        for i in range(a.bounds[4]):
+            if of_human[i]:
+                values = a.values[a.value_at[i] : a.value_at[i + 1]]
+                state = loop.memory[a.state_at[i] : a.state_at[i + 1]]
+                a.reactions[i](at, state, values, a.geometry, a.joint[i], human[k])
+    return angle, speed, torque, truth, human

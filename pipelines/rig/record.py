@@ -1,0 +1,77 @@
+"""A ``recording/1`` made without devices: the plant moved by arrays, for tests and identification campaigns."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipelines.mechanics.motion import CUFFS
+from pipelines.mechanics.trajectory import Trajectory
+from pipelines.rig.plant import JOINTS, Plant
+
+LEAD_S = 4.0
+"""Time to go from rest into the motion, and for transients to fade."""
+
+
+def record(
+    plant: Plant, trajectory: Trajectory, duration_s: float, purpose: str = "train"
+) -> tuple[pd.DataFrame, dict[str, Any]]:
+    """Return frame and metadata of a run of ``duration_s`` along a trajectory.
+
+    The same physics and the same channels as over Modbus. The leg goes from rest into the motion first; the
+    recording begins where the motion repeats.
+    """
+    rate = plant.sample_rate_hz
+    lead, count = round(LEAD_S * rate), round(duration_s * rate)
+    enabled = np.ones(len(JOINTS), dtype=np.bool_)
+    plant.run(_lead_in(plant.reference, trajectory, lead, rate), enabled)
+    # A set-point is reached half a sample after the instant it belongs to.
+    measured = plant.run(trajectory.at((np.arange(count) + 0.5) / rate)[0], enabled)
+    columns: dict[str, NDArray] = {"time_s": measured.time - measured.time[0]}
+    for j, joint in enumerate(JOINTS):
+        columns[f"{joint}_angle_rad"] = measured.angle[:, j]
+        columns[f"{joint}_torque_nm"] = measured.torque[:, j]
+        columns[f"{joint}_reference_rad"] = measured.reference[:, j]
+        columns[f"{joint}_velocity_rad_s"] = measured.velocity[:, j]
+        columns[f"{joint}_temperature_c"] = measured.temperature[:, j]
+    if plant.has_human:
+        for c, cuff in enumerate(CUFFS):
+            columns |= {f"{cuff}_force_{axis}_n": measured.forces[:, c, i] for i, axis in enumerate("xyz")}
+    columns["sequence"] = measured.sequence
+    return pd.DataFrame(columns), _metadata(plant, trajectory, purpose)
+
+
+def _lead_in(start: NDArray, trajectory: Trajectory, samples: int, rate: float) -> NDArray:
+    """Return set-points (n, J) from rest into the motion: a share of it that grows smoothly from 0 to 1."""
+    ahead = (np.arange(-samples, 0) + 0.5) / rate
+    s = np.minimum(1.0, 1.0 + (ahead + 0.25 * LEAD_S) / (0.75 * LEAD_S))
+    share = (s**3 * (10.0 - 15.0 * s + 6.0 * s**2))[:, np.newaxis]
+    period = trajectory.period_s
+    motion = trajectory.at(np.mod(ahead, period) if period else np.zeros(samples))[0]
+    return start + share * (motion - start)
+
+
+def _metadata(plant: Plant, trajectory: Trajectory, purpose: str) -> dict[str, Any]:
+    settings, geometry = plant.settings, plant.geometry
+    controller = {
+        joint: {
+            "type": "pd",
+            "kp_nm_rad": settings.kp_nm_rad[j],
+            "kd_nm_s_rad": settings.kd_nm_s_rad[j],
+            "rate_hz": settings.drive_rate_hz,
+            "limit_nm": settings.limit_nm[j],
+        }
+        for j, joint in enumerate(JOINTS)
+    }
+    lengths = {name: value for name, value in vars(geometry).items() if value is not None}
+    metadata = {
+        "run": "with_human" if plant.has_human else "exo_alone",
+        "purpose": purpose,
+        "sample_rate_hz": plant.sample_rate_hz,
+        "controller": controller,
+        "geometry": lengths,
+    }
+    if trajectory.period_s:
+        metadata["period_s"] = trajectory.period_s
+    return metadata

@@ -1,0 +1,66 @@
+"""``[plant]`` of a virtual rig: the machine, the person in it, and what disturbs the measurement. Pairs are hip, knee."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from pipelines.settings.base import Settings
+
+Pair = tuple[float, float]
+Four = tuple[float, float, float, float]
+
+
+class PlantEffect(Settings):
+    """An effect that the plant has."""
+
+    effect: str = Field(description="Its name, as `exoid effects` lists it.")
+    joint: Literal["hip", "knee"] | None = Field(None, description="The joint it acts at; none for the whole leg.")
+    values: dict[str, float] = Field(description="Its parameters by name.")
+
+
+class CuffSettings(Settings):
+    """How the leg hangs in its cuffs, and how well that is measured."""
+
+    carried_share: float = Field(0.2, ge=0.0, le=1.0, description="Share of the limb's weight carried along it.")
+    thigh_weight_n: float = Field(90.0, ge=0.0, description="Weight of the person's thigh.")
+    shank_weight_n: float = Field(50.0, ge=0.0, description="Weight of the person's shank and foot.")
+    preload_n: float = Field(15.0, ge=0.0, description="Force with which front and back squeeze the limb.")
+    noise_n: float = Field(0.5, ge=0.0, description="RMS of each axis' noise.")
+    zero_n: float = Field(0.0, ge=0.0, description="Standard deviation of the axes' zero errors, constant for a rig.")
+
+
+class TemperatureSettings(Settings):
+    """How motors warm."""
+
+    ambient_c: float = Field(24.0, description="Temperature of the room.")
+    heating_c_nm2: float = Field(0.01, ge=0.0, description="Final rise per joint torque squared.")
+    time_constant_s: float = Field(400.0, gt=0.0, description="Of the rise.")
+
+
+class PlantSettings(Settings):
+    """The machine behind a virtual rig's registers."""
+
+    exo_inertial: Four = Field((1.0, 0.22, 0.55, 2.3), description="X1..X4 of the empty exoskeleton.")
+    human_inertial: Four = Field((1.6, 0.41, 1.23, 3.4), description="X1..X4 of the person's own leg.")
+    coulomb_nm: Pair = Field((2.66, 4.72), description="Coulomb friction.")
+    viscous_nm_s_rad: Pair = Field((4.15, 7.36), description="Viscous friction.")
+    effects: tuple[PlantEffect, ...] = Field((), description="What else the plant has, openly.")
+    sealed: str | None = Field(
+        None, description="File with effects that only the rig reads, relative to this one; see docs/rig.md."
+    )
+    thigh_length_m: float = Field(0.38952, gt=0.0, description="Hip axis to knee axis.")
+    gravity_m_s2: float = Field(9.8, ge=0.0, description="Acceleration of gravity.")
+    thigh_cuff_distance_m: float = Field(0.25, gt=0.0, description="Hip axis to thigh cuff.")
+    shank_cuff_distance_m: float = Field(0.22, gt=0.0, description="Knee axis to shank cuff.")
+    rest_rad: Pair = Field((0.0, 0.0), description="Where the leg hangs before a run.")
+    sample_rate_hz: float = Field(200.0, gt=0.0, description="Samples a second that the devices latch.")
+    drive_rate_hz: float = Field(1000.0, gt=0.0, description="Rate of the drives' position loops.")
+    kp_nm_rad: Pair = Field((1500.0, 600.0), description="Stiffness of the position loops.")
+    kd_nm_s_rad: Pair = Field((120.0, 40.0), description="Damping of the position loops.")
+    limit_nm: Pair = Field((200.0, 200.0), description="Torque at which the drives saturate.")
+    counts_per_turn: Pair = Field((400000.0, 400000.0), description="Encoder counts per turn of the joint; 0: ideal.")
+    ripple_nm: Pair = Field((0.6, 0.4), description="RMS of the error of the measured torque.")
+    ripple_correlation_s: float = Field(0.02, ge=0.0, description="Time over which that error resembles itself.")
+    cuff: CuffSettings = Field(CuffSettings(), description="The cuffs.")
+    temperature: TemperatureSettings = Field(TemperatureSettings(), description="The motors.")
+    seed: int = Field(0, ge=0, description="Of what is constant for this rig, such as its sensors' zeros.")

@@ -1,0 +1,290 @@
+"""A rig file: the devices of a rig, how to read and drive them, what they must never do.
+
+A virtual rig has a ``[plant]`` too, the machine behind its registers. No stage but the rig itself reads that.
+"""
+
+from collections import Counter
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from pipelines.settings.base import Settings, load_toml
+from pipelines.settings.plant import PlantSettings
+
+RegisterType = Literal["int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64"]
+REGISTERS = {"int16": 1, "uint16": 1, "int32": 2, "uint32": 2, "int64": 4, "uint64": 4, "float32": 2, "float64": 4}
+"""Registers of 16 bits that a value takes."""
+
+UNITS = {
+    "1": 1.0, "rad": 1.0, "mrad": 1e-3, "deg": 0.017453292519943295,
+    "rad/s": 1.0, "deg/s": 0.017453292519943295, "rpm": 0.10471975511965977,
+    "A": 1.0, "mA": 1e-3, "N": 1.0, "kN": 1e3, "°C": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6,
+}  # fmt: skip
+"""SI value of one of each unit that a register can hold."""
+
+Unit = Literal[
+    "1", "rad", "mrad", "deg", "rad/s", "deg/s", "rpm", "A", "mA", "N", "kN", "°C", "s", "ms", "us"
+]  # fmt: skip
+
+DIMENSION = {
+    "sequence": ("1",), "status": ("1",), "control": ("1",), "time": ("s", "ms", "us"),
+    "angle": ("rad", "mrad", "deg"), "reference": ("rad", "mrad", "deg"), "velocity": ("rad/s", "deg/s", "rpm"),
+    "current": ("A", "mA"), "temperature": ("°C",),
+    "force_x": ("N", "kN"), "force_y": ("N", "kN"), "force_z": ("N", "kN"),
+}  # fmt: skip
+"""Units in which each quantity can be had."""
+
+MOST_REGISTERS = {"read": 125, "write": 121}
+"""What one FC23 exchange carries."""
+
+
+class Register(Settings):
+    """Where a value lies and what its bits mean: value = raw x scale + offset, in ``unit``."""
+
+    address: int = Field(ge=0, le=65535, description="Address of its first register, counted from 0.")
+    type: RegisterType = Field(description="How the bits are to be read.")
+    word_order: Literal["big", "little"] = Field("big", description="Which half of a long value comes first.")
+    scale: float = Field(1.0, description="Units per count; negative turns the sign.")
+    offset: float = Field(0.0, description="Value at a raw 0, in the unit.")
+    unit: Unit = Field("1", description="Unit of the scaled value.")
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> Self:
+        if self.scale == 0.0:
+            raise ValueError("scale: found 0, expected units per count; every value would be the offset")
+        if self.address + self.registers > 65536:
+            raise ValueError(f"address: found {self.address}, but a {self.type} there ends beyond address 65535")
+        return self
+
+    @property
+    def registers(self) -> int:
+        """How many registers of 16 bits it takes."""
+        return REGISTERS[self.type]
+
+    @property
+    def si(self) -> tuple[float, float]:
+        """SI units per count, and the SI value at a raw 0."""
+        return self.scale * UNITS[self.unit], self.offset * UNITS[self.unit]
+
+
+class Identity(Settings):
+    """A register that tells which device this is, and what it must hold."""
+
+    address: int = Field(ge=0, le=65535, description="Address of the register.")
+    value: int = Field(ge=0, le=65535, description="What it holds on the right device.")
+
+
+class DriveRead(Settings):
+    """What a drive tells, all latched at one instant; read in one block."""
+
+    sequence: Register = Field(description="Sample counter.")
+    time: Register = Field(description="The device's clock at the sample.")
+    angle: Register = Field(description="Joint angle.")
+    current: Register = Field(description="Motor current, positive where it pushes the angle upward.")
+    velocity: Register | None = Field(None, description="The drive's own velocity estimate.")
+    temperature: Register | None = Field(None, description="Drive or motor temperature.")
+    status: Register | None = Field(None, description="Status word.")
+    reference: Register | None = Field(None, description="Set-point that was in force; else what exoid sent is kept.")
+
+
+class DriveWrite(Settings):
+    """What a drive is told, in one block."""
+
+    reference: Register = Field(description="Set-point angle, to be reached within one sample.")
+    control: Register = Field(description="Control word.")
+
+
+class SensorRead(Settings):
+    """What a 3-axis force sensor tells; read in one block. Axes are those of the segment, see docs/contracts.md."""
+
+    sequence: Register = Field(description="Sample counter.")
+    force_x: Register = Field(description="Force along the segment (distal).")
+    force_y: Register = Field(description="Force forward.")
+    force_z: Register = Field(description="Lateral force.")
+
+
+class DriveMap(Settings):
+    """Register map of a make of drives."""
+
+    identity: tuple[Identity, ...] = Field((), description="What tells the right device from a wrong one.")
+    read: DriveRead = Field(description="Block that is read.")
+    write: DriveWrite = Field(description="Block that is written.")
+    enable: int = Field(1, description="Control word that makes the drive follow its set-point.")
+    disable: int = Field(0, description="Control word that takes the torque away.")
+    fault_mask: int = Field(0, ge=0, description="Bits of the status word that mean a fault; 0 for none.")
+
+    @model_validator(mode="after")
+    def _blocks_are_possible(self) -> Self:
+        _refuse_bad_block(self.read, "read")
+        _refuse_bad_block(self.write, "write")
+        if self.fault_mask and self.read.status is None:
+            raise ValueError("fault_mask: needs a status register; add read.status or leave the mask out")
+        return self
+
+
+class SensorMap(Settings):
+    """Register map of a make of force sensors."""
+
+    identity: tuple[Identity, ...] = Field((), description="What tells the right device from a wrong one.")
+    read: SensorRead = Field(description="Block that is read.")
+
+    @model_validator(mode="after")
+    def _block_is_possible(self) -> Self:
+        _refuse_bad_block(self.read, "read")
+        return self
+
+
+def registers_of(block: Settings) -> dict[str, Register]:
+    """Return a block's registers by quantity, those that are not there left out."""
+    return {name: register for name, register in block if register is not None}
+
+
+def _refuse_bad_block(block: Settings, name: str) -> None:
+    registers = registers_of(block)
+    for quantity, register in registers.items():
+        if register.unit not in DIMENSION[quantity]:
+            allowed = " or ".join(DIMENSION[quantity])
+            raise ValueError(f"{name}.{quantity}.unit: found {register.unit!r}, expected {allowed}; correct the unit")
+    taken: dict[int, str] = {}
+    for quantity, register in registers.items():
+        for address in range(register.address, register.address + register.registers):
+            if address in taken:
+                raise ValueError(
+                    f"{name}.{quantity}: register {address} is part of {taken[address]} too; correct one address"
+                )
+            taken[address] = quantity
+    length = max(taken) - min(taken) + 1
+    if length > MOST_REGISTERS[name]:
+        raise ValueError(
+            f"{name}: spans {length} registers ({min(taken)} to {max(taken)}), expected at most "
+            f"{MOST_REGISTERS[name]}, which is what one Modbus exchange carries"
+        )
+
+
+class DeviceSettings(Settings):
+    """Where a device is found."""
+
+    host: str = Field("127.0.0.1", description="Name or address; an embedded rig is always on this machine.")
+    port: int = Field(502, ge=1, le=65535, description="TCP port; an embedded rig chooses a free one.")
+    unit: int = Field(1, ge=1, le=247, description="Modbus unit id.")
+    map: str = Field(description="Its register map, a table below [map].")
+
+
+class DriveSettings(DeviceSettings):
+    """A drive, its transmission, and what its joint may do."""
+
+    joint: Literal["hip", "knee"] = Field(description="The joint it moves.")
+    torque_constant_nm_a: float = Field(gt=0.0, description="Motor torque per ampere.")
+    gear_ratio: float = Field(gt=0.0, description="Motor turns per turn of the joint.")
+    angle_rad: tuple[float, float] = Field(description="Lowest and highest angle.")
+    speed_rad_s: float = Field(gt=0.0, description="Highest speed, either way.")
+    torque_nm: float = Field(gt=0.0, description="Highest torque at the joint, either way.")
+
+    @model_validator(mode="after")
+    def _low_is_below_high(self) -> Self:
+        low, high = self.angle_rad
+        if low >= high:
+            raise ValueError(f"angle_rad: found [{low}, {high}], expected the lowest angle first; swap them")
+        return self
+
+    @property
+    def torque_per_ampere(self) -> float:
+        """Torque at the joint, N·m/A."""
+        return self.torque_constant_nm_a * self.gear_ratio
+
+
+class SensorSettings(DeviceSettings):
+    """A cuff force sensor."""
+
+    cuff: Literal["thigh_front", "thigh_back", "shank_front", "shank_back"] = Field(description="Where it sits.")
+    every: int = Field(1, ge=1, description="Cycles from one reading to the next; rows between hold no force.")
+
+
+class ControllerSettings(Settings):
+    """The loop inside a drive, as far as it is known; it is copied into every recording."""
+
+    type: str = Field("pd", description="Kind of loop.")
+    kp_nm_rad: float | None = Field(None, description="Stiffness.")
+    kd_nm_s_rad: float | None = Field(None, description="Damping.")
+    rate_hz: float | None = Field(None, gt=0.0, description="Rate of the loop.")
+    limit_nm: float | None = Field(None, gt=0.0, description="Torque at which it saturates.")
+
+
+class GeometrySettings(Settings):
+    """Lengths of the leg in this rig; what is left out comes from exoid.toml."""
+
+    thigh_length_m: float | None = Field(None, gt=0.0, description="Hip axis to knee axis.")
+    gravity_m_s2: float | None = Field(None, ge=0.0, description="Acceleration of gravity.")
+    thigh_cuff_distance_m: float | None = Field(None, gt=0.0, description="Hip axis to thigh cuff.")
+    shank_cuff_distance_m: float | None = Field(None, gt=0.0, description="Knee axis to shank cuff.")
+
+
+class SafetySettings(Settings):
+    """What stops a run, and how."""
+
+    angle_margin_rad: float = Field(0.02, ge=0.0, description="Set-points keep this far from each angle limit.")
+    cuff_force_n: float = Field(400.0, gt=0.0, description="Highest force on any axis of any cuff sensor.")
+    watchdog_s: float = Field(0.1, gt=0.0, description="Longest a cycle or a device's next sample may take.")
+    deceleration_rad_s2: float = Field(8.0, gt=0.0, description="How a stop slows the set-points down.")
+    ramp_s: float = Field(3.0, gt=0.0, description="Shortest time to go from rest into the motion and back.")
+    settle_s: float = Field(1.0, ge=0.0, description="Motion before the recording begins, for transients to fade.")
+
+
+class Maps(Settings):
+    """Register maps by name."""
+
+    drive: dict[str, DriveMap] = Field(description="Maps of drives.")
+    sensor: dict[str, SensorMap] = Field(default_factory=dict, description="Maps of force sensors.")
+
+
+class RigSettings(Settings):
+    """Everything exoid knows of a rig."""
+
+    name: Annotated[str, Field(min_length=1)] = Field(description="Name that recordings carry.")
+    embedded: bool = Field(False, description="Virtual: `exoid acquire` starts it in a process of its own.")
+    clock: Literal["lockstep", "real_time"] = Field(
+        "real_time", description="Devices sample on their own clock, or (virtual rigs) once for each exchange."
+    )
+    drive: tuple[DriveSettings, ...] = Field(min_length=1, description="The drives.")
+    sensor: tuple[SensorSettings, ...] = Field((), description="Cuff force sensors, read with a human only.")
+    map: Maps = Field(description="Register maps.")
+    safety: SafetySettings = Field(SafetySettings(), description="What stops a run, and how.")
+    geometry: GeometrySettings = Field(GeometrySettings(), description="The leg in this rig.")
+    controller: dict[Literal["hip", "knee"], ControllerSettings] = Field(
+        default_factory=dict, description="The loops inside the drives."
+    )
+    plant: PlantSettings | None = Field(None, description="The machine behind a virtual rig.")
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        if tuple(drive.joint for drive in self.drive) != ("hip", "knee"):
+            found = ", ".join(drive.joint for drive in self.drive)
+            raise ValueError(f"drive: found {found}, expected one for the hip, then one for the knee")
+        for kind in ("drive", "sensor"):
+            known = getattr(self.map, kind)
+            for i, device in enumerate(getattr(self, kind)):
+                if device.map not in known:
+                    raise ValueError(
+                        f"{kind}[{i}].map: found {device.map!r}, expected a table below [map.{kind}]: "
+                        f"{', '.join(known) or 'there is none'}"
+                    )
+        devices = (*self.drive, *self.sensor)
+        for place, times in Counter((d.host, d.port, d.unit) for d in devices).items():
+            if times > 1:
+                raise ValueError(f"unit: {place[0]}:{place[1]} unit {place[2]} stands for two devices; correct one")
+        for cuff, times in Counter(sensor.cuff for sensor in self.sensor).items():
+            if times > 1:
+                raise ValueError(f"sensor: found two sensors at {cuff}, expected one; correct their cuffs")
+        if self.plant is None and (self.embedded or self.clock == "lockstep"):
+            raise ValueError("plant: missing; a virtual rig (embedded, or in lockstep) needs the machine it plays")
+        return self
+
+    def public(self) -> dict:
+        """Return what recordings may tell of the rig: everything but the plant, which later stages are to find."""
+        return self.model_dump(mode="json", exclude={"plant"}, exclude_none=True)
+
+
+def load_rig(path: Path | str) -> RigSettings:
+    """Return the rig in a file."""
+    return load_toml(path, RigSettings)
