@@ -247,6 +247,35 @@ def stages(joints, memories):
     return Stages(np.zeros((4, 4, joints)), np.zeros((4, memories)), np.zeros((4, joints)), np.zeros(memories))
 
 
+@njit(cache=True, inline="always")
+def begin_stages(a, w, s, t, state, memory, load):
+    """Finish the first stage, whose ``s.rates[0]`` is known: rates of the memories, and ``load`` (J,) passed on."""
+    memory_rates(a, w, t, state, memory, w.direction, load, s.memory_rates[0])
+    load[:] = 0.0
+    at = Instant(t, state[Q], state[DQ], s.rates[0, DQ], w.direction, w.zero)
+    _react(a, a.bounds[0], a.bounds[2], at, memory, load)
+
+
+@njit(cache=True, inline="always")
+def reach_stage(s, i, reach, state, memory):
+    """Write state and memory of stage ``i``, ``reach`` seconds after the step's begin, into ``s``."""
+    for row in range(4):
+        for j in range(state.shape[1]):
+            s.state[row, j] = state[row, j] + reach * s.rates[i - 1, row, j]
+    for m in range(memory.shape[0]):
+        s.memory[m] = memory[m] + reach * s.memory_rates[i - 1, m]
+
+
+@njit(cache=True, inline="always")
+def end_stages(s, h, state, memory):
+    """Advance state and memory by the weighted mean of the four stages."""
+    for row in range(4):
+        for j in range(state.shape[1]):
+            state[row, j] += h / 6.0 * weighted(s.rates[:, row, j])
+    for m in range(memory.shape[0]):
+        memory[m] += h / 6.0 * weighted(s.memory_rates[:, m])
+
+
 @njit(**HOT)
 def step(a, w, s, t, h, state, memory, load, drive):
     """Advance ``state`` (4, J), ``memory`` (m,) and ``load`` (J,) by ``h`` seconds under constant drive torque.
@@ -254,28 +283,18 @@ def step(a, w, s, t, h, state, memory, load, drive):
     Classical Runge-Kutta with the direction of dry friction held over the step.
     """
     find_direction(a, w, t, h, state, memory, load, drive, s.rates[0])
-    memory_rates(a, w, t, state, memory, w.direction, load, s.memory_rates[0])
-    load[:] = 0.0
-    at = Instant(t, state[Q], state[DQ], s.rates[0, DQ], w.direction, w.zero)
-    _react(a, a.bounds[0], a.bounds[2], at, memory, load)
+    begin_stages(a, w, s, t, state, memory, load)
     for i in range(1, 4):
         reach = h if i == 3 else 0.5 * h
-        for row in range(4):
-            for j in range(a.joints):
-                s.state[row, j] = state[row, j] + reach * s.rates[i - 1, row, j]
-        for m in range(memory.shape[0]):
-            s.memory[m] = memory[m] + reach * s.memory_rates[i - 1, m]
+        reach_stage(s, i, reach, state, memory)
         accelerations(a, w, t + reach, s.state, s.memory, w.direction, load, drive, s.rates[i])
         memory_rates(a, w, t + reach, s.state, s.memory, w.direction, load, s.memory_rates[i])
-    for row in range(4):
-        for j in range(a.joints):
-            state[row, j] += h / 6.0 * _weighted(s.rates[:, row, j])
-    for m in range(memory.shape[0]):
-        memory[m] += h / 6.0 * _weighted(s.memory_rates[:, m])
+    end_stages(s, h, state, memory)
 
 
 @njit(cache=True, inline="always")
-def _weighted(k):
+def weighted(k):
+    """Return the four stages' sum with the classical Runge-Kutta weights."""
     return k[0] + 2.0 * k[1] + 2.0 * k[2] + k[3]
 
 
