@@ -17,6 +17,8 @@ import typer
 from typer.exceptions import TyperException
 
 from exoid_cli.console import console
+from exoid_cli.filter import filter_
+from exoid_cli.identify import identify
 from exoid_cli.init import init
 from exoid_cli.settings import settings
 from exoid_cli.show import show
@@ -31,6 +33,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.command("init")(init)
+app.command("filter")(filter_)
+app.command("identify")(identify)
 app.command("show")(show)
 app.add_typer(settings, name="settings")
 

@@ -40,7 +40,8 @@ class Assembly(NamedTuple):
     """What the compiled dynamics needs of a model; made by ``assemble``.
 
     Terms stand in the order: on links and inertial, on links, on drives and inertial, on drives;
-    ``bounds`` (5,) says where each group begins and the last ends. Per term i: its kernels, ``joint[i]`` (-1 for the whole leg), its values
+    ``bounds`` (5,) says where each group begins and the last ends. Per term i: its kernels,
+    ``joint[i]`` (-1 for the whole leg), its values
     ``values[value_at[i] : value_at[i + 1]]``, its memory ``state_at[i] : state_at[i + 1]``.
     """
 

@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipelines.dynamics.assembly import Assembly
-from pipelines.dynamics.forward import DQ, Q, THETA, memory_size, resting_state, stages, step, workspace
+from pipelines.dynamics.forward import DQ, THETA, Q, memory_size, resting_state, stages, step, workspace
 
 SUBSTEPS = 6
 """Integration steps per control period; even, so that the middle of a sample is one of them."""

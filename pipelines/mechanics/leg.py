@@ -6,7 +6,7 @@ the thigh, flexion negative. The paper prints several of these formulas with sli
 forms and a test for each are in ``docs/errata.md``.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import cos, sin
 
 import numpy as np
@@ -27,8 +27,12 @@ class Geometry:
     shank_cuff_distance_m: float | None = None
     """Knee axis to shank cuff; None where there are no cuff forces."""
 
+    def metadata(self) -> dict[str, float]:
+        """Return what a file says of it; lengths that are not known are left out."""
+        return {key: value for key, value in asdict(self).items() if value is not None}
+
     def array(self) -> NDArray:
-        """What compiled kernels receive as ``geometry``: thigh length (m), gravity (m/s²)."""
+        """Return what compiled kernels receive as ``geometry``: thigh length (m), gravity (m/s²)."""
         return np.array([self.thigh_length_m, self.gravity_m_s2])
 
 

@@ -54,6 +54,11 @@ class Motion:
         """Return the number of samples."""
         return len(self.time)
 
+    @property
+    def joint_metadata(self) -> list[dict[str, str]]:
+        """What a file computed from this motion says of its joints."""
+        return [{"name": joint.name, "kind": joint.kind} for joint in joints_of(self.metadata)]
+
     def joint_index(self, joint: str) -> int:
         """Return the column of a joint in q, dq, ddq and torque."""
         return self.joints.index(joint)
@@ -104,18 +109,18 @@ def motion_from_table(table: Table, default_geometry: Geometry | None = None) ->
         columns = [joint.column(quantity) for joint in joints]
         if not set(columns) <= set(frame.columns):
             return None
-        return np.ascontiguousarray(frame[columns].to_numpy(float))
+        return np.array(frame[columns], dtype=float, order="C")
 
     force_columns = [f"{cuff}_force_{axis}_n" for cuff in CUFFS for axis in "xyz"]
     has_forces = set(force_columns) <= set(frame.columns)
     return Motion(
-        time=frame["time_s"].to_numpy(float),
+        time=np.array(frame["time_s"], dtype=float),
         q=per_joint("angle"),
         dq=per_joint("velocity"),
         ddq=per_joint("acceleration"),
         torque=per_joint("torque"),
-        segment=frame["segment"].to_numpy(np.int64),
-        valid=frame["valid"].to_numpy(bool),
+        segment=np.array(frame["segment"], dtype=np.int64),
+        valid=np.array(frame["valid"], dtype=bool),
         run=metadata["run"],
         purpose=metadata["purpose"],
         sample_rate_hz=float(metadata["sample_rate_hz"]),

@@ -1,4 +1,4 @@
-"""``[identify]``: how parameters and their intervals are fitted."""
+"""``[identify]``: what the two-step fit leaves behind."""
 
 from pydantic import Field
 
@@ -8,4 +8,4 @@ from pipelines.settings.base import Settings
 class IdentifySettings(Settings):
     """The two-step fit: friction from exo_alone runs, then inertia with the human."""
 
-    confidence: float = Field(0.95, gt=0.0, lt=1.0, description="Coverage of the intervals in the printed table.")
+    figures: bool = Field(True, description="Draw the figures, beside the parameters, as PNG and PDF.")

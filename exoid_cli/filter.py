@@ -1,0 +1,51 @@
+"""``exoid filter``: low-pass and differentiate a recording."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from exoid_cli.console import console
+
+ConfigOption = Annotated[Path | None, typer.Option("--config", help="exoid.toml; its [filter] section counts.")]
+
+
+def filter_(
+    recording: Annotated[Path, typer.Argument(help="A recording/1 file.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The motion/1 file to write.")],
+    config: ConfigOption = None,
+    cutoff_hz: Annotated[float | None, typer.Option(min=0.0, help="Cut-off; wins over exoid.toml's.")] = None,
+) -> None:
+    """Filter a recording's angles without delay and differentiate them; torque stays as measured.
+
+    Example: exoid filter recordings/with_human_train.parquet -o motions/with_human_train.parquet
+    """
+    from pipelines.contracts import MOTION, RECORDING, describe
+    from pipelines.filtering import filter_recording
+    from pipelines.settings import Experiment
+    from pipelines.settings.filter import FilterSettings
+
+    settings = Experiment.load(config).filter if config else FilterSettings()
+    if cutoff_hz is not None:
+        settings = FilterSettings.model_validate({**settings.model_dump(), "cutoff_hz": cutoff_hz})
+    filtered = filter_recording(RECORDING.read(recording), settings)
+    provenance = describe(inputs=[recording], config=settings.model_dump(mode="json"))
+    MOTION.write(output, filtered.motion.frame, filtered.motion.metadata | provenance)
+
+    summary = {
+        "file": str(output),
+        "cutoff_hz": filtered.cutoff_hz,
+        "why": filtered.why,
+        "segments": filtered.segments,
+        "valid_share": filtered.valid_share,
+        "angle_noise_rad": filtered.noise.tolist(),
+        "drive_velocity_difference_rad_s": (
+            None if filtered.velocity_difference is None else filtered.velocity_difference.tolist()
+        ),
+    }
+    console.emit(summary)
+    gaps = "no gap" if filtered.segments == 1 else f"{filtered.segments} segments"
+    console.say(
+        f"{output}: {len(filtered.motion.frame)} samples, {gaps}, {filtered.valid_share:.1%} valid; "
+        f"cut-off {filtered.cutoff_hz:.1f} Hz ({filtered.why})"
+    )

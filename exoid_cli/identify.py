@@ -1,0 +1,99 @@
+"""``exoid identify``: friction from the empty exoskeleton, then inertia with the human."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from exoid_cli.console import console
+
+if TYPE_CHECKING:
+    from pipelines.identification import Identified
+
+
+def identify(
+    files: Annotated[list[Path], typer.Argument(help="motion/1 files, or recording/1 files to be filtered first.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for parameters, residuals and figures.")],
+    config: Annotated[Path | None, typer.Option("--config", help="exoid.toml: geometry, [filter], [identify].")] = None,
+) -> None:
+    """Fit the leg's parameters to training runs and measure the torque error on validation runs.
+
+    Example: exoid identify motions/*.parquet -o identified/
+    """
+    from pipelines.contracts import PARAMETERS, RESIDUALS, describe, joints_of
+    from pipelines.identification import identify as fit
+    from pipelines.identification.two_step import METHOD
+    from pipelines.mechanics.read import geometry_from, read_motions
+    from pipelines.settings import Experiment
+
+    settings = Experiment.load(config) if config else Experiment()
+    motions = read_motions(files, settings.filter, geometry_from(settings.mechanism))
+    found = fit(motions)
+    config_used = {
+        "mechanism": settings.mechanism.model_dump(mode="json"),
+        "filter": settings.filter.model_dump(mode="json"),
+        "identify": settings.identify.model_dump(mode="json"),
+    }
+    shared = {"joints": motions[0].joint_metadata} | describe(inputs=files, config=config_used)
+    described = {
+        "covariance": found.covariance.tolist(),
+        "mechanism": "leg",
+        "geometry": motions[0].geometry.metadata(),
+        "method": METHOD,
+        "one_step": found.one_step.tolist(),
+        "validation": found.validation.as_json(),
+        "collinear": found.collinear,
+        "unrealizable": found.unrealizable,
+    }
+    PARAMETERS.write(output / "parameters.parquet", found.parameters, shared | described)
+    RESIDUALS.write(output / "residuals.parquet", found.residuals, shared)
+    if settings.identify.figures:
+        from pipelines.identification.figures import draw
+
+        draw(found.residuals, joints_of(shared), output)
+    _report(found)
+
+
+def _named(row: dict[str, Any]) -> str:
+    joint, run = (row[key] if isinstance(row[key], str) else "" for key in ("joint", "run"))
+    return " ".join(filter(None, (joint, row["symbol"], run)))
+
+
+def _report(found: "Identified") -> None:
+    rows = found.parameters
+    console.emit(
+        {
+            "parameters": rows.to_dict("records"),
+            "validation": found.validation.as_json(),
+            "collinear": found.collinear,
+            "unrealizable": found.unrealizable,
+        }
+    )
+    console.table(
+        ("parameter", "value", "95 % interval", "unit", "one step", "step"),
+        [
+            (
+                _named(row),
+                f"{row['value']:.4f}",
+                f"{row['ci95_low']:.4f} … {row['ci95_high']:.4f}",
+                row["unit"],
+                f"{one:.4f}",
+                row["step"],
+            )
+            for row, one in zip(rows.to_dict("records"), found.one_step, strict=True)
+        ],
+        numbers="value, one step",
+    )
+    console.say("")
+    scores = {**found.validation.by_run, "all": found.validation.pooled}
+    console.table(
+        ("validation run", "joint", "RMSE N·m", "with reversals", "torque rms N·m"),
+        [
+            (run, joint, f"{score.rmse[j]:.3f}", f"{score.rmse_unmasked[j]:.3f}", f"{score.torque_rms[j]:.2f}")
+            for run, score in scores.items()
+            for j, joint in enumerate(found.validation.joints)
+        ],
+        numbers="RMSE N·m, with reversals, torque rms N·m",
+    )
+    for sentence in [*found.collinear, *(f"not a real leg: {s}" for s in found.unrealizable)]:
+        console.warn(sentence)

@@ -1,0 +1,1 @@
+"""Least squares on regressors, with intervals that survive autocorrelated residuals."""

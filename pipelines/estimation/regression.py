@@ -1,0 +1,81 @@
+"""One run as a linear regression: torque and regressor behind the same filter, and which rows to trust."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.mechanics.motion import Motion
+from pipelines.model import Model
+from pipelines.signals.blocks import BlockAverage, dilate
+
+REVERSAL_SPEED = 0.04
+"""rad/s (m/s) below which the sign of the speed, and so friction, is not known."""
+REVERSAL_PADDING_S = 0.08
+"""What a joint that stuck still does after it has come free."""
+MASK = f"|v| < {REVERSAL_SPEED:g} rad/s, padded {REVERSAL_PADDING_S:g} s"
+
+
+@dataclass(frozen=True)
+class Regression:
+    """m blocks of one run, J joints, p parameters: ``torque = regressor @ parameters + noise``."""
+
+    motion: Motion
+    time: NDArray
+    """(m,) s, the middle of each block."""
+    segment: NDArray
+    regressor: NDArray
+    """(m, J, p)."""
+    torque: NDArray
+    """(m, J) N·m."""
+    valid: NDArray
+    """(m,) bool: every sample of the block is trusted."""
+    usable: NDArray
+    """(m, J) bool: valid, and away from that joint's reversals."""
+    state: tuple[NDArray, NDArray, NDArray]
+    """q, dq, ddq, (m, J) each."""
+
+    @property
+    def scored(self) -> NDArray:
+        """(m,) bool: usable at every joint, as the RMSE counts it."""
+        return self.usable.all(axis=1)
+
+    def select(self, columns: NDArray) -> "Regression":
+        """Return the regression on some of the parameters."""
+        return replace(self, regressor=self.regressor[:, :, columns])
+
+    def less(self, torque: NDArray) -> "Regression":
+        """Return the regression with a known torque (m, J) taken off."""
+        return replace(self, torque=self.torque - torque)
+
+
+def block_average(motion: Motion) -> BlockAverage:
+    """Return the regression filter that the motion's file asks for."""
+    chosen = motion.metadata.get("regression_filter") or {}
+    if "decimation" in chosen:
+        return BlockAverage(int(chosen["decimation"]))
+    return BlockAverage.lasting(0.025, motion.sample_rate_hz)
+
+
+def away_from_reversals(motion: Motion) -> NDArray:
+    """Tell for each sample and joint whether it moves, and has moved for a while: (n, J) bool."""
+    padding = round(REVERSAL_PADDING_S * motion.sample_rate_hz)
+    slow = np.abs(motion.dq) < REVERSAL_SPEED
+    return ~np.column_stack([dilate(column, padding) for column in slow.T])
+
+
+def regress(motion: Motion, model: Model) -> Regression:
+    """Compute the regressor at full rate, then average it and the torque over the same blocks."""
+    block = block_average(motion)
+    starts = block.starts(motion.segment)
+    valid = block.all(motion.valid, starts)
+    return Regression(
+        motion=motion,
+        time=block.mean(motion.time, starts),
+        segment=motion.segment[starts],
+        regressor=block.mean(model.regressor(motion), starts),
+        torque=block.mean(motion.torque, starts),
+        valid=valid,
+        usable=valid[:, np.newaxis] & block.all(away_from_reversals(motion), starts),
+        state=(block.mean(motion.q, starts), block.mean(motion.dq, starts), block.mean(motion.ddq, starts)),
+    )

@@ -1,0 +1,5 @@
+"""Identification: friction from the empty exoskeleton, then inertia with the human."""
+
+from pipelines.identification.two_step import Identified, identify
+
+__all__ = ["Identified", "identify"]

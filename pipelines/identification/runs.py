@@ -1,0 +1,55 @@
+"""The runs that an identification is given, and whether they suffice."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from pipelines.errors import InputError
+from pipelines.mechanics.motion import Motion
+
+REMEDY = "record it with `exoid acquire`, or correct the metadata of the file"
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Motions of one machine, by what they are for."""
+
+    motions: tuple[Motion, ...]
+
+    def of(self, purpose: str, run: str | None = None) -> list[Motion]:
+        """Return the motions of a purpose and, if asked, of a kind of run."""
+        return [m for m in self.motions if m.purpose == purpose and run in (None, m.run)]
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The kinds of run there are to fit, exo_alone first."""
+        return tuple(kind for kind in ("exo_alone", "with_human") if self.of("train", kind))
+
+
+def checked(motions: Sequence[Motion]) -> Runs:
+    """Refuse motions that do not belong together or do not suffice for two steps and a validation."""
+    runs = Runs(tuple(motions))
+    listed = ", ".join(f"{m.file} ({m.run}, {m.purpose})" for m in motions) or "none"
+    if not runs.of("train", "exo_alone"):
+        raise InputError(
+            f"found no exo_alone run to train on among: {listed}; friction is fitted with nobody in the machine: "
+            f"{REMEDY}"
+        )
+    if not runs.of("validate"):
+        raise InputError(
+            f"found no run to validate on among: {listed}; a fit is judged on data it has not seen: {REMEDY}"
+        )
+    first = motions[0]
+    for other in motions[1:]:
+        if other.joints != first.joints:
+            raise InputError(
+                f"{other.file} has joints {', '.join(other.joints)}, {first.file} has {', '.join(first.joints)}; "
+                "give runs of one machine"
+            )
+        for key in ("thigh_length_m", "gravity_m_s2"):
+            ours, theirs = getattr(first.geometry, key), getattr(other.geometry, key)
+            if ours != theirs:
+                raise InputError(
+                    f"{other.file} has {key} {theirs:g}, {first.file} has {ours:g}; give runs of one machine, "
+                    "or correct the metadata"
+                )
+    return runs
