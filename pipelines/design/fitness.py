@@ -1,0 +1,270 @@
+"""How good an excitation is, compiled: repair, regressor, Gram matrix, criterion; about 15 us a motion.
+
+A candidate is a vector: sine coordinates of hip and knee, cosine coordinates of hip and knee, and the
+two mean angles where they are searched too. Coordinates times ``basis`` are the Fourier coefficients.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pipelines.design.sines import VECTORIZED, sines
+from pipelines.mechanics.leg import Geometry, regressor_rows
+
+CRITERIA = ("log_det", "condition", "scaled_condition")
+LOG_DET, CONDITION, SCALED_CONDITION = range(3)
+
+FAST = {"cache": True, "fastmath": VECTORIZED, "error_model": "numpy"}
+
+PARAMETERS = 8
+HIP_PARAMETERS = (0, 1, 2, 3, 4, 5)
+KNEE_PARAMETERS = (1, 2, 6, 7)
+"""The columns that are not zero in each joint's row; X1 .. X4, then Coulomb and viscous friction of hip and knee."""
+
+
+class Problem(NamedTuple):
+    """What all candidates of one search share. n harmonics, f free coordinates for each joint, N samples."""
+
+    sine: NDArray
+    cosine: NDArray
+    """(n, N) harmonics over one period."""
+    speeds: NDArray
+    """(n,) rad/s."""
+    basis: NDArray
+    """(2, n, f): from coordinates to sine (0) and cosine (1) coefficients."""
+    theta0: NDArray
+    """(2,) mean angles, unless ``theta0_is_free``."""
+    theta0_is_free: bool
+    bounds: NDArray
+    """(3, 2, 2): angle, velocity, acceleration; hip, knee; low, high."""
+    geometry: NDArray
+    criterion: int
+
+
+class Workspace(NamedTuple):
+    """Scratch arrays of one evaluation, N samples each."""
+
+    motion: NDArray
+    """(6, N): angles, velocities, accelerations of hip and knee."""
+    sines: NDArray
+    """(4, N): sine and cosine of the hip's angle, then the knee's."""
+    columns: NDArray
+    """(10, N): the hip's six columns, then the knee's four."""
+    coefficients: NDArray
+    """(2, 2, n): sine and cosine; hip and knee."""
+
+
+def problem(
+    *,
+    omega: float,
+    harmonics: int,
+    bounds: NDArray,
+    geometry: Geometry,
+    criterion: str,
+    theta0: NDArray | None,
+    basis: NDArray,
+    samples: int,
+) -> Problem:
+    """Prepare a search; ``theta0`` is None where the mean angles are searched too."""
+    phase = 2.0 * np.pi * np.outer(np.arange(1, harmonics + 1), np.arange(samples) / samples)
+    return Problem(
+        sine=np.sin(phase),
+        cosine=np.cos(phase),
+        speeds=omega * np.arange(1.0, harmonics + 1),
+        basis=np.ascontiguousarray(basis),
+        theta0=bounds[0].mean(axis=1) if theta0 is None else np.array(theta0, dtype=float),
+        theta0_is_free=theta0 is None,
+        bounds=np.ascontiguousarray(bounds),
+        geometry=geometry.array(),
+        criterion=CRITERIA.index(criterion),
+    )
+
+
+@njit(cache=True)
+def workspace(problem):
+    """Allocate the scratch arrays for one problem."""
+    n, samples = problem.sine.shape
+    return Workspace(
+        np.empty((6, samples)), np.empty((4, samples)), np.empty((10, samples)), np.empty((2, 2, n))
+    )
+
+
+@njit(cache=True)
+def cost(candidate, problem, work):
+    """Repair a candidate in place so that it keeps every bound, and return its cost: the less, the better."""
+    expand(candidate, problem, work.coefficients)
+    move(problem, work)
+    repair(candidate, problem, work)
+    fill_columns(candidate, problem, work)
+    gram = gram_matrix(work.columns)
+    if problem.criterion == LOG_DET:
+        return -log_determinant(gram)
+    if problem.criterion == SCALED_CONDITION:
+        size = np.sqrt(np.diag(gram))
+        if size.min() <= 0.0:
+            return np.inf
+        gram /= np.outer(size, size)
+    return condition_number(gram)
+
+
+@njit(cache=True)
+def expand(candidate, problem, coefficients):
+    """Write the Fourier coefficients (2, 2, n) of a candidate's coordinates."""
+    _, n, free = problem.basis.shape
+    for part in range(2):
+        for joint in range(2):
+            start = (2 * part + joint) * free
+            for k in range(n):
+                total = 0.0
+                for f in range(free):
+                    total += problem.basis[part, k, f] * candidate[start + f]
+                coefficients[part, joint, k] = total
+
+
+@njit(**FAST)
+def move(problem, work):
+    """Compute angle less mean angle, velocity and acceleration over one period."""
+    work.motion[:] = 0.0
+    for joint in range(2):
+        q, dq, ddq = work.motion[joint], work.motion[2 + joint], work.motion[4 + joint]
+        for k in range(problem.speeds.size):
+            a, b = work.coefficients[0, joint, k], work.coefficients[1, joint, k]
+            speed, sine, cosine = problem.speeds[k], problem.sine[k], problem.cosine[k]
+            for i in range(q.size):
+                swing = a * sine[i] + b * cosine[i]
+                q[i] += swing
+                dq[i] += speed * (a * cosine[i] - b * sine[i])
+                ddq[i] -= speed * speed * swing
+
+
+@njit(cache=True)
+def repair(candidate, problem, work):
+    """Shrink each joint's motion about its mean angle until it fits; every quantity is linear in that scale."""
+    _, n, free = problem.basis.shape
+    samples = problem.sine.shape[1]
+    for joint in range(2):
+        theta0 = problem.theta0[joint]
+        if problem.theta0_is_free:
+            low, high = problem.bounds[0, joint]
+            theta0 = min(max(candidate[4 * free + joint], low), high)
+            candidate[4 * free + joint] = theta0
+        scale = 1.0
+        for quantity in range(3):
+            low, high = extent(work.motion[2 * quantity + joint], n)
+            mean = theta0 if quantity == 0 else 0.0
+            scale = min(scale, room(problem.bounds[quantity, joint, 1] - mean, high))
+            scale = min(scale, room(mean - problem.bounds[quantity, joint, 0], -low))
+        if scale < 1.0:
+            for part in range(2):
+                start = (2 * part + joint) * free
+                candidate[start : start + free] *= scale
+            for quantity in range(3):
+                work.motion[2 * quantity + joint] *= scale
+        for i in range(samples):
+            work.motion[joint, i] += theta0
+
+
+@njit(cache=True)
+def room(allowed, reached):
+    """Return the scale at which ``reached`` is no more than what is allowed."""
+    return allowed / reached if reached > allowed else 1.0
+
+
+@njit(**FAST)
+def extent(x, harmonics):
+    """Bound a trigonometric polynomial of this degree from its N uniform samples over a period.
+
+    Between samples it exceeds the largest of them in size by no more than 1 / cos(pi n / N)
+    (Ehlich and Zeller, 1964, Math. Z. 86); taken about the middle of its range, which is tighter.
+    """
+    low, high = x[0], x[0]
+    for i in range(1, x.size):
+        low = min(low, x[i])
+        high = max(high, x[i])
+    middle = 0.5 * (low + high)
+    half = 0.5 * (high - low) / math.cos(math.pi * harmonics / x.size)
+    return middle - half, middle + half
+
+
+@njit(**FAST)
+def fill_columns(candidate, problem, work):
+    """Compute the regressor's columns that are not zero everywhere."""
+    q, sine, columns = work.motion, work.sines, work.columns
+    length, gravity = problem.geometry
+    sines(q[0], sine[0], sine[1])
+    sines(q[1], sine[2], sine[3])
+    for i in range(q.shape[1]):
+        dq = (q[2, i], q[3, i])
+        sin_leg = sine[0, i] * sine[3, i] + sine[1, i] * sine[2, i]
+        hip, knee = regressor_rows(sine[0, i], sin_leg, sine[2, i], sine[3, i], dq, (q[4, i], q[5, i]), length, gravity)
+        for p in range(4):
+            columns[p, i] = hip[p]
+        columns[4, i] = sign(dq[0])
+        columns[5, i] = dq[0]
+        columns[6, i] = knee[1]
+        columns[7, i] = knee[2]
+        columns[8, i] = sign(dq[1])
+        columns[9, i] = dq[1]
+
+
+@njit(**FAST)
+def sign(x):
+    """Return sgn x."""
+    return 1.0 if x > 0.0 else (-1.0 if x < 0.0 else 0.0)
+
+
+@njit(**FAST)
+def gram_matrix(columns):
+    """A'A / N, (8, 8), from the columns of hip and knee."""
+    gram = np.zeros((PARAMETERS, PARAMETERS))
+    for i in range(6):
+        for j in range(i + 1):
+            gram[HIP_PARAMETERS[i], HIP_PARAMETERS[j]] += dot(columns[i], columns[j])
+    for i in range(4):
+        for j in range(i + 1):
+            gram[KNEE_PARAMETERS[i], KNEE_PARAMETERS[j]] += dot(columns[6 + i], columns[6 + j])
+    for i in range(PARAMETERS):
+        for j in range(i + 1):
+            gram[i, j] /= columns.shape[1]
+            gram[j, i] = gram[i, j]
+    return gram
+
+
+@njit(**FAST)
+def dot(x, y):
+    """Sum of products; a loop, because a BLAS call costs more than 1000 products."""
+    total = 0.0
+    for i in range(x.size):
+        total += x[i] * y[i]
+    return total
+
+
+@njit(cache=True)
+def log_determinant(gram):
+    """Log of a Gram matrix's determinant by Cholesky's factors; minus infinity where it is singular."""
+    factor = gram.copy()
+    total = 0.0
+    for j in range(len(factor)):
+        for k in range(j):
+            factor[j, j] -= factor[j, k] ** 2
+        if factor[j, j] <= 0.0:
+            return -np.inf
+        total += math.log(factor[j, j])
+        factor[j, j] = math.sqrt(factor[j, j])
+        for i in range(j + 1, len(factor)):
+            for k in range(j):
+                factor[i, j] -= factor[i, k] * factor[j, k]
+            factor[i, j] /= factor[j, j]
+    return total
+
+
+@njit(cache=True)
+def condition_number(gram):
+    """Condition number of A from the eigenvalues of A'A, good to about eps cond²."""
+    eigenvalues = np.linalg.eigvalsh(gram)
+    if eigenvalues[0] <= 0.0:
+        return np.inf
+    return math.sqrt(eigenvalues[-1] / eigenvalues[0])

@@ -1,0 +1,61 @@
+"""Particle swarm with a ring or a global neighbourhood, compiled."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pipelines.design.fitness import cost, workspace
+
+# Clerc and Kennedy's constriction (2002, IEEE Trans. Evol. Comput. 6(1)): the swarm contracts by itself.
+INERTIA = 0.7298
+PULL = 1.49618
+
+
+class Swarm(NamedTuple):
+    """P particles in D dimensions."""
+
+    position: NDArray
+    velocity: NDArray
+    """(P, D)."""
+    best_position: NDArray
+    """(P, D): the best each particle has seen."""
+    best_cost: NDArray
+    """(P,)."""
+
+
+@njit(cache=True)
+def assess(swarm, problem):
+    """Repair and judge every particle where it is."""
+    work = workspace(problem)
+    for i in range(len(swarm.position)):
+        swarm.best_cost[i] = cost(swarm.position[i], problem, work)
+        swarm.best_position[i] = swarm.position[i]
+
+
+@njit(cache=True)
+def fly(swarm, problem, ring, iterations, rng):
+    """Move the swarm a number of times, in place."""
+    work = workspace(problem)
+    particles, dimensions = swarm.position.shape
+    leader = int(np.argmin(swarm.best_cost))
+    for _ in range(iterations):
+        for i in range(particles):
+            if ring:
+                leader = i
+                for neighbour in ((i - 1) % particles, (i + 1) % particles):
+                    if swarm.best_cost[neighbour] < swarm.best_cost[leader]:
+                        leader = neighbour
+            x, v = swarm.position[i], swarm.velocity[i]
+            for d in range(dimensions):
+                own = swarm.best_position[i, d] - x[d]
+                theirs = swarm.best_position[leader, d] - x[d]
+                v[d] = INERTIA * v[d] + PULL * (rng.random() * own + rng.random() * theirs)
+                x[d] += v[d]
+            value = cost(x, problem, work)
+            if value < swarm.best_cost[i]:
+                swarm.best_cost[i] = value
+                swarm.best_position[i] = x
+                if value < swarm.best_cost[leader]:
+                    leader = i
