@@ -20,7 +20,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipelines.dynamics.assembly import Assembly
-from pipelines.effects.kernel import Instant
+from pipelines.effects.kernel import Instant, derivative_at, reaction_at, spring_at
 
 STICTION_SWEEPS = 20
 STICTION_TOLERANCE = 1e-6
@@ -71,7 +71,7 @@ def _react(a, first, last, at, memory, out):
     for i in range(first, last):
         values = a.values[a.value_at[i] : a.value_at[i + 1]]
         state = memory[a.state_at[i] : a.state_at[i + 1]]
-        a.reactions[i](at, state, values, a.geometry, a.joint[i], out)
+        reaction_at(a.reactions[i])(at, state, values, a.geometry, a.joint[i], out)
 
 
 @njit(cache=True, inline="always")
@@ -123,7 +123,9 @@ def _prepare(a, w, t, state, memory, load):
             w.mass[j, j] += w.motor_mass[j, j]
         else:
             values = a.values[a.value_at[term] : a.value_at[term + 1]]
-            w.passed[j] = a.springs[term](state[THETA, j] - state[Q, j], state[DTHETA, j] - state[DQ, j], values)
+            w.passed[j] = spring_at(a.springs[term])(
+                state[THETA, j] - state[Q, j], state[DTHETA, j] - state[DQ, j], values
+            )
 
 
 @njit(cache=True, inline="always")
@@ -182,7 +184,7 @@ def memory_rates(a, w, t, state, memory, direction, load, rates):
         if last > first:
             values = a.values[a.value_at[i] : a.value_at[i + 1]]
             at = motor if i >= a.bounds[2] else link
-            a.derivatives[i](at, memory[first:last], values, a.geometry, a.joint[i], rates[first:last])
+            derivative_at(a.derivatives[i])(at, memory[first:last], values, a.geometry, a.joint[i], rates[first:last])
 
 
 @njit(**HOT)

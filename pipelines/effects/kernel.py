@@ -10,8 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit, types
+from numba.core import cgutils
 from numba.core.errors import NumbaExperimentalFeatureWarning
 from numba.core.types import float64, int64, void
+from numba.extending import intrinsic
 
 # Kernels as arguments are numba's "first-class functions", which it calls experimental; the
 # alternative, code generated for each model, costs seconds of compilation whenever a model changes.
@@ -70,6 +72,37 @@ def reading(function):
     """Compile what a sensor makes of the truth."""
     return staticmethod(njit(READING, cache=True)(function))
 
+
+def address(kernel) -> int:
+    """Return where a kernel's machine code stands in memory.
+
+    Handing the kernels themselves to compiled code costs 60 µs each, at every call.
+    """
+    (compiled,) = kernel.overloads.values()
+    return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
+
+
+def _kernel_at(signature):
+    kind = types.FunctionType(signature)
+
+    @intrinsic
+    def kernel_at(typing_context, where):
+        """Return the kernel that stands at an address, for compiled code to call."""
+
+        def lower(context, builder, signature, arguments):
+            function = cgutils.create_struct_proxy(kind)(context, builder)
+            function.jit_addr = builder.inttoptr(arguments[0], context.get_value_type(types.voidptr))
+            return function._getvalue()
+
+        return kind(where), lower
+
+    return kernel_at
+
+
+reaction_at = _kernel_at(REACTION)
+derivative_at = _kernel_at(DERIVATIVE)
+spring_at = _kernel_at(SPRING)
+reading_at = _kernel_at(READING)
 
 _table = float64[:, ::1]
 _MOTION = (_vector, _table, _table, _table, _table, _vector)  # time, q, dq, ddq, load, geometry

@@ -7,12 +7,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipelines.dynamics.assembly import MOST_TERMS, Assembly, assemble, in_order
+from pipelines.dynamics.assembly import Assembly, assemble, in_order
 from pipelines.dynamics.forward import DQ, Q, stages, workspace
 from pipelines.dynamics.pd_loop import advance, loop_at_rest, make_drives
 from pipelines.effects import Side
 from pipelines.effects.friction import Friction
-from pipelines.effects.kernel import Instant
+from pipelines.effects.kernel import Instant, reaction_at
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import SettingsError
 from pipelines.mechanics.leg import Geometry, unrealizable
@@ -83,9 +83,9 @@ class Plant:
         )
         self.model = _model(settings, self.geometry, effects).for_run(run)
         self._assembly = assemble(self.model, self.geometry, JOINTS)
-        self._of_human = np.zeros(MOST_TERMS, dtype=np.bool_)
-        for i, term in enumerate(in_order(self.model)):
-            self._of_human[i] = term.effect.side is Side.HUMAN or term.effect.run == "with_human"
+        self._of_human = np.array(
+            [term.effect.side is Side.HUMAN or term.effect.run == "with_human" for term in in_order(self.model)]
+        )
         self._drives = make_drives(
             np.array(settings.kp_nm_rad), np.array(settings.kd_nm_s_rad), np.array(settings.limit_nm),
             np.array(settings.counts_per_turn), settings.drive_rate_hz, self.sample_rate_hz,
@@ -217,5 +217,5 @@ def _run(a: Assembly, d, w, s, loop, first, period, reference, enabled, of_human
             if of_human[i]:
                 values = a.values[a.value_at[i] : a.value_at[i + 1]]
                 state = loop.memory[a.state_at[i] : a.state_at[i + 1]]
-                a.reactions[i](at, state, values, a.geometry, a.joint[i], human[k])
+                reaction_at(a.reactions[i])(at, state, values, a.geometry, a.joint[i], human[k])
     return angle, speed, torque, truth, human
