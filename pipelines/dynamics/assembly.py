@@ -1,4 +1,4 @@
-"""A model laid out for compiled code: kernels in a tuple, values and memory in flat arrays."""
+"""A model laid out for compiled code: addresses of kernels, values and memory in flat arrays."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -7,13 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.effects import Effect, Side
-from pipelines.effects.kernel import derivative, reaction, reading, spring
+from pipelines.effects.kernel import address, derivative, reaction, reading, spring
 from pipelines.errors import InputError
 from pipelines.mechanics.leg import Geometry
 from pipelines.model import Model, Term
-
-MOST_TERMS = 16
-"""Length of every tuple of kernels. Fixed, so that one compilation serves all models."""
 
 
 @reaction
@@ -40,17 +37,17 @@ class Assembly(NamedTuple):
     """What the compiled dynamics needs of a model; made by ``assemble``.
 
     Terms stand in the order: on links and inertial, on links, on drives and inertial, on drives;
-    ``bounds`` (5,) says where each group begins and the last ends. Per term i: its kernels,
-    ``joint[i]`` (-1 for the whole leg), its values
-    ``values[value_at[i] : value_at[i + 1]]``, its memory ``state_at[i] : state_at[i + 1]``.
+    ``bounds`` (5,) says where each group begins and the last ends. Per term i: the addresses of its kernels,
+    ``joint[i]`` (-1 for the whole leg), its values ``values[value_at[i] : value_at[i + 1]]``, its memory
+    ``state_at[i] : state_at[i + 1]``. Arrays alone, so that one compilation serves all models.
     """
 
     joints: int
     bounds: np.ndarray
-    reactions: tuple
-    derivatives: tuple
-    springs: tuple
-    readings: tuple
+    reactions: np.ndarray
+    derivatives: np.ndarray
+    springs: np.ndarray
+    readings: np.ndarray
     joint: np.ndarray
     values: np.ndarray
     value_at: np.ndarray
@@ -61,8 +58,8 @@ class Assembly(NamedTuple):
     geometry: np.ndarray
 
 
-def _padded(kernels: Sequence, blank) -> tuple:
-    return tuple(blank if kernel is None else kernel for kernel in kernels) + (blank,) * (MOST_TERMS - len(kernels))
+def _addresses(kernels: Sequence, blank) -> NDArray:
+    return np.array([address(kernel or blank.__func__) for kernel in kernels], dtype=np.int64)
 
 
 def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "knee")) -> Assembly:
@@ -72,8 +69,6 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
     """
     terms = in_order(model)
     effects = [term.effect for term in terms]
-    if len(effects) >= MOST_TERMS:
-        raise InputError(f"the model has {len(effects)} effects, the simulation takes {MOST_TERMS - 1} at most")
     joint = np.array([joints.index(e.joint) if e.joint else -1 for e in effects], dtype=np.int64)
     sprung = np.full(len(joints), -1, dtype=np.int64)
     motor_inertia = np.zeros(len(joints))
@@ -86,10 +81,10 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
     return Assembly(
         joints=len(joints),
         bounds=np.searchsorted([_group(e) for e in effects], np.arange(5)).astype(np.int64),
-        reactions=_padded([e.reaction for e in effects], _kernel(_no_reaction)),
-        derivatives=_padded([e.derivative for e in effects], _kernel(_no_memory)),
-        springs=_padded([e.spring for e in effects], _kernel(_no_spring)),
-        readings=_padded([e.reading for e in effects], _kernel(_no_reading)),
+        reactions=_addresses([e.reaction for e in effects], _no_reaction),
+        derivatives=_addresses([e.derivative for e in effects], _no_memory),
+        springs=_addresses([e.spring for e in effects], _no_spring),
+        readings=_addresses([e.reading for e in effects], _no_reading),
         joint=joint,
         values=np.concatenate([term.values for term in terms]).astype(float),
         value_at=_offsets([len(term.values) for term in terms]),
@@ -107,10 +102,6 @@ def in_order(model: Model) -> list[Term]:
 
 def _group(effect: Effect) -> int:
     return 2 * (effect.side is Side.DRIVE) + (not effect.inertial)
-
-
-def _kernel(wrapped: staticmethod):
-    return wrapped.__func__
 
 
 def _offsets(lengths: Sequence[int]) -> NDArray:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pipelines.dynamics.assembly import Assembly
 from pipelines.dynamics.forward import DQ, THETA, Q, memory_size, resting_state, stages, step, workspace
+from pipelines.effects.kernel import reading_at
 
 SUBSTEPS = 6
 """Integration steps per control period; even, so that the middle of a sample is one of them."""
@@ -93,7 +94,7 @@ def loop_at_rest(a: Assembly, q: NDArray) -> LoopState:
 def _read(a, angle, torque):
     """Turn true motor angles and drive torques into what the sensors say, in place."""
     for i in range(a.bounds[4]):
-        a.readings[i](angle, torque, a.values[a.value_at[i] : a.value_at[i + 1]], a.joint[i])
+        reading_at(a.readings[i])(angle, torque, a.values[a.value_at[i] : a.value_at[i + 1]], a.joint[i])
 
 
 @njit(cache=True)
