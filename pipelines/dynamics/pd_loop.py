@@ -85,13 +85,13 @@ def loop_at_rest(a: Assembly, q: NDArray) -> LoopState:
     """Return the loop with the leg at rest at link angles ``q`` (J,) and the set-point there."""
     q = np.asarray(q, float)
     angle, unused = q.copy(), np.zeros(a.joints)
-    _read(a, angle, unused)
+    read_sensors(a, angle, unused)
     zeros = [np.zeros(a.joints) for _ in range(3)]
     return LoopState(resting_state(q), np.zeros(memory_size(a)), zeros[0], angle, zeros[1], zeros[2], angle.copy())
 
 
 @njit(cache=True)
-def _read(a, angle, torque):
+def read_sensors(a, angle, torque):
     """Turn true motor angles and drive torques into what the sensors say, in place."""
     for i in range(a.bounds[4]):
         reading_at(a.readings[i])(angle, torque, a.values[a.value_at[i] : a.value_at[i + 1]], a.joint[i])
@@ -126,7 +126,7 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
     for c in range(d.periods):
         counted[:] = loop.state[THETA]
         unused[:] = 0.0
-        _read(a, counted, unused)
+        read_sensors(a, counted, unused)
         for j in range(j_count):
             if d.count[j] > 0.0:
                 counted[j] = np.floor(counted[j] / d.count[j] + 0.5) * d.count[j]
@@ -140,7 +140,7 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
             if done == middle:
                 angle[:] = loop.state[THETA]
                 unused[:] = 0.0
-                _read(a, angle, unused)
+                read_sensors(a, angle, unused)
                 for j in range(j_count):
                     if d.count[j] > 0.0:
                         angle[j] = np.floor(angle[j] / d.count[j] + 0.5) * d.count[j]
@@ -154,7 +154,7 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
         for j in range(j_count):
             torque[j] += loop.torque[j] / d.periods
     unused[:] = 0.0
-    _read(a, unused, torque)
+    read_sensors(a, unused, torque)
     loop.reference[:] = reference
 
 
