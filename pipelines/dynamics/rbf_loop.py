@@ -1,0 +1,237 @@
+"""Adaptive tracking with a radial-basis network for each joint (paper section 2.2, mended as in docs/errata.md).
+
+With e the error of the angle and r = de + Lambda e (the paper's q)::
+
+    torque = W' H(x) + Kv r + gain sgn r,   limited
+    dW/dt  = F H(x) r,                      paused while the torque is at its limit
+    H_i(x) = exp(-|x - c_i|² / b²),         x = (e, de, qd, dqd, ddqd) of the joint
+
+Leg, memories and weights are integrated together by the classical Runge-Kutta method; the direction of
+dry friction is held over a step, as everywhere in the forward dynamics.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pipelines.dynamics.assembly import Assembly
+from pipelines.dynamics.forward import (
+    DTHETA,
+    HOT,
+    THETA,
+    accelerations,
+    begin_stages,
+    end_stages,
+    find_direction,
+    memory_rates,
+    memory_size,
+    reach_stage,
+    resting_state,
+    stages,
+    weighted,
+    workspace,
+)
+from pipelines.dynamics.pd_loop import read_sensors
+
+TURN = 2.0 * np.pi
+"""A joint that leaves ± one turn has run away, rad."""
+
+
+class RbfController(NamedTuple):
+    """Gains and network, the same for all joints."""
+
+    error_gain: float
+    """Lambda, 1/s."""
+    feedback_gain: float
+    """Kv, N·m·s/rad."""
+    adaptation_gain: float
+    """F."""
+    robust_gain: float
+    """Bound on what network and disturbance leave over, N·m."""
+    limit: float
+    """N·m."""
+    nodes: np.ndarray
+    """(m,) where the Gaussians' centres lie on the diagonal of the space of inputs."""
+    width: float
+    """b of every Gaussian."""
+
+
+class Encoder(NamedTuple):
+    """What the controller knows of a motor's angle, read once a step."""
+
+    noise: np.ndarray
+    """(n, J) rad, added at each reading; (0, J) for an ideal encoder, which tells the speed too."""
+    count: float
+    """rad per encoder count; 0 for none."""
+    speed_share: float
+    """What a new difference of angles adds to the low-passed speed at each reading, (0, 1]."""
+
+
+class _Network(NamedTuple):
+    """Weights, their rates at the four stages, the weights of a stage, and the neurons' activation."""
+
+    weights: np.ndarray
+    rates: np.ndarray
+    stage: np.ndarray
+    activation: np.ndarray
+
+
+class _Seen(NamedTuple):
+    """Last reading, low-passed speed, and by how much angle and speed were misread; (J,) each."""
+
+    angle: np.ndarray
+    speed: np.ndarray
+    angle_error: np.ndarray
+    speed_error: np.ndarray
+
+
+@njit(**HOT)
+def _control(c, seen, state, wanted, weights, activation, torque, network, weight_rates):
+    """Write torque and network output (J,) and the weights' rates (J, m) for a reference ``wanted`` (3, J)."""
+    for j in range(torque.shape[0]):
+        q, dq, ddq = wanted[0, j], wanted[1, j], wanted[2, j]
+        e = q - state[THETA, j] - seen.angle_error[j]
+        de = dq - state[DTHETA, j] - seen.speed_error[j]
+        r = de + c.error_gain * e
+        network[j] = 0.0
+        for i in range(c.nodes.shape[0]):
+            x = c.nodes[i]
+            distance = (e - x) ** 2 + (de - x) ** 2 + (q - x) ** 2 + (dq - x) ** 2 + (ddq - x) ** 2
+            activation[i] = np.exp(-distance / c.width**2)
+            network[j] += weights[j, i] * activation[i]
+        demand = network[j] + c.feedback_gain * r + c.robust_gain * np.sign(r)
+        torque[j] = min(c.limit, max(-c.limit, demand))
+        rate = c.adaptation_gain * r if torque[j] == demand else 0.0
+        for i in range(c.nodes.shape[0]):
+            weight_rates[j, i] = rate * activation[i]
+
+
+@njit(**HOT)
+def _step(a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturbance, torque, network, drive):
+    """Advance leg and weights by ``h``; ``wanted`` (3, 3, J) and ``disturbance`` (3, J) at begin, middle and end.
+
+    ``torque`` and ``network`` (J,) are left as they were at the begin.
+    """
+    _control(c, seen, state, wanted[0], net.weights, net.activation, torque, network, net.rates[0])
+    for j in range(a.joints):
+        drive[0, j] = torque[j] - disturbance[0, j]
+    find_direction(a, w, t, h, state, memory, load, drive[0], s.rates[0])
+    begin_stages(a, w, s, t, state, memory, load)
+    for i in range(1, 4):
+        half_steps = 2 if i == 3 else 1
+        reach = 0.5 * h * half_steps
+        reach_stage(s, i, reach, state, memory)
+        for j in range(a.joints):
+            for k in range(net.weights.shape[1]):
+                net.stage[j, k] = net.weights[j, k] + reach * net.rates[i - 1, j, k]
+        _control(c, seen, s.state, wanted[half_steps], net.stage, net.activation, drive[0], drive[1], net.rates[i])
+        for j in range(a.joints):
+            drive[0, j] -= disturbance[half_steps, j]
+        accelerations(a, w, t + reach, s.state, s.memory, w.direction, load, drive[0], s.rates[i])
+        memory_rates(a, w, t + reach, s.state, s.memory, w.direction, load, s.memory_rates[i])
+    end_stages(s, h, state, memory)
+    for j in range(a.joints):
+        for k in range(net.weights.shape[1]):
+            net.weights[j, k] += h / 6.0 * weighted(net.rates[:, j, k])
+
+
+@njit(cache=True)
+def _look(a, encoder, seen, state, k, period):
+    """Read the encoders at sample ``k``: how far angle and speed are off what they are."""
+    for j in range(a.joints):
+        seen.angle_error[j] = state[THETA, j]
+    read_sensors(a, seen.angle_error, np.zeros(a.joints))
+    for j in range(a.joints):
+        angle = seen.angle_error[j]
+        if k < encoder.noise.shape[0]:
+            angle += encoder.noise[k, j]
+            if encoder.count > 0.0:
+                angle = np.floor(angle / encoder.count + 0.5) * encoder.count
+            if k > 0:
+                seen.speed[j] += encoder.speed_share * ((angle - seen.angle[j]) / period - seen.speed[j])
+            seen.angle[j] = angle
+            seen.speed_error[j] = seen.speed[j] - state[DTHETA, j]
+        seen.angle_error[j] = angle - state[THETA, j]
+
+
+@njit(cache=True)
+def _run(a, c, encoder, state, memory, reference, disturbance, period, substeps, out):
+    joints, m = a.joints, c.nodes.shape[0]
+    w, s = workspace(joints), stages(joints, memory.shape[0])
+    net = _Network(np.zeros((joints, m)), np.zeros((4, joints, m)), np.zeros((joints, m)), np.zeros(m))
+    seen = _Seen(np.zeros(joints), np.zeros(joints), np.zeros(joints), np.zeros(joints))
+    load, drive, torque, network = np.zeros(joints), np.zeros((2, joints)), np.zeros(joints), np.zeros(joints)
+    h = period / substeps
+    for k in range(out.shape[0]):
+        _look(a, encoder, seen, state, k, period)
+        out[k, 0], out[k, 1] = state[THETA], state[DTHETA]
+        # The last sample's step is needed for its torque alone; its references end there.
+        for i in range(substeps if k + 1 < out.shape[0] else 0):
+            at = 2 * (k * substeps + i)
+            begin = k * period + i * h
+            wanted, push = reference[at : at + 3], disturbance[at : at + 3]
+            _step(a, c, w, s, net, seen, begin, h, state, memory, load, wanted, push, torque, network, drive)
+            if i == 0:
+                out[k, 2], out[k, 3] = torque, network
+        for j in range(joints):
+            if not abs(state[THETA, j]) < TURN:
+                return k + 1
+    last = out.shape[0] - 1
+    _control(c, seen, state, reference[-1], net.weights, net.activation, torque, network, net.rates[0])
+    out[last, 2], out[last, 3] = torque, network
+    return last + 1
+
+
+class RbfRun(NamedTuple):
+    """What a closed loop did, at n samples of J joints."""
+
+    angle: NDArray
+    """(n, J) of the motors, rad."""
+    speed: NDArray
+    torque: NDArray
+    """(n, J) of the drives, N·m, the disturbance not counted."""
+    network: NDArray
+    """(n, J) N·m."""
+
+
+def follow_with_rbf(
+    a: Assembly,
+    controller: RbfController,
+    encoder: Encoder,
+    reference: NDArray,
+    disturbance: NDArray,
+    period: float,
+    start: NDArray,
+    substeps: int = 1,
+) -> RbfRun:
+    """Let a leg follow a reference under the adaptive controller, weights zero and at rest to begin with.
+
+    Parameters
+    ----------
+    a : Assembly
+    controller : RbfController
+    encoder : Encoder
+    reference : (2 (n - 1) substeps + 1, 3, J) array
+        Angle, velocity and acceleration wanted, at every half integration step.
+    disturbance : (2 (n - 1) substeps + 1, J) array
+        Torque that works against the drives (paper eq. 13), N·m, at every half step.
+    period : float
+        Time between two samples, s.
+    start : (J,) array
+        Angle at rest, rad.
+    substeps : int
+        Integration steps per sample.
+
+    Returns
+    -------
+    RbfRun
+        n samples; fewer, where a joint has left ± one turn on the way.
+    """
+    n = (len(reference) - 1) // (2 * substeps) + 1
+    out = np.empty((n, 4, a.joints))
+    state, memory = resting_state(start), np.zeros(memory_size(a))
+    reference, disturbance = np.ascontiguousarray(reference), np.ascontiguousarray(disturbance)
+    reached = _run(a, controller, encoder, state, memory, reference, disturbance, period, substeps, out)
+    return RbfRun(*(out[:reached, i] for i in range(4)))
