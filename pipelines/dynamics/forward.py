@@ -23,7 +23,7 @@ from pipelines.dynamics.assembly import Assembly
 from pipelines.effects.kernel import Instant, derivative_at, reaction_at, spring_at
 
 STICTION_SWEEPS = 20
-STICTION_TOLERANCE = 1e-6
+STICTION_TOLERANCE = 1e-9
 
 HOT = {"cache": True, "_nrt": False}
 """How the innermost functions are compiled. They allocate nothing, and numba's counting of references
@@ -149,7 +149,7 @@ def _finish(a, w, t, state, memory, direction, load, drive, rates):
             rates[DTHETA, j] = rates[DQ, j]
 
 
-@njit(**HOT)
+@njit(cache=True, inline="always")
 def accelerations(a, w, t, state, memory, direction, load, drive, rates):
     """Write d(state)/dt into ``rates`` (4, J).
 
@@ -174,17 +174,20 @@ def accelerations(a, w, t, state, memory, direction, load, drive, rates):
     _finish(a, w, t, state, memory, direction, load, drive, rates)
 
 
-@njit(**HOT)
+@njit(cache=True, inline="always")
 def memory_rates(a, w, t, state, memory, direction, load, rates):
     """Write the rates of all memories into ``rates`` (m,)."""
-    motor = Instant(t, state[THETA], state[DTHETA], w.zero, direction, load)
-    link = Instant(t, state[Q], state[DQ], w.zero, direction, load)
-    for i in range(a.bounds[4]):
-        first, last = a.state_at[i], a.state_at[i + 1]
-        if last > first:
-            values = a.values[a.value_at[i] : a.value_at[i + 1]]
-            at = motor if i >= a.bounds[2] else link
-            derivative_at(a.derivatives[i])(at, memory[first:last], values, a.geometry, a.joint[i], rates[first:last])
+    if rates.shape[0] > 0:
+        motor = Instant(t, state[THETA], state[DTHETA], w.zero, direction, load)
+        link = Instant(t, state[Q], state[DQ], w.zero, direction, load)
+        for i in range(a.bounds[4]):
+            first, last = a.state_at[i], a.state_at[i + 1]
+            if last > first:
+                values = a.values[a.value_at[i] : a.value_at[i + 1]]
+                at = motor if i >= a.bounds[2] else link
+                derivative_at(a.derivatives[i])(
+                    at, memory[first:last], values, a.geometry, a.joint[i], rates[first:last]
+                )
 
 
 @njit(**HOT)

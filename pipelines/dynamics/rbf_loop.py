@@ -90,16 +90,18 @@ class _Seen(NamedTuple):
 @njit(**HOT)
 def _control(c, seen, state, wanted, weights, activation, torque, network, weight_rates):
     """Write torque and network output (J,) and the weights' rates (J, m) for a reference ``wanted`` (3, J)."""
+    sharpness = 1.0 / (c.width * c.width)
     for j in range(torque.shape[0]):
         q, dq, ddq = wanted[0, j], wanted[1, j], wanted[2, j]
         e = q - state[THETA, j] - seen.angle_error[j]
         de = dq - state[DTHETA, j] - seen.speed_error[j]
         r = de + c.error_gain * e
         network[j] = 0.0
+        # |x - c|² multiplied out: a centre has the same coordinate in each of the five directions.
+        sum_of_inputs, sum_of_squares = e + de + q + dq + ddq, e * e + de * de + q * q + dq * dq + ddq * ddq
         for i in range(c.nodes.shape[0]):
-            x = c.nodes[i]
-            distance = (e - x) ** 2 + (de - x) ** 2 + (q - x) ** 2 + (dq - x) ** 2 + (ddq - x) ** 2
-            activation[i] = np.exp(-distance / c.width**2)
+            distance = sum_of_squares + c.nodes[i] * (5.0 * c.nodes[i] - 2.0 * sum_of_inputs)
+            activation[i] = np.exp(-distance * sharpness)
             network[j] += weights[j, i] * activation[i]
         demand = network[j] + c.feedback_gain * r + c.robust_gain * np.sign(r)
         torque[j] = min(c.limit, max(-c.limit, demand))
