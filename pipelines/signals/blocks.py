@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 
 HALF_POWER = 0.443
 """Half-power frequency of a running mean times its length."""
@@ -52,7 +53,4 @@ class BlockAverage:
 
 def dilate(x: NDArray, samples: int) -> NDArray:
     """Spread every true sample of a boolean (n,) array by ``samples`` to both sides."""
-    if not x.any():
-        return x
-    counts = np.convolve(x, np.ones(2 * samples + 1), mode="same") if samples else x.astype(float)
-    return counts[: len(x)] > 0.5
+    return maximum_filter1d(x.astype(np.uint8), 2 * samples + 1, mode="constant").astype(bool)

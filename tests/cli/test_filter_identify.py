@@ -1,0 +1,158 @@
+import json
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+
+from pipelines.contracts import MOTION, PARAMETERS, RECORDING, RESIDUALS
+from pipelines.mechanics.fourier import FourierTrajectory
+from pipelines.rig.plant import Plant
+from pipelines.rig.record import record
+from pipelines.settings.plant import PlantSettings
+
+RICH = FourierTrajectory(
+    theta0=np.array([0.65, -0.93]),
+    a=np.array([[0.22, -0.16, 0.10], [0.12, 0.24, -0.11]]),
+    b=np.array([[0.10, 0.12, -0.07], [-0.22, 0.08, 0.10]]),
+    omega=0.2 * np.pi,
+)
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("recordings")
+    for run in ("exo_alone", "with_human"):
+        for seed, purpose in enumerate(("train", "validate")):
+            frame, metadata = record(Plant(PlantSettings(), run, seed=seed), RICH, 20.0, purpose)
+            RECORDING.write(folder / f"{run}_{purpose}.parquet", frame, metadata)
+    return folder
+
+
+def test_filter_then_identify_as_a_user_would(exoid, recordings, tmp_path):
+    motions = []
+    for file in sorted(recordings.iterdir()):
+        motion = tmp_path / file.name
+        outcome = exoid("filter", file, "-o", motion)
+        assert outcome.code == 0, outcome.err
+        assert "cut-off" in outcome.out
+        motions.append(motion)
+    outcome = exoid("identify", *motions, "-o", tmp_path / "identified")
+    assert outcome.code == 0, outcome.err
+    assert "X1 with_human" in outcome.out
+    parameters = PARAMETERS.read(tmp_path / "identified" / "parameters.parquet")
+    assert len(parameters.frame) == 16
+    assert np.array(parameters.metadata["covariance"]).shape == (16, 16)
+    assert [entry["name"] for entry in parameters.metadata["inputs"]] == [m.name for m in motions]
+    residuals = RESIDUALS.read(tmp_path / "identified" / "residuals.parquet").frame
+    rest = residuals["hip_torque_nm"] - residuals["hip_predicted_nm"]
+    np.testing.assert_allclose(residuals["hip_residual_nm"], rest, atol=1e-9)
+    assert sorted(p.suffix for p in (tmp_path / "identified").glob("torque-*")) == [".pdf", ".pdf", ".png", ".png"]
+
+
+def test_recordings_need_no_filter_command_and_no_settings(exoid, recordings, tmp_path):
+    outcome = exoid("identify", *sorted(recordings.iterdir()), "-o", tmp_path, "--json")
+    assert outcome.code == 0, outcome.err
+    said = json.loads(outcome.out)
+    assert {"hip", "knee"} == set(said["validation"]["all"])
+
+
+def test_output_fits_eighty_columns(exoid, recordings, tmp_path):
+    outcome = exoid("identify", *sorted(recordings.iterdir()), "-o", tmp_path)
+    assert max(map(len, outcome.out.splitlines())) <= 80
+
+
+def broken(recordings, tmp_path, change):
+    """Write a recording's table past the contract, as a careless tool would."""
+    source = recordings / "exo_alone_train.parquet"
+    table = pq.read_table(source)
+    frame = change(table.to_pandas())
+    import pyarrow as pa
+
+    target = tmp_path / "broken.parquet"
+    pq.write_table(pa.Table.from_pandas(frame).replace_schema_metadata(table.schema.metadata), target)
+    return target
+
+
+def with_nan(frame):
+    frame.loc[17, "hip_angle_rad"] = np.nan
+    return frame
+
+
+def backwards(frame):
+    frame.loc[23, "time_s"] = frame.loc[20, "time_s"]
+    return frame
+
+
+def in_degrees(frame):
+    return frame.assign(hip_angle_rad=np.rad2deg(frame["hip_angle_rad"]))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (with_nan, ["column hip_angle_rad", "row 17"]),
+        (backwards, ["column time_s", "row 23"]),
+        (in_degrees, ["column hip_angle_rad", "degrees"]),
+        (lambda frame: frame.drop(columns="knee_torque_nm"), ["column knee_torque_nm is missing"]),
+    ],
+)
+@pytest.mark.parametrize("command", ["filter", "identify"])
+def test_a_bad_recording_ends_in_one_line_and_no_file(exoid, recordings, tmp_path, command, change, words):
+    file = broken(recordings, tmp_path, change)
+    target = tmp_path / "out.parquet"
+    outcome = exoid(command, file, "-o", target)
+    assert outcome.code == 2
+    assert outcome.err.count("\n") == 1
+    for word in [str(file), *words]:
+        assert word in outcome.err
+    assert not target.exists()
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [(None, "no such file"), (b"", "empty"), (b"PAR1 half a file", "Parquet")],
+    ids=["missing", "empty", "truncated"],
+)
+@pytest.mark.parametrize("command", ["filter", "identify"])
+def test_what_is_no_parquet_file_ends_in_one_line(exoid, tmp_path, command, content, words):
+    file = tmp_path / "run.parquet"
+    if content is not None:
+        file.write_bytes(content)
+    outcome = exoid(command, file, "-o", tmp_path / "out.parquet")
+    assert outcome.code == 2
+    assert outcome.err.count("\n") == 1
+    assert words in outcome.err
+
+
+def test_parameters_are_no_motion(exoid, recordings, tmp_path):
+    assert exoid("identify", *sorted(recordings.iterdir()), "-o", tmp_path).code == 0
+    outcome = exoid("identify", tmp_path / "parameters.parquet", "-o", tmp_path / "again")
+    assert outcome.code == 2
+    assert "holds parameters/1, expected motion/1" in outcome.err
+
+
+def test_one_run_only_and_no_empty_run_are_refused(exoid, recordings, tmp_path):
+    alone = exoid("identify", recordings / "exo_alone_train.parquet", "-o", tmp_path)
+    assert alone.code == 2
+    assert "found no run to validate on" in alone.err
+    human = exoid("identify", *sorted(recordings.glob("with_human*")), "-o", tmp_path)
+    assert human.code == 2
+    assert "found no exo_alone run to train on" in human.err
+
+
+def test_the_same_run_twice_is_refused(exoid, recordings, tmp_path):
+    copy = tmp_path / "copy.parquet"
+    copy.write_bytes((recordings / "exo_alone_train.parquet").read_bytes())
+    outcome = exoid("identify", recordings / "exo_alone_train.parquet", copy, "-o", tmp_path / "i")
+    assert outcome.code == 2
+    assert "holds the same data as" in outcome.err
+
+
+def test_a_motion_says_its_filter(exoid, recordings, tmp_path):
+    target = tmp_path / "m.parquet"
+    exoid("filter", recordings / "exo_alone_train.parquet", "-o", target, "--cutoff-hz", "9")
+    metadata = MOTION.read(target).metadata
+    assert metadata["filter"]["cutoff_hz"] == 9.0
+    assert metadata["filter"]["why"] == "set by hand"
+    assert isinstance(MOTION.read(target).frame, pd.DataFrame)

@@ -1,0 +1,33 @@
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from pipelines.estimation.least_squares import long_run_covariance
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5, 0.9])
+def test_the_variance_of_a_sum_of_correlated_numbers_is_met(rho):
+    """A first-order process of unit variance: the sum of n has variance n (1 + rho) / (1 - rho)."""
+    rng = np.random.default_rng(7)
+    n = 2000
+    found = []
+    for _ in range(60):
+        noise = lfilter([np.sqrt(1 - rho**2)], [1, -rho], rng.standard_normal(n + 200))[200:, np.newaxis]
+        found.append(long_run_covariance([[noise]], 1)[0].item())
+    assert np.mean(found) == pytest.approx(n * (1 + rho) / (1 - rho), rel=0.12)
+
+
+def test_a_gap_is_not_bridged():
+    """Two segments count as two: nothing is multiplied across the gap between them."""
+    rng = np.random.default_rng(1)
+    noise = lfilter([1], [1, -0.9], rng.standard_normal(4000))[:, np.newaxis]
+    whole, _ = long_run_covariance([[noise]], 1)
+    halves, _ = long_run_covariance([[noise[:2000], noise[2000:]]], 1)
+    assert halves.item() != whole.item()
+    assert halves.item() == pytest.approx(whole.item(), rel=0.1)
+
+
+def test_the_critical_value_grows_with_the_share_of_the_lag():
+    rng = np.random.default_rng(1)
+    slow = lfilter([1], [1, -0.95], rng.standard_normal(400))[:, np.newaxis]
+    assert long_run_covariance([[slow]], 1)[1] > long_run_covariance([[rng.standard_normal((400, 1))]], 1)[1] >= 1.96

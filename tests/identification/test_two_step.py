@@ -1,0 +1,159 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.signal import lfilter
+
+from pipelines.errors import InputError, NotIdentifiable
+from pipelines.identification import identify
+
+RATE_HZ = 200.0
+
+
+def white(shape, rng):
+    return rng.standard_normal(shape)
+
+
+def first_order(correlation_s):
+    """Noise that resembles itself over a time."""
+
+    def make(shape, rng):
+        rho = np.exp(-1 / (RATE_HZ * correlation_s))
+        start = int(10 * correlation_s * RATE_HZ)
+        noise = lfilter([np.sqrt(1 - rho**2)], [1, -rho], rng.standard_normal((shape[0] + start, *shape[1:])), axis=0)
+        return noise[start:]
+
+    return make
+
+
+def resonant(shape, rng):
+    """Ripple about 3 Hz, a tenth of that wide."""
+    radius, angle = np.exp(-np.pi * 0.3 / RATE_HZ), 2 * np.pi * 3.0 / RATE_HZ
+    noise = lfilter([1.0], [1, -2 * radius * np.cos(angle), radius**2], rng.standard_normal(shape), axis=0)
+    return noise / noise.std(axis=0)
+
+
+COLOURS = {"white": white, "20 ms": first_order(0.02), "0.2 s": first_order(0.2), "3 Hz": resonant}
+
+
+def with_noise(motions, colour, rms, seed):
+    rng = np.random.default_rng(seed)
+    return [replace(m, torque=m.torque + COLOURS[colour](m.torque.shape, rng) * rms) for m in motions]
+
+
+def test_the_truth_is_recovered_without_noise(noiseless_motions, truth):
+    found = identify(noiseless_motions)
+    assert_allclose(found.parameters["value"], truth, rtol=0.01, atol=0.005)
+
+
+def test_the_truth_lies_in_the_intervals_95_times_in_100_under_coloured_noise(noiseless_motions, truth):
+    inside, bias = [], []
+    for colour in COLOURS:
+        for seed in range(50):
+            table = identify(with_noise(noiseless_motions, colour, (0.6, 0.4), seed)).parameters
+            inside.append((table["ci95_low"] <= truth) & (truth <= table["ci95_high"]))
+            bias.append((table["value"] - truth) / table["std_error"])
+    covered = np.mean(inside)
+    # 200 sessions of 16 parameters, strongly dependent within a session.
+    assert 0.92 <= covered <= 0.98, f"covered {covered:.3f}; each parameter {np.mean(inside, axis=0).round(2)}"
+    assert np.all(np.abs(np.mean(bias, axis=0)) < 0.4), np.mean(bias, axis=0).round(2)
+
+
+def test_the_formula_for_independent_samples_covers_far_less(noiseless_motions, truth):
+    """Why the sandwich is there: 0.2 s of correlation at 40 blocks a second."""
+    inside = []
+    for seed in range(30):
+        motions = with_noise(noiseless_motions, "0.2 s", (0.6, 0.4), seed)
+        inside.append(covers_as_if_independent(motions, truth[:8]))
+    assert np.mean(inside) < 0.7
+
+
+def covers_as_if_independent(motions, truth):
+    from pipelines.estimation.least_squares import solve
+    from pipelines.estimation.regression import regress
+    from pipelines.model import Model, Term, baseline
+
+    effects = baseline(("hip", "knee"), ("exo_alone",))
+    model = Model(tuple(Term(e, np.zeros(len(e.linear))) for e in effects))
+    estimate = solve([regress(motions[0], model)], ["?"] * 8)
+    return np.abs(estimate.values - truth) < 1.96 * np.sqrt(np.diag(estimate.sensitivity))
+
+
+def test_uncertain_friction_widens_the_interval_of_inertia(noiseless_motions):
+    """With friction known from a short run, inertia with the human is less sure."""
+    motions = with_noise(noiseless_motions, "20 ms", (0.6, 0.4), 1)
+    short = motions[0]
+    valid = short.valid & (short.time < 11.0)
+    poor = identify([replace(short, valid=valid), *motions[1:]]).parameters
+    rich = identify(motions).parameters
+    body = rich["run"] == "with_human"
+    assert np.all(poor["std_error"][body] > rich["std_error"][body])
+    assert np.max(poor["std_error"][body] / rich["std_error"][body]) > 1.2
+
+
+def test_two_steps_agree_with_one_fit_of_everything(noiseless_motions):
+    found = identify(with_noise(noiseless_motions, "20 ms", (0.6, 0.4), 3))
+    apart = np.abs(found.parameters["value"] - found.one_step) / found.parameters["std_error"]
+    assert np.max(apart) < 3.0
+
+
+def test_human_is_with_human_less_exo_alone(noiseless_motions):
+    found = identify(with_noise(noiseless_motions, "white", (0.6, 0.4), 4))
+    values = found.parameters.set_index(["run", "name"])["value"]
+    for name in ("X1", "X2", "X3", "X4"):
+        assert_allclose(values["human", name], values["with_human", name] - values["exo_alone", name], rtol=1e-12)
+
+
+def test_validation_error_of_a_faultless_machine_is_its_noise(noiseless_motions):
+    noisy = with_noise(noiseless_motions, "20 ms", (0.6, 0.4), 5)
+    found = identify(noisy)
+    # What the block average leaves of the noise itself.
+    left = [
+        (m.torque - n.torque)[: len(m) // 5 * 5].reshape(-1, 5, 2).mean(axis=1)
+        for m, n in zip(noisy, noiseless_motions, strict=True)
+        if m.purpose == "validate"
+    ]
+    assert_allclose(found.validation.pooled.rmse, np.concatenate(left).std(axis=0), rtol=0.04)
+
+
+def test_an_empty_machine_alone_can_be_identified(noiseless_motions, truth):
+    found = identify([m for m in noiseless_motions if m.run == "exo_alone"])
+    assert list(found.parameters["run"].dropna().unique()) == ["exo_alone"]
+    assert_allclose(found.parameters["value"], truth[:8], rtol=0.01, atol=0.005)
+
+
+def test_a_joint_that_never_moves_is_refused_with_the_reason(noiseless_motions):
+    frozen = [
+        replace(
+            m,
+            q=m.q * [1, 0] + [0, -0.9],
+            dq=m.dq * [1, 0] + [0, 0.1],
+            ddq=m.ddq * [1, 0],
+        )
+        for m in noiseless_motions
+    ]
+    with pytest.raises(NotIdentifiable, match=r"the motion does not separate .* any of them can stand for the others"):
+        identify(frozen)
+
+
+def test_unrealizable_results_are_said(noiseless_motions):
+    lighter = [replace(m, torque=0.2 * m.torque) if m.run == "with_human" else m for m in noiseless_motions]
+    assert any(s.startswith("human: X2") for s in identify(lighter).unrealizable)
+
+
+def test_without_an_empty_run_friction_cannot_be_fitted(noiseless_motions):
+    with pytest.raises(InputError, match="found no exo_alone run to train on among: with_human_train.parquet"):
+        identify([m for m in noiseless_motions if m.run == "with_human"])
+
+
+def test_one_run_cannot_be_validated(noiseless_motions):
+    with pytest.raises(InputError, match="found no run to validate on among: exo_alone_train.parquet"):
+        identify(noiseless_motions[:1])
+
+
+def test_runs_of_two_machines_are_refused(noiseless_motions):
+    other = noiseless_motions[1]
+    longer = replace(other, geometry=replace(other.geometry, thigh_length_m=0.45))
+    with pytest.raises(InputError, match=r"exo_alone_validate.parquet has thigh_length_m 0.45, .* has 0.38952"):
+        identify([noiseless_motions[0], longer, *noiseless_motions[2:]])

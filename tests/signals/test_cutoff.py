@@ -1,0 +1,42 @@
+import numpy as np
+import pytest
+
+from pipelines.signals.cutoff import choose_cutoff, spectrum
+
+RATE_HZ = 200.0
+TIME = np.arange(0, 40, 1 / RATE_HZ)
+
+
+def moving(harmonics=5, base_hz=0.2):
+    return sum(np.sin(2 * np.pi * k * base_hz * TIME + k) / k**1.5 for k in range(1, harmonics + 1))
+
+
+def test_the_floor_is_the_density_of_the_noise():
+    noise = 1e-4 * np.random.default_rng(0).standard_normal(len(TIME))
+    assert spectrum(moving() + noise, RATE_HZ).floor == pytest.approx(1e-8 / (RATE_HZ / 2), rel=0.1)
+
+
+def test_more_noise_hides_more_of_the_signal():
+    rng = np.random.default_rng(0)
+    # Corners, as reversals of a sticking joint leave them: a spectrum without an end.
+    rough = moving() + 0.02 * np.abs(np.sin(2 * np.pi * 0.5 * TIME)) ** 1.5
+    cutoffs = [
+        choose_cutoff((rough + s * rng.standard_normal(len(TIME)))[:, None], RATE_HZ, ("hip",)).hz
+        for s in (1e-6, 1e-5, 1e-4)
+    ]
+    assert cutoffs[0] > cutoffs[1] > cutoffs[2]
+
+
+def test_the_cutoff_lies_above_the_highest_harmonic_and_below_an_eighth_of_the_rate():
+    noise = 1e-5 * np.random.default_rng(0).standard_normal(len(TIME))
+    chosen = choose_cutoff((moving() + noise)[:, None], RATE_HZ, ("hip",))
+    assert 1.0 < chosen.hz <= RATE_HZ / 8
+    assert chosen.reason.startswith("the hip angle's spectrum meets its noise floor")
+
+
+def test_the_joint_that_needs_most_decides():
+    noise = 1e-5 * np.random.default_rng(0).standard_normal((len(TIME), 2))
+    fast = np.column_stack([moving(5, 0.2), moving(5, 1.0)]) + noise
+    chosen = choose_cutoff(fast, RATE_HZ, ("hip", "knee"))
+    assert "knee" in chosen.reason
+    assert chosen.hz > 5.0
