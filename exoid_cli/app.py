@@ -16,10 +16,12 @@ from typing import Annotated, NoReturn
 import typer
 from typer.exceptions import TyperException
 
+from exoid_cli.acquire import acquire
 from exoid_cli.console import console
 from exoid_cli.filter import filter_
 from exoid_cli.identify import identify
 from exoid_cli.init import init
+from exoid_cli.rig import rig
 from exoid_cli.settings import settings
 from exoid_cli.show import show
 from pipelines import __version__
@@ -33,8 +35,10 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.command("init")(init)
+app.command("acquire")(acquire)
 app.command("filter")(filter_)
 app.command("identify")(identify)
+app.command("rig")(rig)
 app.command("show")(show)
 app.add_typer(settings, name="settings")
 

@@ -53,23 +53,12 @@ def _lead_in(start: NDArray, trajectory: Trajectory, samples: int, rate: float) 
 
 
 def _metadata(plant: Plant, trajectory: Trajectory, purpose: str) -> dict[str, Any]:
-    settings, geometry = plant.settings, plant.geometry
-    controller = {
-        joint: {
-            "type": "pd",
-            "kp_nm_rad": settings.kp_nm_rad[j],
-            "kd_nm_s_rad": settings.kd_nm_s_rad[j],
-            "rate_hz": settings.drive_rate_hz,
-            "limit_nm": settings.limit_nm[j],
-        }
-        for j, joint in enumerate(JOINTS)
-    }
-    lengths = {name: value for name, value in vars(geometry).items() if value is not None}
-    metadata = {
+    lengths = {name: value for name, value in vars(plant.geometry).items() if value is not None}
+    metadata: dict[str, Any] = {
         "run": "with_human" if plant.has_human else "exo_alone",
         "purpose": purpose,
         "sample_rate_hz": plant.sample_rate_hz,
-        "controller": controller,
+        "controller": plant.settings.controllers(),
         "geometry": lengths,
     }
     if trajectory.period_s:

@@ -1,4 +1,4 @@
-"""``[plant]`` of a virtual rig: the machine, the person in it, and what disturbs the measurement. Pairs are hip, knee."""
+"""``[plant]`` of a virtual rig: machine, person, and what disturbs the measurement. Pairs are hip, knee."""
 
 from typing import Literal
 
@@ -64,3 +64,11 @@ class PlantSettings(Settings):
     cuff: CuffSettings = Field(CuffSettings(), description="The cuffs.")
     temperature: TemperatureSettings = Field(TemperatureSettings(), description="The motors.")
     seed: int = Field(0, ge=0, description="Of what is constant for this rig, such as its sensors' zeros.")
+
+    def controllers(self) -> dict[str, dict]:
+        """Return the drives' loops as a recording's metadata tell them, by joint."""
+        pairs = zip(("hip", "knee"), self.kp_nm_rad, self.kd_nm_s_rad, self.limit_nm, strict=True)
+        return {
+            joint: {"type": "pd", "kp_nm_rad": kp, "kd_nm_s_rad": kd, "rate_hz": self.drive_rate_hz, "limit_nm": limit}
+            for joint, kp, kd, limit in pairs
+        }

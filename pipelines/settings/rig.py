@@ -280,6 +280,16 @@ class RigSettings(Settings):
             raise ValueError("plant: missing; a virtual rig (embedded, or in lockstep) needs the machine it plays")
         return self
 
+    def known_geometry(self) -> dict[str, float]:
+        """Return the lengths that are known of this rig's leg; a virtual rig's are its plant's unless the file says."""
+        plant = {name: getattr(self.plant, name) for name in GeometrySettings.model_fields} if self.plant else {}
+        return plant | self.geometry.model_dump(exclude_none=True)
+
+    def known_controllers(self) -> dict[str, dict]:
+        """Return what is known of the drives' loops, by joint; a virtual rig's are its plant's unless the file says."""
+        plant = self.plant.controllers() if self.plant else {}
+        return plant | {joint: loop.model_dump(exclude_none=True) for joint, loop in self.controller.items()}
+
     def public(self) -> dict:
         """Return what recordings may tell of the rig: everything but the plant, which later stages are to find."""
         return self.model_dump(mode="json", exclude={"plant"}, exclude_none=True)

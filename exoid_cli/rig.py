@@ -1,0 +1,32 @@
+"""``exoid rig``: a virtual rig on this machine, to be recorded like a real one."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from exoid_cli.console import console
+
+
+def rig(
+    file: Annotated[Path, typer.Argument(help="The rig's description, with a [plant].")],
+    run: Annotated[
+        Literal["exo_alone", "with_human"], typer.Option(help="Nobody in the machine, or somebody.")
+    ] = "with_human",
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
+    port: Annotated[
+        int | None, typer.Option(min=0, max=65535, help="One port for all devices, 0 for a free one; else the file's.")
+    ] = None,
+    sample_rate_hz: Annotated[float | None, typer.Option(min=1.0, help="Samples a second; else the plant's.")] = None,
+    until_input_ends: Annotated[bool, typer.Option(hidden=True, help="Stop when standard input is closed.")] = False,
+) -> None:
+    """Serve the drives and force sensors of a virtual rig over Modbus TCP, until Ctrl-C."""
+    from pipelines.rig.server import serve_file
+
+    def announce(host: str, port: int) -> None:
+        # Not through the console: whoever started the rig waits for this line.
+        print(f"{host}:{port}", flush=True)
+
+    if not until_input_ends:
+        console.say(f"{file}: a virtual rig, {run}; Ctrl-C ends it")
+    serve_file(file, run, seed, port, sample_rate_hz, announce, until_input_ends=until_input_ends)

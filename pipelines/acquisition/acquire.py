@@ -1,0 +1,160 @@
+"""One run on a rig, from the first connection to the recording."""
+
+import asyncio
+import logging
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipelines.acquisition.columns import columns_of
+from pipelines.acquisition.embedded import embedded
+from pipelines.acquisition.journal import Journal, journal_of, read_journal, refuse_leftover
+from pipelines.acquisition.loop import Loop, Progress, Report
+from pipelines.acquisition.machine import Machine
+from pipelines.acquisition.plan import check_start, check_trajectory, make_plan
+from pipelines.contracts import RECORDING
+from pipelines.contracts.provenance import describe
+from pipelines.errors import DeviceError
+from pipelines.mechanics.trajectory import Trajectory, read_trajectory
+from pipelines.settings.acquire import RunSettings
+from pipelines.settings.mechanism import MechanismSettings
+from pipelines.settings.rig import RigSettings, load_rig
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a whole run left."""
+
+    path: Path
+    samples: int
+    missed: int
+
+
+def acquire(
+    rig_path: Path,
+    run: RunSettings,
+    trajectory_path: Path,
+    output: Path,
+    sample_rate_hz: float = 200.0,
+    mechanism: MechanismSettings | None = None,
+    report: Report = lambda progress: None,
+) -> Outcome:
+    """Record one run.
+
+    Parameters
+    ----------
+    rig_path, trajectory_path : Path
+        The rig's description; the excitation, ``trajectory/1`` or TOML.
+    run : RunSettings
+    output : Path
+        The recording. While it is being made, its samples are in ``<output>.journal``. A run that is stopped
+        raises DeviceError and leaves what there is in ``<output stem>.aborted.parquet``, so that nobody, make
+        included, takes it for a whole one.
+    sample_rate_hz : float
+        Rate at which the rig samples.
+    mechanism : MechanismSettings, optional
+        Geometry, where the rig file does not say it.
+    report : callable
+        Called about ten times a second with the progress.
+    """
+    rig = load_rig(rig_path)
+    trajectory = read_trajectory(trajectory_path)
+    check_trajectory(rig, trajectory, run.duration_s, sample_rate_hz)
+    journal = journal_of(output)
+    refuse_leftover(journal)
+    metadata = _metadata(rig, run, trajectory, sample_rate_hz, mechanism or MechanismSettings())
+    metadata |= {"trajectory": trajectory_path.name}
+    metadata |= describe([trajectory_path, rig_path], {"run": run.model_dump(mode="json"), "rig": rig.public()})
+    logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # what it would print, our errors say
+    with embedded(rig, rig_path, run, sample_rate_hz) if rig.embedded else nullcontext(rig) as present:
+        abort, gaps = asyncio.run(_record(present, run, trajectory, journal, metadata, sample_rate_hz, report))
+    return _finish(output, journal, abort, gaps)
+
+
+async def _record(
+    rig: RigSettings,
+    run: RunSettings,
+    trajectory: Trajectory,
+    path: Path,
+    metadata: dict[str, Any],
+    rate: float,
+    report: Report,
+) -> tuple[str | None, list[tuple[float, int]]]:
+    """Move the leg and write the journal; return why the run was stopped early, None if it was not, and its gaps."""
+    machine = Machine(rig, with_sensors=run.run == "with_human")
+    report(Progress(duration_s=run.duration_s))
+    with _signals() as stopped_by:
+        try:
+            await machine.connect()
+            start = np.array((await machine.look()).angle)
+            if why := check_start(rig, start):
+                raise DeviceError(why)
+            plan = make_plan(rig, trajectory, start, run.duration_s, rate)
+            with Journal(path, ["time_s", *columns_of(machine)], metadata) as journal:
+                loop = Loop(machine, plan, journal, rate, report, stopped_by, sent=start)
+                return await loop.run(), loop.gaps
+        finally:
+            machine.close()
+
+
+@contextmanager
+def _signals() -> Iterator[list[str]]:
+    """Collect the names of signals that ask for a stop, so that the loop and nothing else acts on them."""
+    names = {signal.SIGINT: "Ctrl-C", signal.SIGTERM: "SIGTERM"}
+    loop, came = asyncio.get_running_loop(), list[str]()
+    # Outside a process's main thread nobody can catch signals, and nobody is sent them.
+    with suppress(NotImplementedError, RuntimeError, ValueError):
+        for number, name in names.items():
+            loop.add_signal_handler(number, came.append, name)
+    try:
+        yield came
+    finally:
+        with suppress(NotImplementedError, RuntimeError, ValueError):
+            for number in names:
+                loop.remove_signal_handler(number)
+
+
+def _finish(output: Path, journal: Path, abort: str | None, gaps: list[tuple[float, int]]) -> Outcome:
+    """Turn the journal into a recording; raise DeviceError where the run was stopped."""
+    frame, metadata = read_journal(journal)
+    if abort and frame.empty:
+        journal.unlink()
+        raise DeviceError(f"{abort}; the leg was stopped before the recording began")
+    metadata |= {"gaps": gaps} | ({"abort": abort} if abort else {})
+    path = _aborted(output) if abort else output
+    RECORDING.write(path, frame, metadata)
+    journal.unlink()
+    if abort:
+        raise DeviceError(f"{abort}; the leg was stopped, its {len(frame)} samples so far are in {path}")
+    return Outcome(path, len(frame), sum(count for _, count in gaps))
+
+
+def _aborted(output: Path) -> Path:
+    """Return a name for what a stopped run recorded, beside the output and not taken."""
+    path, number = output.with_name(f"{output.stem}.aborted{output.suffix}"), 1
+    while path.exists():
+        number += 1
+        path = output.with_name(f"{output.stem}.aborted-{number}{output.suffix}")
+    return path
+
+
+def _metadata(
+    rig: RigSettings, run: RunSettings, trajectory: Trajectory, sample_rate_hz: float, mechanism: MechanismSettings
+) -> dict[str, Any]:
+    """Return what the recording knows of itself; nothing of a virtual rig's plant but what a user would measure."""
+    metadata: dict[str, Any] = {
+        "run": run.run,
+        "purpose": run.purpose,
+        "sample_rate_hz": sample_rate_hz,
+        "rig": rig.name,
+        "controller": rig.known_controllers(),
+        "geometry": mechanism.model_dump() | rig.known_geometry(),
+    }
+    if trajectory.period_s:
+        metadata["period_s"] = trajectory.period_s
+    return metadata

@@ -1,0 +1,105 @@
+"""A Modbus device: one connection, one request at a time, and every way to fail turned into one sentence."""
+
+from collections.abc import Awaitable, Iterable, Sequence
+
+from pymodbus.client import AsyncModbusTcpClient
+from pymodbus.constants import ExcCodes
+from pymodbus.exceptions import ModbusException
+from pymodbus.pdu import ModbusPDU
+
+from pipelines.errors import DeviceError
+from pipelines.registers import Block
+from pipelines.settings.rig import DeviceSettings, Identity
+
+MEANING = {
+    ExcCodes.ILLEGAL_FUNCTION: "it does not know this function",
+    ExcCodes.ILLEGAL_ADDRESS: "it has no such register",
+    ExcCodes.ILLEGAL_VALUE: "it does not take this value",
+    ExcCodes.DEVICE_FAILURE: "it failed",
+    ExcCodes.DEVICE_BUSY: "it is busy",
+    ExcCodes.GATEWAY_PATH_UNAVIABLE: "the gateway has no path to it",
+    ExcCodes.GATEWAY_NO_RESPONSE: "the gateway got no answer from it",
+}
+
+
+class Device:
+    """The line to one device. Requests to several devices may run side by side, to one they may not."""
+
+    def __init__(self, name: str, settings: DeviceSettings, timeout_s: float) -> None:
+        self.label = f"{name} ({settings.host}:{settings.port}, unit {settings.unit})"
+        self._unit = settings.unit
+        self._timeout_s = timeout_s
+        # Never a second try: a set-point that comes late is no set-point, and an exchange may move the leg.
+        self._client = AsyncModbusTcpClient(
+            settings.host, port=settings.port, timeout=timeout_s, retries=0, reconnect_delay=0
+        )
+
+    async def connect(self) -> None:
+        """Open the connection."""
+        if not await self._client.connect():
+            raise DeviceError(
+                f"{self.label}: refuses the connection; check that the rig is on, and host and port in the rig file"
+            )
+
+    def close(self) -> None:
+        """Close the connection; nothing happens where there is none."""
+        self._client.close()
+
+    async def check_identity(self, identity: Iterable[Identity]) -> None:
+        """Refuse a device that is not the one that the rig file describes."""
+        for entry in identity:
+            (found,) = await self.read(entry.address, 1)
+            if found != entry.value:
+                raise DeviceError(
+                    f"{self.label}: identity register {entry.address} holds 0x{found:04X}, expected "
+                    f"0x{entry.value:04X}: it is another device; check cabling and unit id, or correct the rig file"
+                )
+
+    async def read(self, address: int, count: int) -> list[int]:
+        """Return words read by FC03."""
+        request = self._client.read_holding_registers(address, count=count, device_id=self._unit)
+        return await self._answer(request, f"reading registers {address} to {address + count - 1}", count)
+
+    async def write(self, block: Block, words: Sequence[int]) -> None:
+        """Write a block by FC16."""
+        request = self._client.write_registers(block.address, list(words), device_id=self._unit)
+        await self._answer(request, f"writing registers {_range(block)}", None)
+
+    async def exchange(self, write: Block, words: Sequence[int], read: Block) -> list[int]:
+        """Write one block and read another in one FC23 exchange."""
+        request = self._client.readwrite_registers(
+            read_address=read.address,
+            read_count=read.count,
+            write_address=write.address,
+            values=list(words),
+            device_id=self._unit,
+        )
+        what = f"an exchange (writing registers {_range(write)}, reading {_range(read)})"
+        return await self._answer(request, what, read.count)
+
+    async def _answer(self, request: Awaitable[ModbusPDU], what: str, count: int | None) -> list[int]:
+        try:
+            response = await request
+        except (ModbusException, OSError) as error:
+            raise DeviceError(
+                f"{self.label}: did not answer {what} within {self._timeout_s:g} s; check cable and power, "
+                "or raise safety.watchdog_s in the rig file"
+            ) from error
+        # An exception reply is an answer like any other to pymodbus: nothing is raised.
+        if response.isError():
+            code = getattr(response, "exception_code", 0)
+            meaning = f": {MEANING[code]}" if code in MEANING else ""
+            raise DeviceError(
+                f"{self.label}: answered {what} with Modbus exception {int(code)}{meaning}; "
+                "compare the register map in the rig file with the device's manual"
+            )
+        if count is not None and len(response.registers) != count:
+            raise DeviceError(
+                f"{self.label}: answered {what} with {len(response.registers)} registers, expected {count}; "
+                "compare the register map in the rig file with the device's manual"
+            )
+        return response.registers
+
+
+def _range(block: Block) -> str:
+    return f"{block.address} to {block.address + block.count - 1}"

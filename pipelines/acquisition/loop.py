@@ -1,0 +1,167 @@
+"""The cycle that moves the leg: set-points out, samples in, and every drive disabled at its end whatever happens."""
+
+import asyncio
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.acquisition.columns import columns_of
+from pipelines.acquisition.journal import Journal
+from pipelines.acquisition.machine import Machine, Row
+from pipelines.acquisition.pace import Lockstep, PhaseLock
+from pipelines.acquisition.plan import Plan
+from pipelines.acquisition.safety import Limits, stop
+from pipelines.errors import DeviceError
+
+REPORT_S = 0.1
+RATE_SAMPLES = 50
+RATE_TOLERANCE = 0.05
+"""How far the devices' clock may be from the rate that was asked for, and after how many samples that is looked at."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What an operator wants to see."""
+
+    state: str = "connecting"
+    time_s: float = 0.0
+    """Since the recording began; negative on the way there."""
+    duration_s: float = 0.0
+    row: Row | None = None
+    samples: int = 0
+    missed: int = 0
+    rate_hz: float = 0.0
+    """Samples a second of wall time."""
+
+
+Report = Callable[[Progress], None]
+
+
+@dataclass
+class Loop:
+    """One run while it goes on."""
+
+    machine: Machine
+    plan: Plan
+    journal: Journal
+    rate: float
+    report: Report
+    stopped_by: Sequence[str]
+    """Names of the signals that have come."""
+    sent: NDArray
+    """(J,) last set-point, rad; to begin with, where the leg stands."""
+    gaps: list[tuple[float, int]] = field(default_factory=list)
+    """First missing time and number of missing samples, within the recording."""
+
+    def __post_init__(self) -> None:
+        self._speed = np.zeros_like(self.sent)
+        self._limits = Limits(self.machine.rig, self.rate)
+        self._watchdog = self.machine.rig.safety.watchdog_s
+        self._began: float | None = None
+        self._columns = columns_of(self.machine)
+        self._cycle = 0
+
+    async def run(self) -> str | None:
+        """Follow the plan to its end, then disable the drives; return why it was stopped early, None if it was not."""
+        why = None
+        try:
+            await self._follow()
+        except DeviceError as error:
+            why = str(error)
+        finally:  # a fault of exoid's own must not leave a drive enabled either
+            complaints = await self._stop()
+        if complaints:
+            why = f"{why or 'the run is complete'}; and could not be disabled: {'; '.join(complaints)}"
+        return why
+
+    def _pace(self) -> Lockstep | PhaseLock:
+        return Lockstep() if self.machine.rig.clock == "lockstep" else PhaseLock(self.rate)
+
+    async def _follow(self) -> None:
+        """Send set-point after set-point; raise DeviceError as soon as something is wrong."""
+        pace, path = self._pace(), np.vstack([self.sent, self.plan.reference])
+        first = last = await self._exchange(path[0], np.zeros_like(self.sent))
+        began = fresh = reported = time.monotonic()
+        # What is sent while a sample is latched is reached at the end of the next one.
+        while last.sequence - first.sequence < len(path):
+            await pace.wait()
+            if self.stopped_by:
+                raise DeviceError(f"stopped by {self.stopped_by[0]}")
+            index = min(last.sequence - first.sequence + 1, len(path) - 1)
+            row = await self._exchange(path[index], (path[index] - path[index - 1]) * self.rate)
+            now = time.monotonic()
+            self._watch(now - fresh, last, row)
+            if row.sequence == last.sequence:
+                pace.stale()
+                continue
+            pace.fresh(row.sequence - last.sequence)
+            self._keep(row, row.sequence - first.sequence - 2, row.sequence - last.sequence - 1)
+            if row.sequence - first.sequence >= RATE_SAMPLES:
+                self._check_rate(first, row)
+            if why := self._limits.violation(row):
+                raise DeviceError(why)
+            fresh, last = now, row
+            if now - reported >= REPORT_S:
+                reported = now
+                self._tell(row, row.sequence - first.sequence, now - began)
+
+    async def _exchange(self, reference: NDArray, speed: NDArray) -> Row:
+        """Exchange all devices; remember how the set-points move, in case they must be slowed down."""
+        self.sent, self._speed = reference, speed
+        self._cycle += 1
+        return await self.machine.cycle(reference, self._cycle)
+
+    def _keep(self, row: Row, index: int, missed: int) -> None:
+        """Write a sample that carries set-point ``index`` of the plan, and note those missed before it."""
+        first, stop = self.plan.first, self.plan.stop
+        missing = range(max(index - missed, first), min(index, stop))
+        if missing:
+            self.gaps.append(((missing.start - first) / self.rate, len(missing)))
+        if not first <= index < stop:
+            return
+        if self._began is None:
+            self._began = row.time - (index - first) / self.rate
+        self.journal.append([row.time - self._began, *(value(row) for value in self._columns.values())])
+
+    def _watch(self, waited: float, last: Row, row: Row) -> None:
+        """Refuse to go on after too long a wait, or with a counter that runs backwards."""
+        device = self.machine.drives[0].device.label
+        if waited > self._watchdog:
+            raise DeviceError(
+                f"watchdog: no new sample from {device} for {waited:.3f} s, allowed are {self._watchdog:g} s; its counter "
+                "stands still, or this computer is too busy"
+            )
+        if row.sequence < last.sequence:
+            raise DeviceError(
+                f"{device}: its sample counter went back from {last.sequence} to {row.sequence}; was it restarted?"
+            )
+
+    def _check_rate(self, first: Row, row: Row) -> None:
+        """Refuse a device clock that does not tell the sample rate; a wrong unit in the rig file shows here."""
+        found = (row.sequence - first.sequence) / max(row.time - first.time, 1e-9)
+        if abs(found / self.rate - 1.0) > RATE_TOLERANCE:
+            raise DeviceError(
+                f"{self.machine.drives[0].device.label}: samples {found:.4g} times a second by its own clock, expected "
+                f"{self.rate:g}; correct acquire.sample_rate_hz, or the unit of time in the rig file"
+            )
+
+    def _tell(self, row: Row, samples: int, elapsed: float) -> None:
+        since = (samples - 2 - self.plan.first) / self.rate
+        duration = (self.plan.stop - self.plan.first) / self.rate
+        state = "ramp" if since < 0 else "run" if since < duration else "ramp down"
+        missed = sum(count for _, count in self.gaps)
+        self.report(Progress(state, since, duration, row, self.journal.rows, missed, samples / elapsed))
+
+    async def _stop(self) -> list[str]:
+        """Bring every drive to rest and take its torque away; return what went wrong with that."""
+        safety, told = self.machine.rig.safety, zip(self.machine.drives, self.sent, self._speed, strict=True)
+        stops = [
+            stop(drive, float(reference), float(speed), safety.deceleration_rad_s2, self.rate, self._pace())
+            for drive, reference, speed in told
+            if drive.touched
+        ]
+        return [complaint for complaint in await asyncio.gather(*stops) if complaint]
+

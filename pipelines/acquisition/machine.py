@@ -1,0 +1,214 @@
+"""The rig as acquisition sees it: drives and force sensors that together deliver one row a cycle."""
+
+import asyncio
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.acquisition.device import Device
+from pipelines.errors import DeviceError
+from pipelines.mechanics.motion import CUFFS
+from pipelines.registers import Block
+from pipelines.settings.rig import DriveSettings, RigSettings, SensorSettings, registers_of
+
+LAG_PAUSE_S = 0.0002
+"""Before a drive is asked again that has not latched its sample yet."""
+
+LOOKS = 9
+"""Readings from which the distance between the drives' counters is taken."""
+
+
+class Counter:
+    """A device's counter or clock, carried on beyond the width of its register."""
+
+    def __init__(self, span: float) -> None:
+        self._span = span
+        self._turns = 0
+        self._last: float | None = None
+
+    def __call__(self, value: float) -> float:
+        """Return the value with every turn of the register added."""
+        # Less than half a span back is a turn; anything else is a step of the device's own.
+        if self._span and self._last is not None and value < self._last - self._span / 2:
+            self._turns += 1
+        self._last = value
+        return value + self._turns * self._span
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a drive tells, SI units; NaN for what it does not."""
+
+    sequence: int
+    time: float
+    angle: float
+    torque: float
+    current: float
+    velocity: float
+    temperature: float
+    reference: float
+
+
+class Drive:
+    """One drive: set-points out, readings in."""
+
+    def __init__(self, rig: RigSettings, settings: DriveSettings) -> None:
+        self.settings = settings
+        self.map = rig.map.drive[settings.map]
+        self.device = Device(f"drive {settings.joint}", settings, rig.safety.watchdog_s)
+        self.told = Block(registers_of(self.map.read))
+        self.tell = Block(registers_of(self.map.write))
+        self._sequence = Counter(self.told.span("sequence"))
+        self._time = Counter(self.told.span("time"))
+        self._sent = np.nan
+        self.touched = False
+        """Whether it has been told anything, so that it must be disabled."""
+
+    async def look(self) -> Reading:
+        """Read without telling the drive anything."""
+        return self._reading(await self.device.read(self.told.address, self.told.count))
+
+    async def exchange(self, reference: float, *, enable: bool = True) -> Reading:
+        """Send a set-point (rad) and return the sample that is latched."""
+        self.touched = True
+        control = self.map.enable if enable else self.map.disable
+        words = self.tell.encode({"reference": reference, "control": control})
+        reading = self._reading(await self.device.exchange(self.tell, words, self.told))
+        self._sent = reference
+        return reading
+
+    async def disable(self, reference: float) -> None:
+        """Take the torque away."""
+        words = self.tell.encode({"reference": reference, "control": self.map.disable})
+        await self.device.write(self.tell, words)
+
+    def _reading(self, words: list[int]) -> Reading:
+        told = self.told.decode(words)
+        if fault := int(told.get("status", 0)) & self.map.fault_mask:
+            raise DeviceError(
+                f"{self.device.label}: reports a fault (status bits 0x{fault:04X}); see the drive's manual, "
+                "clear the fault and start again"
+            )
+        return Reading(
+            sequence=int(self._sequence(told["sequence"])),
+            time=self._time(told["time"]),
+            angle=told["angle"],
+            torque=told["current"] * self.settings.torque_per_ampere,
+            current=told["current"],
+            velocity=told.get("velocity", np.nan),
+            temperature=told.get("temperature", np.nan),
+            reference=told.get("reference", self._sent),
+        )
+
+
+class Sensor:
+    """One 3-axis force sensor."""
+
+    def __init__(self, rig: RigSettings, settings: SensorSettings) -> None:
+        self.settings = settings
+        self.map = rig.map.sensor[settings.map]
+        self.device = Device(f"sensor {settings.cuff}", settings, rig.safety.watchdog_s)
+        self.block = Block(registers_of(self.map.read))
+        self._last: float | None = None
+
+    async def look(self) -> tuple[float, float, float] | None:
+        """Return the force (N), or None where the sensor has no new sample."""
+        told = self.block.decode(await self.device.read(self.block.address, self.block.count))
+        stale, self._last = told["sequence"] == self._last, told["sequence"]
+        return None if stale else (told["force_x"], told["force_y"], told["force_z"])
+
+
+@dataclass(frozen=True)
+class Row:
+    """One sample of the whole machine."""
+
+    drives: tuple[Reading, ...]
+    forces: NDArray
+    """(4, 3) N; NaN where a sensor was not read or had nothing new."""
+
+    @property
+    def sequence(self) -> int:
+        """The first drive's sample counter: the machine's."""
+        return self.drives[0].sequence
+
+    @property
+    def time(self) -> float:
+        """The first drive's clock: the machine's, s."""
+        return self.drives[0].time
+
+    @property
+    def angle(self) -> list[float]:
+        """Angle of each joint, rad."""
+        return [drive.angle for drive in self.drives]
+
+
+class Machine:
+    """All devices of a rig."""
+
+    def __init__(self, rig: RigSettings, *, with_sensors: bool) -> None:
+        self.rig = rig
+        self.drives = [Drive(rig, settings) for settings in rig.drive]
+        self.sensors = [Sensor(rig, settings) for settings in rig.sensor] if with_sensors else []
+        self._no_force = np.full((len(CUFFS), 3), np.nan)
+        self._ahead = [0 for _ in self.drives]
+        """How far each drive's counter is ahead of the first one's at the same sample."""
+
+    async def connect(self) -> None:
+        """Open every line and make sure who is at its end."""
+        for part in (*self.drives, *self.sensors):
+            await part.device.connect()
+            await part.device.check_identity(part.map.identity)
+
+    def close(self) -> None:
+        """Close every line."""
+        for part in (*self.drives, *self.sensors):
+            part.device.close()
+
+    async def look(self) -> Row:
+        """Read every device once, moving nothing."""
+        # Several looks: between two requests of one of them a drive may go on to its next sample.
+        looks = [await asyncio.gather(*(drive.look() for drive in self.drives)) for _ in range(LOOKS)]
+        ahead = np.array([[reading.sequence - look[0].sequence for reading in look] for look in looks])
+        self._ahead = np.median(ahead, axis=0).astype(int).tolist()
+        return Row(tuple(looks[-1]), await self._felt(0))
+
+    async def cycle(self, reference: NDArray, number: int) -> Row:
+        """Send set-points (J,) rad and return the sample that is latched in all devices.
+
+        In lockstep the drives' exchange ends a sample, so sensors are read before it. In real time the drives
+        tell when a new sample begins, so sensors are read after it.
+        """
+        if self.rig.clock == "lockstep":
+            forces = await self._felt(number)
+            return Row(await self._exchange(reference), forces)
+        drives = await self._exchange(reference)
+        return Row(drives, await self._felt(number))
+
+    async def _felt(self, number: int) -> NDArray:
+        due = [sensor for sensor in self.sensors if number % sensor.settings.every == 0]
+        if not due:
+            return self._no_force
+        forces = self._no_force.copy()
+        for sensor, force in zip(due, await asyncio.gather(*(s.look() for s in due)), strict=True):
+            if force is not None:
+                forces[CUFFS.index(sensor.settings.cuff)] = force
+        return forces
+
+    async def _exchange(self, reference: NDArray) -> tuple[Reading, ...]:
+        """Exchange every drive; one that has not latched the others' sample yet is asked again."""
+        pairs = list(zip(self.drives, reference.tolist(), strict=True))
+        readings = list(await asyncio.gather(*(drive.exchange(angle) for drive, angle in pairs)))
+        tries = int(self.rig.safety.watchdog_s / LAG_PAUSE_S)
+        for _ in range(tries):
+            counts = [reading.sequence - ahead for reading, ahead in zip(readings, self._ahead, strict=True)]
+            late = [j for j, count in enumerate(counts) if count < max(counts)]
+            if not late:
+                return tuple(readings)
+            await asyncio.sleep(LAG_PAUSE_S)
+            for j in late:
+                readings[j] = await self.drives[j].exchange(reference[j])
+        raise DeviceError(
+            f"{self.drives[late[0]].device.label}: its sample counter lags behind the others' for "
+            f"{self.rig.safety.watchdog_s:g} s; check the drives' synchronisation"
+        )

@@ -1,0 +1,138 @@
+"""All set-points of a run, made and checked before anything moves: from rest into the motion, the run, back to rest."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.errors import InputError
+from pipelines.mechanics.trajectory import Trajectory
+from pipelines.registers import Block
+from pipelines.settings.rig import RigSettings, registers_of
+
+LONGEST_RAMP_S = 60.0
+RAMP_GROWTH = 1.2
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Set-points, one a sample; each is reached at its sample's end."""
+
+    reference: NDArray
+    """(n, J) rad."""
+    first: int
+    """Index of the first sample that is recorded."""
+    stop: int
+    """Index after the last one."""
+
+
+def make_plan(
+    rig: RigSettings, trajectory: Trajectory, start: NDArray, duration_s: float, sample_rate_hz: float
+) -> Plan:
+    """Plan a run, or refuse it.
+
+    The ramp is a smooth share, 0 to 1, of the motion itself, so the leg leaves rest without a jump in speed
+    and arrives in the motion at its speed. ``settle_s`` later the recording begins, in phase with the
+    trajectory's start. The same share, 1 to 0, leads back to where the leg stood.
+
+    Parameters
+    ----------
+    start : (J,) array
+        Where the leg stands, rad.
+    duration_s : float
+        Length of the recording.
+    """
+    run = check_trajectory(rig, trajectory, duration_s, sample_rate_hz)
+    lead_in = _ramp(rig, trajectory, start, sample_rate_hz, before=True, end_s=duration_s)
+    lead_out = _ramp(rig, trajectory, start, sample_rate_hz, before=False, end_s=duration_s)
+    return Plan(np.concatenate([lead_in, run, lead_out]), len(lead_in), len(lead_in) + len(run))
+
+
+def check_trajectory(rig: RigSettings, trajectory: Trajectory, duration_s: float, sample_rate_hz: float) -> NDArray:
+    """Return a run's set-points (n, J), or refuse a trajectory that is too short or leaves the rig's limits."""
+    if duration_s > trajectory.duration_s + 1e-9:
+        raise InputError(
+            f"the trajectory lasts {trajectory.duration_s:g} s and does not repeat, but the run's duration_s is "
+            f"{duration_s:g}; shorten the run, or give the trajectory's omega_rad_s if it repeats"
+        )
+    # A set-point is reached half a sample after the instant it belongs to, the middle of the window.
+    instants = (np.arange(round(duration_s * sample_rate_hz)) + 0.5) / sample_rate_hz
+    run = trajectory.at(instants)[0]
+    _refuse_outside(rig, run, instants, sample_rate_hz)
+    return run
+
+
+def check_start(rig: RigSettings, angle: NDArray) -> str | None:
+    """Return why the leg must not be moved from where it stands; None if it may."""
+    for drive, found in zip(rig.drive, angle, strict=True):
+        low, high = drive.angle_rad
+        if not low <= found <= high:
+            return (
+                f"the {drive.joint} stands at {found:.3f} rad, outside its limits {low:g} to {high:g} rad; move the leg "
+                "by hand, or check the encoder's zero"
+            )
+    return None
+
+
+def _ramp(
+    rig: RigSettings, trajectory: Trajectory, rest: NDArray, rate: float, *, before: bool, end_s: float
+) -> NDArray:
+    """Return the shortest ramp from or to rest that keeps the limits, with the settling time (n, J)."""
+    ramp_s = rig.safety.ramp_s
+    settle_s = rig.safety.settle_s if before else 0.0
+    while ramp_s <= LONGEST_RAMP_S:
+        ahead = (np.arange(round((ramp_s + settle_s) * rate)) + 0.5) / rate
+        s = np.minimum(1.0, ahead / ramp_s)
+        share = (s**3 * (10.0 - 15.0 * s + 6.0 * s**2))[:, np.newaxis]
+        # Time runs backwards from the motion's beginning, forwards from its end; the share grows towards it.
+        motion = _extended(trajectory, -ahead[::-1] if before else end_s + ahead)
+        reference = rest + (share if before else share[::-1]) * (motion - rest)
+        if before or len(reference) == 0:
+            path = np.vstack([rest, reference])
+        else:
+            path = np.vstack([reference, rest])
+        speed = np.abs(np.diff(path, axis=0)).max(axis=0) * rate
+        if all(found <= drive.speed_rad_s for found, drive in zip(speed, rig.drive, strict=True)):
+            return reference
+        ramp_s *= RAMP_GROWTH
+    slowest = rig.drive[int(np.argmax(speed / [drive.speed_rad_s for drive in rig.drive]))]
+    raise InputError(
+        f"no ramp of at most {LONGEST_RAMP_S:g} s leads the {slowest.joint} between rest and the trajectory below "
+        f"its {slowest.speed_rad_s:g} rad/s; start with the leg nearer to the motion"
+    )
+
+
+def _extended(trajectory: Trajectory, time: NDArray) -> NDArray:
+    """Return angles (n, J) at times before or after the motion; one that runs once stands still there."""
+    if trajectory.period_s is None:
+        time = np.clip(time, 0.0, trajectory.duration_s)
+    return trajectory.at(np.mod(time, trajectory.period_s) if trajectory.period_s else time)[0]
+
+
+def _refuse_outside(rig: RigSettings, run: NDArray, time: NDArray, rate: float) -> None:
+    """Refuse a motion that leaves the drives' limits."""
+    margin = rig.safety.angle_margin_rad
+    speed = np.diff(run, axis=0) * rate
+    for j, drive in enumerate(rig.drive):
+        low, high = drive.angle_rad[0] + margin, drive.angle_rad[1] - margin
+        outside = (run[:, j] < low) | (run[:, j] > high)
+        if outside.any():
+            k = int(np.argmax(outside))
+            raise InputError(
+                f"trajectory: the {drive.joint} would be at {run[k, j]:.3f} rad at {time[k]:.3f} s, but the rig allows "
+                f"{low:g} to {high:g} rad (its limits less angle_margin_rad); make the excitation smaller, or design "
+                "it within the rig's limits"
+            )
+        fast = np.abs(speed[:, j]) > drive.speed_rad_s
+        if fast.any():
+            k = int(np.argmax(fast))
+            raise InputError(
+                f"trajectory: the {drive.joint} would move at {speed[k, j]:.3f} rad/s at {time[k]:.3f} s, but the rig "
+                f"allows {drive.speed_rad_s:g} rad/s; make the excitation slower or smaller"
+            )
+        reference = Block(registers_of(rig.map.drive[drive.map].write))
+        if not reference.holds("reference", low, high):
+            raise InputError(
+                f"map.drive.{drive.map}.write.reference: cannot hold {low:g} to {high:g} rad, the {drive.joint}'s "
+                "limits; correct its type or scale"
+            )

@@ -1,0 +1,76 @@
+"""Modbus registers and what they mean: one block of a device's register map, read and written as SI values."""
+
+import struct
+from collections.abc import Mapping, Sequence
+from operator import itemgetter
+
+from pipelines.settings.rig import Register
+
+_FORMAT = {
+    "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "int64": "q", "uint64": "Q", "float32": "f",
+    "float64": "d",
+}  # fmt: skip
+
+
+class Block:
+    """Registers that travel in one exchange, from the lowest address to the highest."""
+
+    def __init__(self, registers: Mapping[str, Register]) -> None:
+        self.registers = dict(registers)
+        self.names = tuple(registers)
+        self.address = min(r.address for r in registers.values())
+        self.count = max(r.address + r.registers for r in registers.values()) - self.address
+        # Words are picked in the order in which one big-endian structure of all values holds them.
+        self._places = [place for r in registers.values() for place in self._words(r)]
+        self._pick = itemgetter(*self._places) if len(self._places) > 1 else lambda words: (words[self._places[0]],)
+        self._words_format = struct.Struct(f">{len(self._places)}H")
+        self._values_format = struct.Struct(">" + "".join(_FORMAT[r.type] for r in registers.values()))
+        self._scales = [r.si for r in registers.values()]
+        self._ranges = [raw_range(r) for r in registers.values()]
+
+    def _words(self, register: Register) -> list[int]:
+        words = list(range(register.address - self.address, register.address - self.address + register.registers))
+        return words if register.word_order == "big" else words[::-1]
+
+    def decode(self, words: Sequence[int]) -> dict[str, float]:
+        """Return the SI values in ``count`` words that were read at ``address``."""
+        raw = self._values_format.unpack(self._words_format.pack(*self._pick(words)))
+        return {
+            name: value * scale + offset
+            for name, value, (scale, offset) in zip(self.names, raw, self._scales, strict=True)
+        }
+
+    def encode(self, values: Mapping[str, float]) -> list[int]:
+        """Return ``count`` words that hold SI values; what does not fit saturates, as it does in a device."""
+        raw = []
+        for name, (scale, offset), limits in zip(self.names, self._scales, self._ranges, strict=True):
+            value = (values[name] - offset) / scale
+            raw.append(value if limits is None else min(max(round(value), limits[0]), limits[1]))
+        words = [0] * self.count
+        for place, word in zip(
+            self._places, self._words_format.unpack(self._values_format.pack(*raw)), strict=True
+        ):
+            words[place] = word
+        return words
+
+    def span(self, name: str) -> float:
+        """Return after which difference an unsigned counter begins anew, in SI units; 0 for one that does not."""
+        register = self.registers[name]
+        limits = raw_range(register)
+        return (limits[1] + 1) * register.si[0] if limits and limits[0] == 0 else 0.0
+
+    def holds(self, name: str, low: float, high: float) -> bool:
+        """Tell whether a register can hold every SI value from ``low`` to ``high``."""
+        limits = raw_range(self.registers[name])
+        scale, offset = self.registers[name].si
+        if limits is None:
+            return True
+        return all(limits[0] <= round((value - offset) / scale) <= limits[1] for value in (low, high))
+
+
+def raw_range(register: Register) -> tuple[int, int] | None:
+    """Return the least and the greatest count of an integer register; None for a float."""
+    if register.type.startswith("float"):
+        return None
+    bits = 16 * register.registers
+    return (0, 2**bits - 1) if register.type.startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)

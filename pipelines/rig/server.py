@@ -1,0 +1,266 @@
+"""The virtual rig on the wire: drives and force sensors as Modbus TCP devices, all latched at one instant.
+
+In lockstep a sample lasts until every drive has been exchanged once (FC23: set-point in, sample out), so a
+run depends on seeds and set-points alone. In real time samples come on the rig's own clock.
+"""
+
+import asyncio
+import logging
+import sys
+import threading
+from collections import defaultdict
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+from pymodbus.constants import ExcCodes
+from pymodbus.server import ModbusTcpServer
+from pymodbus.simulator import DataType, SimData, SimDevice
+
+from pipelines.errors import DeviceError, SettingsError
+from pipelines.mechanics.motion import CUFFS
+from pipelines.registers import Block
+from pipelines.rig.plant import JOINTS, Plant, Samples
+from pipelines.rig.sealed import hidden_effects
+from pipelines.settings.rig import (
+    DriveMap,
+    DriveSettings,
+    Identity,
+    RigSettings,
+    SensorMap,
+    SensorSettings,
+    load_rig,
+    registers_of,
+)
+
+READ_WRITE = 23
+"""Function code of the exchange that lockstep counts."""
+
+
+def build_plant(
+    rig: RigSettings, path: Path, run: str, seed: int = 0, sample_rate_hz: float | None = None
+) -> Plant:
+    """Return the plant of a rig file, with what it hides."""
+    if rig.plant is None:
+        raise SettingsError(f"{path}: plant: missing, so there is no machine to play; add a [plant], see docs/rig.md")
+    hidden = hidden_effects(path.parent / rig.plant.sealed) if rig.plant.sealed else ()
+    return Plant(rig.plant, run, seed, hidden, sample_rate_hz)
+
+
+class Device:
+    """Registers of one device; they are written when they are read, from the sample that is latched then."""
+
+    def __init__(self, rig: "VirtualRig", unit: int, identity: Iterable[Identity], blocks: Iterable[Block]) -> None:
+        self.rig = rig
+        self.unit = unit
+        self.identity = tuple(identity)
+        self.blocks = tuple(blocks)
+        self.registers: list[int] = []
+        """The words of the device, shared with the server, from ``first`` on."""
+        self.first = 0
+
+    def as_served(self) -> SimDevice:
+        """Return the device as the server knows it."""
+        held = {entry.address: entry.value for entry in self.identity}
+        for block in self.blocks:
+            held |= dict.fromkeys(range(block.address, block.address + block.count), 0)
+        # One SimData for each stretch of addresses: what lies between does not exist.
+        stretches = groupby(enumerate(sorted(held)), lambda numbered: numbered[1] - numbered[0])
+        addresses = [[address for _, address in stretch] for _, stretch in stretches]
+        data = [SimData(a[0], values=[held[i] for i in a], datatype=DataType.REGISTERS) for a in addresses]
+        return SimDevice(self.unit, simdata=data, action=self._serve)
+
+    async def _serve(
+        self, function: int, first: int, address: int, count: int, registers: list[int], written: list | None
+    ) -> ExcCodes | None:
+        self.registers, self.first = registers, first
+        self.rig.catch_up()  # before a write takes effect: until now the old set-point held
+        if written is None:
+            self.show(self.rig.sample)
+            if function == READ_WRITE:
+                self.rig.exchanged(self)
+        return None
+
+    def show(self, sample: Samples) -> None:
+        """Put a sample into the registers."""
+        raise NotImplementedError
+
+    def _put(self, block: Block, values: dict[str, float]) -> None:
+        start = block.address - self.first
+        self.registers[start : start + block.count] = block.encode(values)
+
+
+class Drive(Device):
+    """A drive: follows its set-point while it is enabled."""
+
+    def __init__(self, rig: "VirtualRig", settings: DriveSettings, registers: DriveMap, rest: float) -> None:
+        self.read, self.write = Block(registers_of(registers.read)), Block(registers_of(registers.write))
+        super().__init__(rig, settings.unit, registers.identity, (self.read, self.write))
+        self.joint = JOINTS.index(settings.joint)
+        self.torque_per_ampere = settings.torque_per_ampere
+        self.enable = registers.enable
+        self.rest = rest
+
+    def command(self) -> tuple[float, bool]:
+        """Return the set-point (rad) and whether the drive is enabled."""
+        start = self.write.address - self.first
+        if not self.registers:
+            return self.rest, False
+        told = self.write.decode(self.registers[start : start + self.write.count])
+        return (told["reference"], True) if told["control"] == self.enable else (self.rest, False)
+
+    def show(self, sample: Samples) -> None:
+        """Put a sample into the registers."""
+        j = self.joint
+        values = {
+            "sequence": sample.sequence[0] % (self.read.span("sequence") or 2**63),
+            "time": sample.time[0] % (self.read.span("time") or np.inf),
+            "angle": sample.angle[0, j],
+            "velocity": sample.velocity[0, j],
+            "current": sample.torque[0, j] / self.torque_per_ampere,
+            "temperature": sample.temperature[0, j],
+            "status": float(self.rig.enabled[j]),
+            "reference": sample.reference[0, j],
+        }
+        self._put(self.read, values)
+
+
+class Sensor(Device):
+    """A 3-axis force sensor in a cuff."""
+
+    def __init__(self, rig: "VirtualRig", settings: SensorSettings, registers: SensorMap) -> None:
+        self.read = Block(registers_of(registers.read))
+        super().__init__(rig, settings.unit, registers.identity, (self.read,))
+        self.cuff = CUFFS.index(settings.cuff)
+
+    def show(self, sample: Samples) -> None:
+        """Put a sample into the registers."""
+        x, y, z = sample.forces[0, self.cuff]
+        sequence = sample.sequence[0] % (self.read.span("sequence") or 2**63)
+        self._put(self.read, {"sequence": sequence, "force_x": x, "force_y": y, "force_z": z})
+
+
+class VirtualRig:
+    """All devices of a rig and the plant behind them."""
+
+    def __init__(self, rig: RigSettings, plant: Plant) -> None:
+        self.plant = plant
+        self.lockstep = rig.clock == "lockstep"
+        self.drives = [
+            Drive(self, drive, rig.map.drive[drive.map], rest)
+            for drive, rest in zip(rig.drive, plant.reference, strict=True)
+        ]
+        self.sensors = [Sensor(self, sensor, rig.map.sensor[sensor.map]) for sensor in rig.sensor]
+        self.enabled = np.zeros(len(self.drives), dtype=np.bool_)
+        self._waiting = set(self.drives)
+        self._advance()
+        self._began = asyncio.get_running_loop().time()
+
+    def exchanged(self, drive: Device) -> None:
+        """Note that a drive has been exchanged; after the last one the plant goes on, once its reply is sent."""
+        self._waiting.discard(drive)
+        if self.lockstep and not self._waiting:
+            asyncio.get_running_loop().call_soon(self.catch_up)
+
+    def catch_up(self) -> None:
+        """Advance the plant to the sample that is due."""
+        if self.lockstep:
+            if not self._waiting:
+                self._advance()
+            return
+        elapsed = asyncio.get_running_loop().time() - self._began
+        while self.sample.sequence[0] < int(elapsed * self.plant.sample_rate_hz):
+            self._advance()
+
+    async def keep_time(self) -> None:
+        """Latch samples on the rig's own clock, for ever."""
+        loop = asyncio.get_running_loop()
+        while True:
+            due = self._began + (self.sample.sequence[0] + 1) / self.plant.sample_rate_hz
+            await asyncio.sleep(max(0.0, due - loop.time()))
+            self.catch_up()
+
+    def _advance(self) -> None:
+        told = [drive.command() for drive in self.drives]
+        self.enabled = np.array([enabled for _, enabled in told])
+        self.sample = self.plant.run(np.array([[reference for reference, _ in told]]), self.enabled)
+        self._waiting = set(self.drives)
+
+
+async def serve(
+    rig: RigSettings,
+    plant: Plant,
+    port: int | None,
+    announce: Callable[[str, int], None],
+    until: asyncio.Event,
+) -> None:
+    """Serve a rig on this machine until an event is set.
+
+    Parameters
+    ----------
+    rig : RigSettings
+    plant : Plant
+    port : int or None
+        One port for all devices, 0 for a free one; None for those that the rig file names.
+    announce : callable
+        Called with host and port of each server once it listens.
+    until : asyncio.Event
+    """
+    virtual = VirtualRig(rig, plant)
+    by_port: dict[int, list[SimDevice]] = defaultdict(list)
+    for settings, device in zip((*rig.drive, *rig.sensor), (*virtual.drives, *virtual.sensors), strict=True):
+        by_port[settings.port if port is None else port].append(device.as_served())
+    servers = []
+    clock = None if virtual.lockstep else asyncio.ensure_future(virtual.keep_time())
+    try:
+        for number, devices in by_port.items():
+            server = ModbusTcpServer(devices, address=("127.0.0.1", number))
+            servers.append(server)
+            if not await server.listen():
+                raise DeviceError(f"127.0.0.1:{number}: cannot listen there; choose a free port with --port")
+            announce("127.0.0.1", server.transport.sockets[0].getsockname()[1])
+        await until.wait()
+    finally:
+        if clock:
+            clock.cancel()
+        for server in servers:
+            await server.shutdown()
+
+
+def serve_file(
+    path: Path,
+    run: str,
+    seed: int,
+    port: int | None,
+    sample_rate_hz: float | None,
+    announce: Callable[[str, int], None],
+    *,
+    until_input_ends: bool,
+) -> None:
+    """Serve the rig in a file until Ctrl-C or, if asked, until standard input is closed.
+
+    The latter ties the rig to the process that started it: an operating system closes the pipe whatever
+    becomes of that process.
+    """
+    rig = load_rig(path)
+    # A first sample compiles the plant, which may take seconds: not once a client waits for a reply.
+    build_plant(rig, path, run, seed, sample_rate_hz).run(np.zeros((1, len(JOINTS))), np.zeros(len(JOINTS), bool))
+    plant = build_plant(rig, path, run, seed, sample_rate_hz)
+
+    async def until_stopped() -> None:
+        until = asyncio.Event()
+        if until_input_ends:
+            loop = asyncio.get_running_loop()
+
+            def wait() -> None:
+                sys.stdin.buffer.read()
+                loop.call_soon_threadsafe(until.set)
+
+            threading.Thread(target=wait, daemon=True).start()
+        await serve(rig, plant, port, announce, until)
+
+    logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
+    with suppress(KeyboardInterrupt):
+        asyncio.run(until_stopped())
