@@ -87,9 +87,7 @@ def problem(
 def workspace(problem):
     """Allocate the scratch arrays for one problem."""
     n, samples = problem.sine.shape
-    return Workspace(
-        np.empty((6, samples)), np.empty((4, samples)), np.empty((10, samples)), np.empty((2, 2, n))
-    )
+    return Workspace(np.empty((6, samples)), np.empty((4, samples)), np.empty((10, samples)), np.empty((2, 2, n)))
 
 
 @njit(cache=True)
@@ -98,7 +96,7 @@ def cost(candidate, problem, work):
     expand(candidate, problem, work.coefficients)
     move(problem, work)
     repair(candidate, problem, work)
-    fill_columns(candidate, problem, work)
+    fill_columns(problem, work)
     gram = gram_matrix(work.columns)
     if problem.criterion == LOG_DET:
         return -log_determinant(gram)
@@ -108,6 +106,16 @@ def cost(candidate, problem, work):
             return np.inf
         gram /= np.outer(size, size)
     return condition_number(gram)
+
+
+@njit(cache=True)
+def costs(candidates, problem):
+    """Repair candidates (P, D) in place and return their costs (P,)."""
+    work = workspace(problem)
+    result = np.empty(len(candidates))
+    for i in range(len(candidates)):
+        result[i] = cost(candidates[i], problem, work)
+    return result
 
 
 @njit(cache=True)
@@ -190,7 +198,7 @@ def extent(x, harmonics):
 
 
 @njit(**FAST)
-def fill_columns(candidate, problem, work):
+def fill_columns(problem, work):
     """Compute the regressor's columns that are not zero everywhere."""
     q, sine, columns = work.motion, work.sines, work.columns
     length, gravity = problem.geometry

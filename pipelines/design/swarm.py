@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipelines.design.fitness import cost, workspace
+from pipelines.design.fitness import cost, costs, workspace
 
 # Clerc and Kennedy's constriction (2002, IEEE Trans. Evol. Comput. 6(1)): the swarm contracts by itself.
 INERTIA = 0.7298
@@ -28,10 +28,8 @@ class Swarm(NamedTuple):
 @njit(cache=True)
 def assess(swarm, problem):
     """Repair and judge every particle where it is."""
-    work = workspace(problem)
-    for i in range(len(swarm.position)):
-        swarm.best_cost[i] = cost(swarm.position[i], problem, work)
-        swarm.best_position[i] = swarm.position[i]
+    swarm.best_cost[:] = costs(swarm.position, problem)
+    swarm.best_position[:] = swarm.position
 
 
 @njit(cache=True)

@@ -29,6 +29,17 @@ class JointBounds(Settings):
     knee: Bounds = Field(Bounds(angle_rad=(-1.6232, -0.2269)), description="Knee, flexion negative.")
 
 
+class NoiseSettings(Settings):
+    """What the expected standard errors are computed for: the rig's torque noise and the record's length."""
+
+    hip_nm: float = Field(0.6, gt=0.0, description="Standard deviation of the hip's torque noise.")
+    knee_nm: float = Field(0.4, gt=0.0, description="Standard deviation of the knee's torque noise.")
+    correlation_s: float = Field(
+        0.02, ge=0.0, description="Time after which the noise's correlation has fallen to 1/e; 0 for white noise."
+    )
+    duration_s: float = Field(40.0, gt=0.0, description="Length of the record that will be fitted.")
+
+
 class DesignSettings(Settings):
     """The excitation, a Fourier series, and the particle swarm that searches it."""
 
@@ -45,6 +56,32 @@ class DesignSettings(Settings):
     rest_to_rest: bool = Field(False, description="Start and end at standstill.")
     bounds: JointBounds = Field(JointBounds(), description="Angle, speed and acceleration, kept between samples too.")
     topology: Literal["ring", "global"] = Field("ring", description="Whose best each particle of the swarm follows.")
-    particles: int = Field(64, ge=4, description="Size of the swarm.")
-    seconds: float = Field(10.0, gt=0.0, description="Longest search, wall time.")
+    particles: int = Field(128, ge=4, description="Size of the swarm.")
+    iterations: int = Field(800, ge=1, description="Most moves of the swarm; it stops earlier where nothing is gained.")
+    seconds: float = Field(
+        60.0, gt=0.0, description="Longest search, wall time; a search it cuts short depends on the machine's speed."
+    )
     seed: int = Field(1, ge=0, description="Seed of the search; equal seeds give equal designs.")
+    sample_rate_hz: float = Field(200.0, gt=0.0, description="Rows a second in the file, samples a second of a record.")
+    noise: NoiseSettings = Field(NoiseSettings(), description="For the standard errors to expect.")
+
+    @model_validator(mode="after")
+    def _mean_angles_are_within_bounds(self) -> Self:
+        if self.theta0_rad == "free":
+            return self
+        for name, theta0, joint in zip(
+            ("hip", "knee"), self.theta0_rad, (self.bounds.hip, self.bounds.knee), strict=True
+        ):
+            low, high = joint.angle_rad
+            if not low < theta0 < high:
+                raise ValueError(
+                    f"theta0_rad: found {theta0} at the {name}, expected between its bounds {low} and {high}; "
+                    'change one of them, or write "free"'
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _something_moves(self) -> Self:
+        if self.rest_to_rest and self.harmonics < 2:
+            raise ValueError("rest_to_rest: one harmonic is never at rest; set harmonics to 2 or more")
+        return self

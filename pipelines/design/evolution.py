@@ -1,0 +1,81 @@
+"""Local polish: an evolution strategy that learns the landscape's covariance (CMA-ES).
+
+Hansen (2016), "The CMA Evolution Strategy: A Tutorial", arXiv:1604.00772; the names are the tutorial's. It needs
+no gradient: shrinking to the bounds, sgn columns and crossing eigenvalues all leave kinks in the criterion.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+POPULATION = 24
+# The decomposition costs as much as several candidates, and the covariance moves slowly.
+GENERATIONS_PER_DECOMPOSITION = 5
+PATIENCE = 60
+LEAST_GAIN = 1e-6
+
+
+def polish(
+    start: NDArray,
+    spread: NDArray,
+    costs: Callable[[NDArray], NDArray],
+    rng: np.random.Generator,
+    generations: int,
+    out_of_time: Callable[[], bool] = lambda: False,
+) -> tuple[NDArray, float]:
+    """Minimise from ``start`` until nothing is gained for a while.
+
+    Parameters
+    ----------
+    start, spread : (D,) arrays
+        First mean, and standard deviation of the first candidates.
+    costs : callable
+        Returns the costs (P,) of candidates (P, D); may repair them in place.
+
+    Returns
+    -------
+    (D,) array, float
+        The best candidate, repaired, and its cost.
+    """
+    size = len(start)
+    rank = np.arange(1, POPULATION // 2 + 1)
+    weights = np.log(POPULATION / 2 + 0.5) - np.log(rank)
+    weights /= weights.sum()
+    mu = 1.0 / np.sum(weights**2)
+    c_c = (4 + mu / size) / (size + 4 + 2 * mu / size)
+    c_sigma = (mu + 2) / (size + mu + 5)
+    c_1 = 2 / ((size + 1.3) ** 2 + mu)
+    c_mu = min(1 - c_1, 2 * (mu - 2 + 1 / mu) / ((size + 2) ** 2 + mu))
+    damping = 1 + 2 * max(0.0, np.sqrt((mu - 1) / (size + 1)) - 1) + c_sigma
+    expected_length = np.sqrt(size) * (1 - 1 / (4 * size) + 1 / (21 * size**2))
+
+    mean, sigma, covariance = start.copy(), 1.0, np.diag(spread**2)
+    path_c, path_sigma = np.zeros(size), np.zeros(size)
+    best, best_cost, last_gain = start.copy(), np.inf, 0
+    for generation in range(generations):
+        if generation % GENERATIONS_PER_DECOMPOSITION == 0:
+            eigenvalues, axes = np.linalg.eigh(covariance)
+            lengths = np.sqrt(np.maximum(eigenvalues, 1e-20))
+        steps = (rng.standard_normal((POPULATION, size)) * lengths) @ axes.T
+        candidates = mean + sigma * steps
+        cost = costs(candidates)
+        order = np.argsort(cost)
+        if not cost[order[0]] >= best_cost - LEAST_GAIN * abs(best_cost):
+            last_gain = generation
+        if cost[order[0]] < best_cost:
+            best, best_cost = candidates[order[0]].copy(), float(cost[order[0]])
+        if generation - last_gain > PATIENCE or out_of_time():
+            break
+        chosen = steps[order[: len(weights)]]
+        step = weights @ chosen
+        mean = mean + sigma * step
+        whitened = axes @ ((axes.T @ step) / lengths)
+        path_sigma = (1 - c_sigma) * path_sigma + np.sqrt(c_sigma * (2 - c_sigma) * mu) * whitened
+        length = np.linalg.norm(path_sigma) / expected_length
+        steady = length < (1.4 + 2 / (size + 1)) * np.sqrt(1 - (1 - c_sigma) ** (2 * (generation + 1)))
+        path_c = (1 - c_c) * path_c + steady * np.sqrt(c_c * (2 - c_c) * mu) * step
+        covariance = (1 - c_1 - c_mu) * covariance + c_1 * np.outer(path_c, path_c)
+        covariance += c_mu * (chosen.T * weights) @ chosen
+        sigma *= np.exp(min(1.0, c_sigma / damping * (length - 1)))
+    return best, best_cost

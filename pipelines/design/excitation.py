@@ -1,0 +1,58 @@
+"""The stage: find an excitation, judge it, and put it into a table."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipelines.design.quality import Quality, quality
+from pipelines.design.search import Report, search
+from pipelines.mechanics.fourier import FourierTrajectory
+from pipelines.mechanics.leg import Geometry
+from pipelines.settings.design import DesignSettings
+
+
+@dataclass(frozen=True)
+class Design:
+    """A designed excitation."""
+
+    trajectory: FourierTrajectory
+    quality: Quality
+    settings: DesignSettings
+    stopped_by: str
+
+    def frame(self) -> pd.DataFrame:
+        """Return one period as rows of a ``trajectory/1`` table; the next period begins where it ends."""
+        rows = round(self.trajectory.period_s * self.settings.sample_rate_hz)
+        time = np.arange(rows) / self.settings.sample_rate_hz
+        states = dict(zip(("angle", "velocity", "acceleration"), self.trajectory.at(time), strict=True))
+        columns = {
+            joint.column(quantity): values[:, j]
+            for j, joint in enumerate(self.trajectory.joints)
+            for quantity, values in states.items()
+        }
+        return pd.DataFrame({"time_s": time, **columns})
+
+    def metadata(self) -> dict[str, Any]:
+        """Return the coefficients and what they are worth."""
+        return {
+            "omega_rad_s": self.trajectory.omega,
+            "theta0_rad": self.trajectory.theta0.tolist(),
+            "a": self.trajectory.a.tolist(),
+            "b": self.trajectory.b.tolist(),
+            "criterion": self.settings.criterion,
+            "criterion_value": self.quality.value(self.settings.criterion),
+            **self.quality.as_metadata(),
+            "seed": self.settings.seed,
+            "stopped_by": self.stopped_by,
+        }
+
+
+def design(
+    settings: DesignSettings, geometry: Geometry | None = None, report: Report = lambda done, note: None
+) -> Design:
+    """Design an excitation; equal settings give an equal one, unless ``seconds`` cut the search short."""
+    geometry = geometry or Geometry()
+    found = search(settings, geometry, report)
+    return Design(found.trajectory, quality(found.trajectory, settings, geometry), settings, found.stopped_by)

@@ -1,0 +1,125 @@
+"""What an excitation can tell: condition numbers, log det, and the standard errors to expect."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from pipelines.errors import InputError
+from pipelines.mechanics.leg import INERTIAL, Geometry
+from pipelines.mechanics.limits import Margin, margins
+from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.trajectory import Trajectory
+from pipelines.model import Model, Term, baseline
+from pipelines.settings.design import DesignSettings, NoiseSettings
+
+JOINTS = ("hip", "knee")
+SAMPLES = 1000
+"""Samples of one period in the numbers that are reported."""
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How good an excitation is; the regressor has eight columns, X1 .. X4, then each joint's friction."""
+
+    condition: float
+    """Of the regressor as it is, the paper's criterion; computed by singular values."""
+    inertial_condition: float
+    """Of the four inertial columns alone."""
+    scaled_condition: float
+    """With columns scaled to unit norm, so that it does not depend on units."""
+    log_det: float
+    """log det of A'A/N."""
+    standard_errors: dict[str, float]
+    """By parameter, in its unit."""
+    units: dict[str, str]
+    margins: list[Margin]
+
+    def value(self, criterion: str) -> float:
+        """Return the criterion of this name."""
+        return float(getattr(self, criterion))
+
+    def as_metadata(self) -> dict[str, Any]:
+        """Return what a ``trajectory/1`` file says of its excitation."""
+        numbers = {name: getattr(self, name) for name in ("condition", "scaled_condition", "log_det")}
+        return {
+            **{name: value if np.isfinite(value) else None for name, value in numbers.items()},
+            "inertial_condition": self.inertial_condition if np.isfinite(self.inertial_condition) else None,
+            "standard_errors": {k: v if np.isfinite(v) else None for k, v in self.standard_errors.items()},
+            "margins": [{**vars(margin), "margin": margin.margin} for margin in self.margins],
+        }
+
+
+def quality(trajectory: Trajectory, settings: DesignSettings, geometry: Geometry) -> Quality:
+    """Judge an excitation as a whole period of it, by the reference method."""
+    names = tuple(joint.name for joint in trajectory.joints)
+    if names != JOINTS:
+        raise InputError(f"the excitation moves the joints {', '.join(names)}, expected hip and knee")
+    span = trajectory.period_s or trajectory.duration_s
+    A = regressor(trajectory, geometry, np.arange(SAMPLES) * span / SAMPLES)
+    stacked = A.reshape(-1, A.shape[2])
+    size = np.linalg.norm(stacked, axis=0)
+    parameters = _parameters()
+    errors = standard_errors(trajectory, settings.noise, geometry, settings.sample_rate_hz)
+    return Quality(
+        condition=_condition(stacked),
+        inertial_condition=_condition(stacked[:, : len(INERTIAL)]),
+        scaled_condition=_condition(stacked / np.where(size > 0.0, size, 1.0)),
+        log_det=float(np.linalg.slogdet(stacked.T @ stacked / SAMPLES)[1]),
+        standard_errors=dict(zip(parameters, errors.tolist(), strict=True)),
+        units=parameters,
+        margins=margins(trajectory, settings.bounds),
+    )
+
+
+def regressor(trajectory: Trajectory, geometry: Geometry, time: NDArray) -> NDArray:
+    """Regressor of rigid body and friction at times (n,), shape (n, 2, 8)."""
+    q, dq, ddq = trajectory.at(time)
+    nothing = np.zeros_like(q)
+    count = len(time)
+    motion = Motion(
+        time, q, dq, ddq, torque=nothing, load=nothing, segment=np.zeros(count, np.int64), valid=np.ones(count, bool),
+        geometry=geometry,
+    )  # fmt: skip
+    return _model().regressor(motion)
+
+
+def standard_errors(trajectory: Trajectory, noise: NoiseSettings, geometry: Geometry, sample_rate_hz: float) -> NDArray:
+    """Foretell the standard errors (8,) of a weighted least-squares fit to one recording.
+
+    Torque noise of a joint is stationary, with standard deviation s and correlation exp(-|t| / T). With weights
+    1 / s², information I = sum of A_j'A_j / s_j² and R the noise's correlation matrix, the fit's covariance is
+    I⁻¹ (sum of A_j' R A_j / s_j²) I⁻¹ exactly (White's sandwich), whatever the fit believes of its noise.
+    """
+    duration = min(noise.duration_s, trajectory.duration_s)
+    A = regressor(trajectory, geometry, np.arange(0.0, duration, 1.0 / sample_rate_hz))
+    A = A / np.array([noise.hip_nm, noise.knee_nm])[:, np.newaxis]
+    rho = np.exp(-1.0 / (sample_rate_hz * noise.correlation_s)) if noise.correlation_s > 0.0 else 0.0
+    # Row k of ``earlier`` is sum over i < k of rho^(k - i) A_i, so that A'RA = A'A + A'earlier + earlier'A.
+    earlier = lfilter([0.0, rho], [1.0, -rho], A, axis=0)
+    information = np.einsum("njp,njq->pq", A, A)
+    cross = np.einsum("njp,njq->pq", A, earlier)
+    if _condition(information) * np.finfo(float).eps > 1e-3:
+        return np.full(A.shape[2], np.inf)
+    inverse = np.linalg.inv(information)
+    return np.sqrt(np.diag(inverse @ (information + cross + cross.T) @ inverse))
+
+
+def _model() -> Model:
+    effects = baseline(JOINTS, ("exo_alone",))
+    return Model(tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects))
+
+
+def _parameters() -> dict[str, str]:
+    """Return the unit of each column's parameter by its name: ``X1``, ``hip_coulomb``."""
+    return {
+        f"{effect.joint}_{parameter.name}" if effect.joint else parameter.name: parameter.unit
+        for effect, parameter in _model().linear_parameters
+    }
+
+
+def _condition(A: NDArray) -> float:
+    largest, *_, least = np.linalg.svd(A, compute_uv=False)
+    return float(largest / least) if least > 0.0 else np.inf

@@ -1,0 +1,154 @@
+"""The search for an excitation: a swarm for the region, an evolution strategy for the last digits."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import null_space
+
+from pipelines.design.evolution import polish
+from pipelines.design.fitness import Problem, costs, expand, problem
+from pipelines.design.swarm import Swarm, assess, fly
+from pipelines.errors import NotIdentifiable
+from pipelines.mechanics.fourier import FourierTrajectory
+from pipelines.mechanics.leg import Geometry
+from pipelines.mechanics.limits import bounds_array
+from pipelines.settings.design import DesignSettings
+
+# The swarm only has to find the region: a coarse grid is five times faster, and no less strict about bounds.
+COARSE_SAMPLES, COARSE_SAMPLES_PER_HARMONIC = 200, 40
+FINE_SAMPLES, FINE_SAMPLES_PER_HARMONIC = 1000, 100
+
+ITERATIONS_PER_LOOK = 25
+PATIENCE = 8
+"""Looks at the swarm without gain after which it is done."""
+LEAST_GAIN = 1e-4
+
+POLISHED = 3
+"""Particles that are polished: the best of as many arcs of the ring, which may sit in different valleys."""
+GENERATIONS = 2000
+POLISH_SPREAD = 0.05
+
+Report = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class Found:
+    """The outcome of a search."""
+
+    trajectory: FourierTrajectory
+    stopped_by: str
+    """``stagnation``, ``iterations``, or ``seconds``, when the design also depends on the machine's speed."""
+
+
+def search(settings: DesignSettings, geometry: Geometry, report: Report = lambda done, note: None) -> Found:
+    """Find an excitation that keeps its bounds at every time and is as good as can be by the chosen criterion.
+
+    ``report`` is called with the share done, 0 to 1, and the best value so far.
+    """
+    rng = np.random.default_rng(settings.seed)
+    coarse = _problem(settings, geometry, COARSE_SAMPLES, COARSE_SAMPLES_PER_HARMONIC)
+    fine = _problem(settings, geometry, FINE_SAMPLES, FINE_SAMPLES_PER_HARMONIC)
+    spread = _spread(fine)
+
+    def note(cost: float) -> str:
+        return f"{settings.criterion} {-cost if settings.criterion == 'log_det' else cost:.4g}"
+
+    swarm = _first_swarm(settings, coarse, spread, rng)
+    fly(swarm, coarse, True, 0, rng)  # compiles what is not compiled yet, which is no search time
+    deadline = time.monotonic() + settings.seconds
+    stopped_by = _let_fly(swarm, coarse, settings, rng, deadline, lambda done, cost: report(0.5 * done, note(cost)))
+
+    best, best_cost = swarm.best_position[0], np.inf
+    for i, arc in enumerate(np.array_split(np.arange(settings.particles), POLISHED)):
+        start = swarm.best_position[arc[np.argmin(swarm.best_cost[arc])]]
+        candidate, cost = polish(
+            start, POLISH_SPREAD * spread, lambda positions: costs(positions, fine), rng, GENERATIONS,
+            out_of_time=lambda: time.monotonic() > deadline,
+        )  # fmt: skip
+        if cost < best_cost:
+            best, best_cost = candidate, cost
+        report(0.5 + 0.5 * (i + 1) / POLISHED, note(best_cost))
+    if not np.isfinite(best_cost):
+        raise NotIdentifiable(
+            "no excitation within the bounds tells the parameters apart; widen [design.bounds] or add harmonics"
+        )
+    return Found(_trajectory(best, fine), "seconds" if time.monotonic() > deadline else stopped_by)
+
+
+def _problem(settings: DesignSettings, geometry: Geometry, samples: int, samples_per_harmonic: int) -> Problem:
+    return problem(
+        omega=2.0 * np.pi * settings.base_frequency_hz,
+        harmonics=settings.harmonics,
+        bounds=bounds_array(settings.bounds),
+        geometry=geometry,
+        criterion=settings.criterion,
+        theta0=None if settings.theta0_rad == "free" else np.array(settings.theta0_rad),
+        basis=_basis(settings.harmonics, settings.rest_to_rest),
+        samples=max(samples, samples_per_harmonic * settings.harmonics),
+    )
+
+
+def _basis(harmonics: int, rest_to_rest: bool) -> NDArray:
+    """Return what coefficients are combinations of: sine (0) and cosine (1), (2, n, free).
+
+    At t = 0 and after each period the velocity is w sum k a_k and the acceleration -w² sum k² b_k; at rest
+    both vanish, so the coefficients come from the null spaces of (k) and (k²).
+    """
+    if not rest_to_rest:
+        return np.array([np.eye(harmonics)] * 2)
+    k = np.arange(1.0, harmonics + 1)
+    return np.array([null_space(k[np.newaxis]), null_space(k[np.newaxis] ** 2)])
+
+
+def _spread(problem: Problem) -> NDArray:
+    """Return how far a single coordinate may go before some bound stops it, (D,)."""
+    half = 0.5 * (problem.bounds[:, :, 1] - problem.bounds[:, :, 0])
+    powers = problem.speeds ** np.arange(3)[:, np.newaxis]
+    reach = (half[:, :, np.newaxis] / powers[:, np.newaxis, :]).min(axis=0)
+    coordinates = np.einsum("pkf,jk->pjf", np.abs(problem.basis), reach).ravel()
+    return np.append(coordinates, half[0]) if problem.theta0_is_free else coordinates
+
+
+def _first_swarm(settings: DesignSettings, problem: Problem, spread: NDArray, rng: np.random.Generator) -> Swarm:
+    shape = (settings.particles, len(spread))
+    position = rng.standard_normal(shape) * spread
+    if problem.theta0_is_free:
+        position[:, -2:] = rng.uniform(*problem.bounds[0].T, size=(settings.particles, 2))
+    velocity = 0.3 * rng.standard_normal(shape) * spread
+    swarm = Swarm(position, velocity, position.copy(), np.empty(settings.particles))
+    assess(swarm, problem)
+    return swarm
+
+
+def _let_fly(
+    swarm: Swarm,
+    problem: Problem,
+    settings: DesignSettings,
+    rng: np.random.Generator,
+    deadline: float,
+    report: Callable[[float, float], None],
+) -> str:
+    """Move the swarm until nothing is gained, and say what stopped it."""
+    best, last_gain = swarm.best_cost.min(), 0
+    looks = -(-settings.iterations // ITERATIONS_PER_LOOK)
+    for look in range(looks):
+        fly(swarm, problem, settings.topology == "ring", ITERATIONS_PER_LOOK, rng)
+        found = swarm.best_cost.min()
+        if not found >= best - LEAST_GAIN * abs(best):
+            best, last_gain = found, look
+        report((look + 1) / looks, found)
+        if time.monotonic() > deadline:
+            return "seconds"
+        if look - last_gain >= PATIENCE:
+            return "stagnation"
+    return "iterations"
+
+
+def _trajectory(candidate: NDArray, problem: Problem) -> FourierTrajectory:
+    coefficients = np.empty((2, 2, len(problem.speeds)))
+    expand(candidate, problem, coefficients)
+    theta0 = candidate[-2:] if problem.theta0_is_free else problem.theta0
+    return FourierTrajectory(theta0.copy(), coefficients[0], coefficients[1], float(problem.speeds[0]))
