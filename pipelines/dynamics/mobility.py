@@ -1,0 +1,48 @@
+"""What the motors feel of the leg's mass, and how fast a loop around it gets."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pipelines.dynamics.assembly import Assembly
+from pipelines.dynamics.forward import DTHETA, Q, accelerations, memory_size, resting_state, workspace
+
+KNEE_ANGLES = np.linspace(0.0, np.pi, 61)
+"""Where the mass matrix is looked at, rad: it is even in the knee angle and depends on no other."""
+
+STABLE_REACH = 1.5
+"""Step times fastest rate up to which the Runge-Kutta method is stable (2.78) and still accurate."""
+
+
+@njit(cache=True)
+def _masses(a, angles, memory, state):
+    w, rates, still = workspace(a.joints), np.zeros((4, a.joints)), np.zeros(a.joints)
+    mass = np.empty((len(angles), a.joints, a.joints))
+    mobility = np.empty((len(angles), a.joints, a.joints))
+    drive = np.zeros(a.joints)
+    for k in range(len(angles)):
+        state[Q, -1] = angles[k]
+        for j in range(a.joints):
+            drive[j] = 1.0
+            accelerations(a, w, 0.0, state, memory, w.direction, still, drive, rates)
+            mobility[k, :, j] = rates[DTHETA]
+            drive[j] = 0.0
+        accelerations(a, w, 0.0, state, memory, w.direction, still, drive, rates)
+        for j in range(a.joints):
+            mobility[k, :, j] -= rates[DTHETA]
+        mass[k] = w.mass
+    return mass, mobility
+
+
+def masses(a: Assembly) -> tuple[NDArray, NDArray]:
+    """Return the links' mass matrix (kg·m²) and the motors' acceleration per drive torque, (k, J, J) each.
+
+    k is the number of ``KNEE_ANGLES``.
+    """
+    return _masses(a, KNEE_ANGLES, np.zeros(memory_size(a)), resting_state(np.zeros(a.joints)))
+
+
+def substeps_for(a: Assembly, feedback_gain: float, period: float) -> int:
+    """Return how many integration steps a sample needs so that a speed feedback (N·m·s/rad) stays stable."""
+    fastest = feedback_gain * np.abs(np.linalg.eigvals(masses(a)[1])).max()
+    return max(1, int(np.ceil(fastest * period / STABLE_REACH)))

@@ -1,0 +1,1 @@
+"""Simulation: the identified leg under the adaptive controller, and against its own recordings."""

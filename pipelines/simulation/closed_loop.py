@@ -1,0 +1,139 @@
+"""The leg under the adaptive controller: one run, and how the error falls with the feedback gain."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipelines.contracts import Joint
+from pipelines.dynamics.mobility import substeps_for
+from pipelines.dynamics.rbf_loop import TURN, Encoder, RbfController, RbfRun, follow_with_rbf
+from pipelines.errors import InputError
+from pipelines.mechanics.trajectory import Trajectory
+from pipelines.settings.simulate import SimulateSettings
+from pipelines.simulation.plant import Plant
+
+NODES_REACH = 1.5
+"""The centres lie between minus and plus this, on the diagonal."""
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """A closed loop at n samples of J joints."""
+
+    time: NDArray
+    """(n,) s."""
+    reference: NDArray
+    """(n, J) rad."""
+    run: RbfRun
+    joints: tuple[Joint, ...]
+    asked: int
+    """Samples that were asked for; n is smaller where a joint ran away."""
+
+    @property
+    def error(self) -> NDArray:
+        """Reference less angle, (n, J) rad."""
+        return self.reference - self.run.angle
+
+    def worst_error(self, after_s: float) -> NDArray:
+        """Return the largest error of each joint after a time, (J,) rad; NaN where a joint ran away."""
+        if self.ran_away:
+            return np.full(len(self.joints), np.nan)
+        return np.abs(self.error[self.time >= after_s]).max(axis=0)
+
+    @property
+    def ran_away(self) -> str:
+        """Which joint ran away, and when; empty where none did."""
+        if len(self.time) == self.asked:
+            return ""
+        joint = self.joints[int(np.argmin(np.abs(self.run.angle[-1]) < TURN))].name
+        return f"the simulated {joint} ran past one full turn at t = {self.time[-1]:.3f} s"
+
+    def frame(self) -> pd.DataFrame:
+        """Return the columns of a ``simulation/1`` table."""
+        columns = {"time_s": self.time}
+        for j, joint in enumerate(self.joints):
+            columns[joint.column("reference")] = self.reference[:, j]
+            columns[joint.column("angle")] = self.run.angle[:, j]
+            columns[joint.column("velocity")] = self.run.speed[:, j]
+            columns[joint.column("error")] = self.error[:, j]
+            columns[joint.column("torque")] = self.run.torque[:, j]
+            columns[joint.column("network")] = self.run.network[:, j]
+        return pd.DataFrame(columns)
+
+
+def track(
+    plant: Plant, settings: SimulateSettings, reference: Trajectory, feedback_gain: float | None = None
+) -> ClosedLoop:
+    """Let the leg follow a reference from rest, hanging straight down.
+
+    ``feedback_gain`` is Kv in N·m·s/rad, the settings' unless given.
+    """
+    _refuse_short(reference, settings)
+    if feedback_gain is None:
+        feedback_gain = settings.feedback_gain_nm_s_rad
+    period, joints = settings.step_s, len(plant.joints)
+    substeps = substeps_for(plant.assembly, feedback_gain, period)
+    n = round(settings.duration_s / period) + 1
+    half_steps = np.arange(2 * (n - 1) * substeps + 1) * (0.5 * period / substeps)
+    disturbance = settings.disturbance_nm * np.sin(settings.disturbance_rad_s * half_steps)
+    wanted = np.stack(reference.at(half_steps), axis=1)
+    run = follow_with_rbf(
+        plant.assembly,
+        _controller(settings, feedback_gain),
+        _encoder(settings, n, joints),
+        wanted,
+        np.repeat(disturbance[:, np.newaxis], joints, axis=1),
+        period,
+        np.zeros(joints),
+        substeps,
+    )
+    reached = len(run.angle)
+    return ClosedLoop(np.arange(reached) * period, wanted[:: 2 * substeps, 0][:reached], run, plant.joints, n)
+
+
+def sweep(plant: Plant, settings: SimulateSettings, reference: Trajectory, gains: Iterable[float]) -> pd.DataFrame:
+    """Return the largest settled error for each feedback gain (the paper's Figure 3).
+
+    Columns ``feedback_gain_nm_s_rad`` and, for each joint, its error in rad; NaN where the loop ran away.
+    """
+    rows = []
+    for gain in gains:
+        worst = track(plant, settings, reference, gain).worst_error(settings.settled_after_s)
+        errors = {joint.column("error"): error for joint, error in zip(plant.joints, worst, strict=True)}
+        rows.append({"feedback_gain_nm_s_rad": gain, **errors})
+    return pd.DataFrame(rows)
+
+
+def _controller(settings: SimulateSettings, feedback_gain: float) -> RbfController:
+    return RbfController(
+        error_gain=settings.error_gain_1_s,
+        feedback_gain=feedback_gain,
+        adaptation_gain=settings.adaptation_gain,
+        robust_gain=settings.robust_gain_nm,
+        limit=settings.torque_limit_nm,
+        nodes=np.linspace(-NODES_REACH, NODES_REACH, settings.network_nodes),
+        width=settings.network_width,
+    )
+
+
+def _encoder(settings: SimulateSettings, samples: int, joints: int) -> Encoder:
+    counts, noise = settings.encoder_counts_per_turn, settings.encoder_noise_rad
+    ideal = counts == 0 and noise == 0
+    draw = np.random.default_rng(settings.seed)
+    return Encoder(
+        noise=np.zeros((0, joints)) if ideal else noise * draw.standard_normal((samples, joints)),
+        count=2.0 * np.pi / counts if counts else 0.0,
+        speed_share=float(1.0 - np.exp(-2.0 * np.pi * settings.speed_cutoff_hz * settings.step_s)),
+    )
+
+
+def _refuse_short(reference: Trajectory, settings: SimulateSettings) -> None:
+    # A sampled motion ends at its last sample; half a step is rounding.
+    if reference.duration_s < settings.duration_s - 0.5 * settings.step_s:
+        raise InputError(
+            f"the reference lasts {reference.duration_s:g} s, but simulate.duration_s asks for "
+            f"{settings.duration_s:g} s; shorten that, or give a reference that repeats (omega_rad_s)"
+        )

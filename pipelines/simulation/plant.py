@@ -1,0 +1,71 @@
+"""The leg to be simulated: one kind of run of an identified model, laid out for the compiled dynamics."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pipelines.contracts import PARAMETERS, Joint, joints_of
+from pipelines.contracts.table import Table
+from pipelines.dynamics.assembly import Assembly, assemble
+from pipelines.dynamics.mobility import masses
+from pipelines.effects.rigid_body import RigidBody
+from pipelines.errors import InputError
+from pipelines.mechanics.leg import Geometry, unrealizable
+from pipelines.mechanics.motion import geometry_of
+from pipelines.model import Model, model_from_parameters
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A model that can move."""
+
+    model: Model
+    geometry: Geometry
+    joints: tuple[Joint, ...]
+    run: str
+    assembly: Assembly
+
+    def metadata(self) -> dict:
+        """Return what a file says of the plant: run, geometry and every parameter of every effect."""
+        effects = [
+            {
+                "effect": term.effect.label,
+                **{p.name: float(v) for p, v in zip(term.effect.parameters, term.values, strict=True)},
+            }
+            for term in self.model
+        ]
+        return {"run": self.run, "geometry": self.geometry.metadata(), "effects": effects}
+
+
+def make_plant(model: Model, geometry: Geometry, joints: tuple[Joint, ...], run: str) -> Plant:
+    """Return the plant of a kind of run, or refuse a leg that cannot exist."""
+    model = model.for_run(run)
+    assembly = assemble(model, geometry, [joint.name for joint in joints])
+    lightest = np.linalg.eigvalsh(masses(assembly)[0]).min()
+    if lightest <= 0:
+        X = sum(term.values for term in model if isinstance(term.effect, RigidBody))
+        reasons = unrealizable(X, geometry) or [f"the mass matrix has the eigenvalue {lightest:.3g} kg·m²"]
+        raise InputError(
+            f"the {run} parameters are no real leg: {'; '.join(reasons)}. A simulation of it would run away; "
+            "identify again from motions that separate X1, X2 and X3 better, or choose another --run"
+        )
+    return Plant(model, geometry, joints, run, assembly)
+
+
+def plant_from_table(table: Table, run: str, default_geometry: Geometry | None = None) -> Plant:
+    """Return the plant that a ``parameters/1`` table describes for one kind of run."""
+    bodies = table.frame.loc[table.frame["effect"] == "rigid_body", "run"]
+    if not (bodies.isna() | (bodies == run)).any():
+        known = ", ".join(sorted(set(bodies) - {"human"})) or "none"
+        raise InputError(f"{table.path}: holds no model of the run {run}, only of: {known}; choose one with --run")
+    joints = joints_of(table.metadata)
+    if len(joints) != 2:
+        raise InputError(f"{table.path}: describes {len(joints)} joints, expected the leg's two")
+    geometry = geometry_of(table.metadata, default_geometry)
+    return make_plant(model_from_parameters(table.frame, run), geometry, joints, run)
+
+
+def read_plant(path: Path | str, run: str, default_geometry: Geometry | None = None) -> Plant:
+    """Return the plant in a ``parameters/1`` file."""
+    return plant_from_table(PARAMETERS.read(path), run, default_geometry)
