@@ -18,6 +18,7 @@ from typer.exceptions import TyperException
 
 from exoid_cli.acquire import acquire
 from exoid_cli.console import console
+from exoid_cli.design import design
 from exoid_cli.filter import filter_
 from exoid_cli.identify import identify
 from exoid_cli.init import init
@@ -40,6 +41,7 @@ app.command("filter")(filter_)
 app.command("identify")(identify)
 app.command("rig")(rig)
 app.command("show")(show)
+app.command("design")(design)
 app.add_typer(settings, name="settings")
 
 

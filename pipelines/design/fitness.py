@@ -5,7 +5,7 @@ two mean angles where they are searched too. Coordinates times ``basis`` are the
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -17,7 +17,7 @@ from pipelines.mechanics.leg import Geometry, regressor_rows
 CRITERIA = ("log_det", "condition", "scaled_condition")
 LOG_DET, CONDITION, SCALED_CONDITION = range(3)
 
-FAST = {"cache": True, "fastmath": VECTORIZED, "error_model": "numpy"}
+FAST: dict[str, Any] = {"cache": True, "fastmath": VECTORIZED, "error_model": "numpy"}
 
 PARAMETERS = 8
 HIP_PARAMETERS = (0, 1, 2, 3, 4, 5)

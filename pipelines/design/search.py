@@ -116,7 +116,8 @@ def _first_swarm(settings: DesignSettings, problem: Problem, spread: NDArray, rn
     shape = (settings.particles, len(spread))
     position = rng.standard_normal(shape) * spread
     if problem.theta0_is_free:
-        position[:, -2:] = rng.uniform(*problem.bounds[0].T, size=(settings.particles, 2))
+        low, high = problem.bounds[0].T
+        position[:, -2:] = rng.uniform(low, high, size=(settings.particles, 2))
     velocity = 0.3 * rng.standard_normal(shape) * spread
     swarm = Swarm(position, velocity, position.copy(), np.empty(settings.particles))
     assess(swarm, problem)

@@ -4,7 +4,7 @@ import json
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, Self, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -16,6 +16,14 @@ class Settings(BaseModel):
     """One table of a settings file. Every field has a description; a unit stands at the end of its name."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    def changed(self, **values: Any) -> Self:
+        """Return the settings with some values replaced, as command-line options do; None leaves one as it is."""
+        content = self.model_dump() | {name: value for name, value in values.items() if value is not None}
+        try:
+            return type(self).model_validate(content)
+        except ValidationError as error:
+            raise SettingsError(explain(error, content)) from error
 
 
 Model = TypeVar("Model", bound=Settings)

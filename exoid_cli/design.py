@@ -1,0 +1,101 @@
+"""``exoid design``: find an excitation, or judge one."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from exoid_cli.console import console
+
+if TYPE_CHECKING:
+    from pipelines.design.quality import Quality
+
+
+def design(
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="The trajectory/1 file to write.")] = None,
+    config: Annotated[Path | None, typer.Option("--config", help="exoid.toml; [design] and [mechanism] count.")] = None,
+    evaluate: Annotated[
+        Path | None, typer.Option("--evaluate", metavar="FILE", help="Judge this excitation, Parquet or TOML.")
+    ] = None,
+    criterion: Annotated[
+        Literal["log_det", "condition", "scaled_condition"] | None, typer.Option(help="Wins over exoid.toml's.")
+    ] = None,
+    harmonics: Annotated[int | None, typer.Option(min=1, max=20, help="Wins over exoid.toml's.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Wins over exoid.toml's.")] = None,
+) -> None:
+    """Search the excitation that tells the parameters apart best, or judge a given one.
+
+    Examples: exoid design --config exoid.toml -o trajectory.parquet,
+    exoid design --evaluate trajectory.toml
+    """
+    from pipelines.errors import InputError
+    from pipelines.mechanics.leg import Geometry
+    from pipelines.settings import Experiment
+
+    experiment = Experiment.load(config) if config else Experiment()
+    settings = experiment.design.changed(criterion=criterion, harmonics=harmonics, seed=seed)
+    geometry = Geometry(**experiment.mechanism.model_dump())
+    if (evaluate is None) == (output is None):
+        raise InputError("give either --output FILE, to design an excitation, or --evaluate FILE, to judge one")
+    if evaluate:
+        _evaluate(evaluate, settings, geometry)
+    elif output:
+        _design(output, settings, geometry)
+
+
+def _evaluate(file: Path, settings: Any, geometry: Any) -> None:
+    from pipelines.design.quality import quality
+    from pipelines.mechanics.trajectory import read_trajectory
+
+    found = quality(read_trajectory(file), settings, geometry)
+    console.emit({"file": str(file), **found.as_metadata()})
+    _show(str(file), found)
+
+
+def _design(output: Path, settings: Any, geometry: Any) -> None:
+    from pipelines.contracts import TRAJECTORY, describe
+    from pipelines.design.excitation import design
+
+    with console.progress("Designing", total=1.0) as report:
+        found = design(settings, geometry, report)
+    config = {"design": settings.model_dump(mode="json"), "geometry": vars(geometry)}
+    TRAJECTORY.write(output, found.frame(), found.metadata() | describe(config=config))
+    if found.stopped_by == "seconds":
+        console.warn(
+            f"the search was cut short after {settings.seconds:g} s, so another machine may find another design; "
+            "raise design.seconds"
+        )
+    console.emit({"file": str(output), **found.metadata()})
+    console.say(
+        f"{output}: {settings.criterion} {found.quality.value(settings.criterion):.4g}, {settings.harmonics} "
+        f"harmonics, period {found.trajectory.period_s:g} s, seed {settings.seed}; stopped by {found.stopped_by}"
+    )
+    _show(str(output), found.quality)
+
+
+def _show(file: str, found: "Quality") -> None:
+    console.say("")
+    console.table(
+        ("how well the regressor is conditioned", "value"),
+        [
+            ("condition number, 8 columns (the paper's criterion)", f"{found.condition:.1f}"),
+            ("condition number, 4 inertial columns", f"{found.inertial_condition:.1f}"),
+            ("condition number, columns scaled to unit norm", f"{found.scaled_condition:.1f}"),
+            ("log det A'A/N", f"{found.log_det:.2f}"),
+        ],
+        numbers="value",
+    )
+    console.say("")
+    errors = [(name, f"{value:.2g}", found.units[name]) for name, value in found.standard_errors.items()]
+    console.table(("parameter", "expected standard error", "unit"), errors, numbers="expected standard error")
+    console.say("")
+    headings = ("joint", "quantity", "unit", "lowest", "highest", "allowed from", "to", "margin", "")
+    rows = [
+        (m.joint, m.quantity, m.unit, *(f"{x:.4f}" for x in (m.lowest, m.highest, m.low, m.high)), f"{m.margin:.4f}",
+         "" if m.kept else "OUTSIDE")
+        for m in found.margins
+    ]  # fmt: skip
+    console.table(headings, rows, numbers="lowest, highest, allowed from, to, margin")
+    outside = [str(margin) for margin in found.margins if not margin.kept]
+    if outside:
+        console.warn(f"{file}: outside its limits, and `exoid acquire` will refuse it: {'; '.join(outside)}")
