@@ -1,27 +1,32 @@
 """A model: a tuple of effects with their values. Everything a stage asks of physics, it asks here."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipelines.effects import EFFECTS, Effect, Parameter, Side
+from pipelines.effects import EFFECTS, RUNS, Effect, Parameter, Side
 from pipelines.effects.friction import Friction
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
 from pipelines.mechanics.motion import Motion
+from pipelines.validation import suggestion
 
 BY_NAME = {effect.name: effect for effect in EFFECTS}
 
 
 @dataclass(frozen=True)
 class Term:
-    """An effect and the values of its parameters, linear ones first."""
+    """An effect and the values of its fitted parameters, linear ones first."""
 
     effect: Effect
     values: NDArray = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        """Fill in the defaults of what was left out."""
+        object.__setattr__(self, "values", self.effect.completed(self.values))
 
     @property
     def linear(self) -> NDArray:
@@ -65,12 +70,16 @@ class Model:
         return Model(tuple(t for t in self.terms if run in t.effect.acts_in and t.effect.run in (None, run)))
 
     def sensed(self, motion: Motion) -> Motion:
-        """Undo what sensors did: the motion of the motors."""
+        """Undo what encoders did: the motion of the motors."""
         return self._corrected(motion, lambda effect: effect.side is Side.SENSOR)
 
     def corrected(self, motion: Motion) -> Motion:
-        """Undo what sensors and transmissions did: the motion of the links."""
-        return self._corrected(self.sensed(motion), lambda effect: effect.side is not Side.SENSOR)
+        """Undo what encoders and transmissions did: the motion of the machine's links."""
+        return self._corrected(self.sensed(motion), lambda e: e.side in (Side.DRIVE, Side.STRUCTURE))
+
+    def on_limb(self, motion: Motion) -> Motion:
+        """Undo what encoders, transmissions and cuffs did: the motion of the wearer's limb."""
+        return self._corrected(self.corrected(motion), lambda effect: effect.side is Side.HUMAN)
 
     def _corrected(self, motion: Motion, chosen) -> Motion:
         for term in self.terms:
@@ -79,23 +88,36 @@ class Model:
         return motion
 
     def regressor(self, motion: Motion) -> NDArray:
-        """Torque per unit of each linear parameter, (n, J, p).
+        """Measured torque per unit of each linear parameter, (n, J, p).
 
-        Drive effects see the motor's motion, all others the link's.
+        Drive effects see the motor's motion, those on the wearer's side of the cuffs the limb's, all others the
+        link's. The sensors then make of all these torques, one sensor effect after the other, what they measure.
         """
-        motor, link = self.sensed(motion), self.corrected(motion)
-        parts = [t.effect.columns(motor if t.effect.side is Side.DRIVE else link, t.shape) for t in self.terms]
-        return np.concatenate(parts, axis=2)
+        motor, link, limb = self.sensed(motion), self.corrected(motion), self.on_limb(motion)
+        parts: dict[int, NDArray] = {}
+        for i in sorted(range(len(self.terms)), key=lambda i: self.terms[i].effect.side is Side.SENSOR):
+            effect, shape = self.terms[i].effect, self.terms[i].shape
+            at = limb if effect.on_limb else motor if effect.side is Side.DRIVE else link
+            parts = {k: effect.observed(columns, motion, shape) for k, columns in parts.items()}
+            parts[i] = effect.columns(at, shape)
+        return np.concatenate([parts[i] for i in range(len(parts))], axis=2)
+
+    def delivered(self, motion: Motion) -> NDArray:
+        """Return what the drives deliver where their sensors measured ``motion.torque``, (n, J) N·m."""
+        torque = motion.torque
+        for term in reversed(self.terms):
+            torque = term.effect.delivered(torque, motion, term.values)
+        return torque
 
     def torque(self, motion: Motion) -> NDArray:
-        """Torque the drives must supply along a motion, (n, J) N·m."""
+        """Torque that the sensors should measure along a motion, (n, J) N·m."""
         return self.regressor(motion) @ self.linear_values
 
 
 def effect_named(name: str) -> type[Effect]:
     """Look an effect up by the name that files use."""
     if name not in BY_NAME:
-        raise InputError(f"there is no effect {name!r}; known are {', '.join(BY_NAME)}")
+        raise InputError(f"there is no effect {name!r}; {suggestion(name, list(BY_NAME))}")
     return BY_NAME[name]
 
 
@@ -115,10 +137,24 @@ def model_from_parameters(frame: pd.DataFrame, run: str) -> Model:
         raise InputError(f"the parameters hold no rigid body for run {run!r}, only for {known}")
     terms = []
     for (name, joint), rows in chosen.groupby(["effect", "joint"], sort=False, dropna=False):
-        effect = effect_named(str(name))(joint=None if pd.isna(joint) else joint)
-        values = rows.set_index("name")["value"]
-        missing = [p.name for p in effect.parameters if p.name not in values.index]
-        if missing:
-            raise InputError(f"{effect.label}: the parameters table has no row {', '.join(missing)}")
-        terms.append(Term(effect, np.array([float(values[p.name]) for p in effect.parameters])))
+        # Of the wearer's limb where the rows say so: a compliant cuff stands before it.
+        own = run if run in RUNS and (rows["run"] == run).all() else None
+        effect = effect_named(str(name))(joint=None if pd.isna(joint) else joint, run=own)
+        values = {str(key): float(value) for key, value in zip(rows["name"], rows["value"], strict=True)}
+        try:
+            terms.append(term_from(effect, values))
+        except InputError as error:
+            raise InputError(f"the parameters table: {error}") from None
     return Model(tuple(terms))
+
+
+def term_from(effect: Effect, values: Mapping[str, float]) -> Term:
+    """Return a term from the values that a file gives to ``effect.parameters``."""
+    known = {parameter.name: parameter for parameter in effect.parameters}
+    missing = [name for name, parameter in known.items() if name not in values and parameter.default is None]
+    if missing or not set(values) <= set(known):
+        raise InputError(
+            f"{effect.label} has values {', '.join(values) or 'none'}, expected {', '.join(known)}; correct them"
+        )
+    physical = np.array([values.get(name, parameter.default) for name, parameter in known.items()], dtype=float)
+    return Term(effect, effect.values_from(physical))

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.effects import Effect, Side
-from pipelines.effects.kernel import address, derivative, reaction, reading, spring
+from pipelines.effects.kernel import address, derivative, reaction, reading, spring, torque_reading
 from pipelines.errors import InputError
 from pipelines.mechanics.leg import Geometry
 from pipelines.model import Model, Term
@@ -29,7 +29,12 @@ def _no_spring(twist, twist_rate, values):
 
 
 @reading
-def _no_reading(angle, torque, values, joint):
+def _no_reading(angle, values, joint):
+    pass
+
+
+@torque_reading
+def _no_torque_reading(t, torque, values, joint, state):
     pass
 
 
@@ -48,10 +53,13 @@ class Assembly(NamedTuple):
     derivatives: np.ndarray
     springs: np.ndarray
     readings: np.ndarray
+    torque_readings: np.ndarray
     joint: np.ndarray
     values: np.ndarray
     value_at: np.ndarray
     state_at: np.ndarray
+    sensed_at: np.ndarray
+    """As ``state_at``, for the memory of torque sensors."""
     sprung: np.ndarray
     """For each joint the term that is its transmission, -1 for a rigid one."""
     motor_inertia: np.ndarray
@@ -85,10 +93,12 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
         derivatives=_addresses([e.derivative for e in effects], _no_memory),
         springs=_addresses([e.spring for e in effects], _no_spring),
         readings=_addresses([e.reading for e in effects], _no_reading),
+        torque_readings=_addresses([e.torque_reading for e in effects], _no_torque_reading),
         joint=joint,
         values=np.concatenate([term.values for term in terms]).astype(float),
         value_at=_offsets([len(term.values) for term in terms]),
         state_at=_offsets([e.states for e in effects]),
+        sensed_at=_offsets([e.reading_states for e in effects]),
         sprung=sprung,
         motor_inertia=motor_inertia,
         geometry=geometry.array(),

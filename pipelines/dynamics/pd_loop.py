@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pipelines.dynamics.assembly import Assembly
 from pipelines.dynamics.forward import DQ, THETA, Q, memory_size, resting_state, stages, step, workspace
-from pipelines.effects.kernel import reading_at
+from pipelines.effects.kernel import reading_at, torque_reading_at
 
 SUBSTEPS = 6
 """Integration steps per control period; even, so that the middle of a sample is one of them."""
@@ -79,22 +79,36 @@ class LoopState(NamedTuple):
     """(J,) what the drives apply."""
     reference: np.ndarray
     """(J,) last set-point."""
+    sensed: np.ndarray
+    """Memory of the torque sensors."""
 
 
 def loop_at_rest(a: Assembly, q: NDArray) -> LoopState:
     """Return the loop with the leg at rest at link angles ``q`` (J,) and the set-point there."""
     q = np.asarray(q, float)
-    angle, unused = q.copy(), np.zeros(a.joints)
-    read_sensors(a, angle, unused)
+    angle = q.copy()
+    read_encoders(a, angle)
     zeros = [np.zeros(a.joints) for _ in range(3)]
-    return LoopState(resting_state(q), np.zeros(memory_size(a)), zeros[0], angle, zeros[1], zeros[2], angle.copy())
+    return LoopState(
+        resting_state(q), np.zeros(memory_size(a)), zeros[0], angle, zeros[1], zeros[2], angle.copy(),
+        np.zeros(int(a.sensed_at[-1])),
+    )  # fmt: skip
 
 
 @njit(cache=True)
-def read_sensors(a, angle, torque):
-    """Turn true motor angles and drive torques into what the sensors say, in place."""
+def read_encoders(a, angle):
+    """Turn true motor angles into what the encoders say, in place."""
     for i in range(a.bounds[4]):
-        reading_at(a.readings[i])(angle, torque, a.values[a.value_at[i] : a.value_at[i + 1]], a.joint[i])
+        reading_at(a.readings[i])(angle, a.values[a.value_at[i] : a.value_at[i + 1]], a.joint[i])
+
+
+@njit(cache=True)
+def read_torque(a, t, torque, sensed):
+    """Turn what the drives deliver into what their torque sensors say, in place; once a sample, in order."""
+    for i in range(a.bounds[4]):
+        values = a.values[a.value_at[i] : a.value_at[i + 1]]
+        state = sensed[a.sensed_at[i] : a.sensed_at[i + 1]]
+        torque_reading_at(a.torque_readings[i])(t, torque, values, a.joint[i], state)
 
 
 @njit(cache=True)
@@ -117,7 +131,6 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
     j_count = a.joints
     begin = loop.reference.copy()
     torque[:] = 0.0
-    unused = np.zeros(j_count)
     counted = np.zeros(j_count)
     period = d.step_s * SUBSTEPS
     middle = d.periods * SUBSTEPS // 2
@@ -125,8 +138,7 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
     before = loop.state
     for c in range(d.periods):
         counted[:] = loop.state[THETA]
-        unused[:] = 0.0
-        read_sensors(a, counted, unused)
+        read_encoders(a, counted)
         for j in range(j_count):
             if d.count[j] > 0.0:
                 counted[j] = np.floor(counted[j] / d.count[j] + 0.5) * d.count[j]
@@ -139,8 +151,7 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
         for _ in range(SUBSTEPS):
             if done == middle:
                 angle[:] = loop.state[THETA]
-                unused[:] = 0.0
-                read_sensors(a, angle, unused)
+                read_encoders(a, angle)
                 for j in range(j_count):
                     if d.count[j] > 0.0:
                         angle[j] = np.floor(angle[j] / d.count[j] + 0.5) * d.count[j]
@@ -153,8 +164,7 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
             done += 1
         for j in range(j_count):
             torque[j] += loop.torque[j] / d.periods
-    unused[:] = 0.0
-    read_sensors(a, unused, torque)
+    read_torque(a, t + middle * d.step_s, torque, loop.sensed)
     loop.reference[:] = reference
 
 

@@ -33,7 +33,7 @@ from pipelines.dynamics.forward import (
     weighted,
     workspace,
 )
-from pipelines.dynamics.pd_loop import read_sensors
+from pipelines.dynamics.pd_loop import read_encoders
 
 TURN = 2.0 * np.pi
 """A joint that leaves ± one turn has run away, rad."""
@@ -144,7 +144,7 @@ def _look(a, encoder, seen, state, k, period):
     """Read the encoders at sample ``k``: how far angle and speed are off what they are."""
     for j in range(a.joints):
         seen.angle_error[j] = state[THETA, j]
-    read_sensors(a, seen.angle_error, np.zeros(a.joints))
+    read_encoders(a, seen.angle_error)
     for j in range(a.joints):
         angle = seen.angle_error[j]
         if k < encoder.noise.shape[0]:

@@ -2,31 +2,35 @@
 
 An effect says where it acts by which hooks it has:
 
-===============  ==============================================================
-``reaction``     torque the drives must supply; linear in ``linear``, any function of ``shape``
-``derivative``   rate of the memory (``states`` of it) that ``reaction`` reads
-``spring``       torque between motor and link where a joint is not rigid
-``reading``      what a sensor makes of the truth
-``corrected``    the inverse of ``spring`` or ``reading`` for a measured motion
-===============  ==============================================================
+==================  ===========================================================
+``reaction``        torque the drives must supply; linear in ``linear``, any function of ``shape``
+``derivative``      rate of the memory (``states`` of it) that ``reaction`` reads
+``spring``          torque across a joint that is not rigid
+``reading``         what the encoders make of the angles
+``torque_reading``  what the torque sensors make of the torque
+``corrected``       the inverse of ``spring`` or ``reading`` for a measured motion
+==================  ===========================================================
 
-Identification and diagnosis use ``columns`` and ``corrected``; the forward dynamics uses the
-compiled hooks. ``columns`` evaluates the same kernels, so the two cannot disagree.
+Identification and diagnosis use ``columns``, ``observed`` and ``corrected``; the forward dynamics uses
+the compiled hooks. ``columns`` and ``observed`` evaluate the same kernels, so the two cannot disagree.
 """
 
 from abc import ABC
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from enum import StrEnum
+from enum import IntEnum, StrEnum
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.kernel import torque_along, torque_along_with_memory
+from pipelines.effects.kernel import read_along, torque_along, torque_along_with_memory
 from pipelines.mechanics.motion import Motion
 
 RUNS = ("exo_alone", "with_human")
+
+DIFFERENCE = 1e-6
+"""Relative step of numerical derivatives."""
 
 
 class Side(StrEnum):
@@ -36,6 +40,13 @@ class Side(StrEnum):
     STRUCTURE = "structure"
     SENSOR = "sensor"
     HUMAN = "human"
+
+
+class Parity(IntEnum):
+    """What becomes of a torque when the same path is run backwards in time."""
+
+    EVEN = 1
+    ODD = -1
 
 
 @dataclass(frozen=True)
@@ -50,6 +61,10 @@ class Parameter:
     """The range seen on exoskeletons; a search for a shape parameter spans it."""
     per_run: bool = False
     """True where each run has a value of its own, as an onset time has."""
+    default: float | None = None
+    """What it is where nobody says; a shape parameter that has one may be held in a fit."""
+    forms: tuple[float, ...] = ()
+    """Values that stand for the known members of a family of shapes; empty where the range is all there is."""
 
 
 @dataclass(frozen=True)
@@ -72,55 +87,100 @@ class Effect(ABC):
     """How to make sure of it on the rig."""
     joints: ClassVar[tuple[str, ...] | None] = None
     """The only joints that can have it; None for any."""
+    absorbed: ClassVar[Mapping[str, str]] = {}
+    """Joints at which another parameter takes it up whole, and which."""
     whole_leg: ClassVar[bool] = False
     acts_in: ClassVar[tuple[str, ...]] = RUNS
     linear: ClassVar[tuple[Parameter, ...]] = ()
+    """Amplitudes, as a fit solves for them."""
     shape: ClassVar[tuple[Parameter, ...]] = ()
+    """What the torque is a nonlinear function of; those with a default come last."""
+    reported: ClassVar[tuple[Parameter, ...] | None] = None
+    """What files say of it where that is not what a fit solves for, as amplitude and phase of sine and cosine."""
 
+    parity: ClassVar[Parity | None] = None
+    """Of the torque in velocity; None where it has none, or has a memory."""
+    dissipative: ClassVar[bool] = False
+    """True where positive amplitudes never feed energy into the joint."""
     states: ClassVar[int] = 0
     inertial: ClassVar[bool] = False
     """True where ``reaction`` depends on acceleration: it then adds to the mass matrix."""
     motor_inertia: ClassVar[float] = 0.0
     """kg·m² on the motor's side of ``spring``."""
+    at_cuff: ClassVar[bool] = False
+    """True where ``spring`` stands between machine and limb, not between motor and link."""
+    reading_states: ClassVar[int] = 0
     reaction: ClassVar[Callable[..., Any] | None] = None
     derivative: ClassVar[Callable[..., Any] | None] = None
     spring: ClassVar[Callable[..., Any] | None] = None
     reading: ClassVar[Callable[..., Any] | None] = None
+    torque_reading: ClassVar[Callable[..., Any] | None] = None
+
+    @property
+    def fitted(self) -> tuple[Parameter, ...]:
+        """Linear parameters, then shape parameters: the order of a term's values everywhere."""
+        return self.linear + self.shape
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Linear parameters, then shape parameters: the order of ``values`` everywhere."""
-        return self.linear + self.shape
+        """What files and reports call its parameters, CONTRACTS' names among them."""
+        return self.fitted if self.reported is None else self.reported
 
     @property
     def label(self) -> str:
         """``effect@joint``, as tables of candidates name it."""
         return f"{self.name}@{self.joint}" if self.joint else self.name
 
+    @property
+    def on_limb(self) -> bool:
+        """Tell whether it sits on the wearer's side of the cuffs."""
+        return self.side is Side.HUMAN or self.run == "with_human"
+
     def explains(self, motion: Motion) -> bool:
         """Tell whether the effect is there in this kind of run."""
         return motion.run in self.acts_in and self.run in (None, motion.run)
 
+    def physical(self, values: NDArray) -> NDArray:
+        """Return the values of ``parameters`` for those of ``fitted``."""
+        return np.asarray(values, dtype=float)
+
+    def values_from(self, physical: NDArray) -> NDArray:
+        """Return the values of ``fitted`` for those of ``parameters``: the inverse of ``physical``."""
+        return np.asarray(physical, dtype=float)
+
+    def jacobian(self, values: NDArray) -> NDArray:
+        """Return how ``physical`` changes with ``values``, (parameters, fitted), to carry intervals over."""
+        values = np.asarray(values, dtype=float)
+        steps = np.diag(DIFFERENCE * np.maximum(np.abs(values), DIFFERENCE))
+        ahead = np.array([self.physical(values + step) for step in steps])
+        behind = np.array([self.physical(values - step) for step in steps])
+        return ((ahead - behind) / (2.0 * np.diag(steps)[:, np.newaxis])).T
+
+    def completed(self, values: NDArray | tuple[float, ...]) -> NDArray:
+        """Return values of ``fitted`` with the defaults of those that are left out at the end."""
+        rest = [p.default for p in self.fitted[len(values) :]]
+        return np.append(np.asarray(values, dtype=float), [d for d in rest if d is not None])
+
     def columns(self, motion: Motion, shape: NDArray | tuple[float, ...] = ()) -> NDArray:
         """Torque per unit of each linear parameter, (n, J, p) N·m per unit.
 
-        ``shape`` holds the nonlinear parameters, in the order of ``self.shape``.
+        ``shape`` holds the nonlinear parameters of this run, in the order of ``self.shape``.
         """
         columns = np.zeros((*motion.q.shape, len(self.linear)))
-        if self.reaction is None or not self.explains(motion):
-            return columns
-        for i in range(len(self.linear)):
-            unit = np.zeros(len(self.linear))
-            unit[i] = 1.0
+        for i, unit in enumerate(np.eye(len(self.linear))):
             columns[:, :, i] = self.torque(motion, np.append(unit, shape))
         return columns
 
     def torque(self, motion: Motion, values: NDArray) -> NDArray:
-        """Torque the drives must supply for this effect, (n, J) N·m."""
-        if self.reaction is None or not self.explains(motion):
+        """Torque that the effect adds to what is measured, (n, J) N·m."""
+        values = self.completed(values)
+        if not self.explains(motion):
+            return np.zeros(motion.q.shape)
+        if self.torque_reading is not None:
+            return self._read(np.zeros((*motion.q.shape, 1)), motion, values)[:, :, 0]
+        if self.reaction is None:
             return np.zeros(motion.q.shape)
         joint = motion.joint_index(self.joint) if self.joint else -1
-        values = np.ascontiguousarray(values, dtype=float)
         geometry = motion.geometry.array()
         of_motion = (motion.time, motion.q, motion.dq, motion.ddq, motion.transmitted[0])
         arrays = [np.ascontiguousarray(array) for array in of_motion]
@@ -132,6 +192,29 @@ class Effect(ABC):
                 self.reaction, self.derivative, self.states, values, joint, *(a[stretch] for a in arrays), geometry
             )
         return out
+
+    def observed(self, columns: NDArray, motion: Motion, shape: NDArray | tuple[float, ...] = ()) -> NDArray:
+        """Return what the torque sensors make of torques that the drives deliver, both (n, J, p).
+
+        What they add of their own is in ``columns``.
+        """
+        if self.torque_reading is None or not self.shape or not self.explains(motion):
+            return columns
+        return self._read(columns, motion, self.completed(np.append(np.zeros(len(self.linear)), shape)))
+
+    def _read(self, torque: NDArray, motion: Motion, values: NDArray) -> NDArray:
+        out = np.empty_like(torque)
+        joint = motion.joint_index(self.joint) if self.joint else -1
+        for stretch in motion.segments():
+            time = np.ascontiguousarray(motion.time[stretch])
+            read_along(
+                self.torque_reading, self.reading_states, values, joint, time, torque[stretch], out[stretch]
+            )  # fmt: skip
+        return out
+
+    def delivered(self, torque: NDArray, motion: Motion, values: NDArray) -> NDArray:
+        """Return what the drives deliver where their sensors say ``torque`` (n, J): the inverse of the reading."""
+        return torque - self.torque(motion, values) if self.torque_reading is not None else torque
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
         """Return the motion as it would have been measured without this effect in the sensor or transmission."""

@@ -21,7 +21,7 @@ class EncoderOffset(Effect):
     shape = (Parameter("offset", "rad", "measured less true angle", "q_o", (-0.15, 0.15)),)
 
     @reading
-    def reading(angle, torque, values, joint):
+    def reading(angle, values, joint):
         """Shift the angle."""
         angle[joint] += values[0]
 

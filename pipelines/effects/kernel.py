@@ -49,8 +49,13 @@ DERIVATIVE = void(INSTANT, _vector, _vector, _vector, int64, _vector)
 SPRING = float64(float64, float64, _vector)
 """spring(twist, twist_rate, values): torque that a transmission passes from motor to link, N·m."""
 
-READING = void(_vector, _vector, _vector, int64)
-"""reading(angle, torque, values, joint): turn what is into what a sensor says, in place."""
+READING = void(_vector, _vector, int64)
+"""reading(angle, values, joint): turn true angles into what the encoders say, in place."""
+
+TORQUE_READING = void(float64, _vector, _vector, int64, _vector)
+"""torque_reading(t, torque, values, joint, state): turn what the drives deliver into what their sensors say, in place.
+
+Called once a sample, in order; ``state`` is the sensor's memory, all zero before the first."""
 
 
 def reaction(function):
@@ -69,8 +74,13 @@ def spring(function):
 
 
 def reading(function):
-    """Compile what a sensor makes of the truth."""
+    """Compile what an encoder makes of the angle."""
     return staticmethod(njit(READING, cache=True)(function))
+
+
+def torque_reading(function):
+    """Compile what a torque sensor makes of the torque."""
+    return staticmethod(njit(TORQUE_READING, cache=True)(function))
 
 
 def address(kernel) -> int:
@@ -103,6 +113,7 @@ reaction_at = _kernel_at(REACTION)
 derivative_at = _kernel_at(DERIVATIVE)
 spring_at = _kernel_at(SPRING)
 reading_at = _kernel_at(READING)
+torque_reading_at = _kernel_at(TORQUE_READING)
 
 _table = float64[:, ::1]
 _MOTION = (_vector, _table, _table, _table, _table, _vector)  # time, q, dq, ddq, load, geometry
@@ -111,6 +122,10 @@ _ALONG = _table(types.FunctionType(REACTION), _vector, int64, *_MOTION)
 _ALONG_WITH_MEMORY = _table(
     types.FunctionType(REACTION), types.FunctionType(DERIVATIVE), int64, _vector, int64, *_MOTION
 )
+_READ_ALONG = void(
+    types.FunctionType(TORQUE_READING), int64, _vector, int64, _vector, types.Array(float64, 3, "A"),
+    types.Array(float64, 3, "A"),
+)  # fmt: skip
 
 MEMORY_SUBSTEPS = 8
 """Steps per sample along a measured motion: a presliding state turns over within a few milliseconds."""
@@ -162,3 +177,17 @@ def torque_along_with_memory(kernel, rate, states, values, joint, time, q, dq, d
             rate(middle, state + 0.5 * h * slope, values, geometry, joint, slope)
             state += h * slope
     return out
+
+
+@njit(_READ_ALONG, cache=True)
+def read_along(kernel, states, values, joint, time, torque, out):
+    """Write what a sensor makes of p torques (n, J, p) of one unbroken stretch into ``out`` (n, J, p), N·m."""
+    at_once = np.empty(torque.shape[1])
+    for i in range(torque.shape[2]):
+        state = np.zeros(states)
+        for k in range(torque.shape[0]):
+            for j in range(at_once.shape[0]):
+                at_once[j] = torque[k, j, i]
+            kernel(time[k], at_once, values, joint, state)
+            for j in range(at_once.shape[0]):
+                out[k, j, i] = at_once[j]

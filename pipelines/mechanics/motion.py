@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pipelines.contracts.joints import joints_of
 from pipelines.contracts.table import Table
-from pipelines.mechanics.leg import Geometry
+from pipelines.mechanics.leg import Geometry, cuff_torque
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 
 CUFFS = tuple(f"{segment}_{side}" for segment in ("thigh", "shank") for side in ("front", "back"))
@@ -73,22 +73,40 @@ class Motion:
     def transmitted(self) -> tuple[NDArray, NDArray, NDArray]:
         """Torque passed on to the links, its first and its second derivative, (n, J) each.
 
-        The estimate where there is one; else the measured torque, which also holds the drive's own
-        friction. Smoothed like the angle: its derivatives would otherwise be those of the noise.
+        The estimate where there is one; else the measured torque, which also holds the drive's own friction.
         """
-        load = self.torque if self.load is None else self.load
-        smooth, rate, curvature = load.copy(), np.zeros_like(load), np.zeros_like(load)
+        return self._smoothed(self.torque if self.load is None else self.load)
+
+    @cached_property
+    def on_limb(self) -> tuple[NDArray, NDArray, NDArray]:
+        """Torque of the machine on the wearer's limb, its first and its second derivative, (n, J) each.
+
+        From the cuff forces where they were read; else what is passed on to the links.
+        """
+        if self.forces is None or self.geometry.thigh_cuff_distance_m is None:
+            return self.transmitted
+        thigh, shank = self.forces[:, :2].sum(axis=1), self.forces[:, 2:].sum(axis=1)
+        return self._smoothed(cuff_torque(thigh, shank, self.q, self.geometry))
+
+    def _smoothed(self, torque: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        """Smooth like the angle, and differentiate: the derivatives would otherwise be those of the noise."""
+        smooth, rate, curvature = torque.copy(), np.zeros_like(torque), np.zeros_like(torque)
         for stretch in self.segments():
             if stretch.stop - stretch.start < shortest(self.sample_rate_hz, self.cutoff_hz):
                 continue
-            smooth[stretch] = low_pass(load[stretch], self.sample_rate_hz, self.cutoff_hz)
+            smooth[stretch] = low_pass(torque[stretch], self.sample_rate_hz, self.cutoff_hz)
             rate[stretch] = derivative(smooth[stretch], self.sample_rate_hz, 1)
             curvature[stretch] = derivative(smooth[stretch], self.sample_rate_hz, 2)
         return smooth, rate, curvature
 
     def with_state(self, q: NDArray, dq: NDArray, ddq: NDArray) -> "Motion":
         """Return the same run with other kinematics, as a corrected measurement has."""
-        return replace(self, q=q, dq=dq, ddq=ddq)
+        made = replace(self, q=q, dq=dq, ddq=ddq)
+        # The torques are the same, and smoothing them costs more than the correction did.
+        made.__dict__.update(
+            {name: self.__dict__[name] for name in ("transmitted", "on_limb") if name in self.__dict__}
+        )
+        return made
 
 
 def geometry_of(metadata: dict[str, Any], default: Geometry | None = None) -> Geometry:

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 from pipelines.dynamics.assembly import Assembly, assemble, in_order
 from pipelines.dynamics.forward import DQ, Q, stages, workspace
 from pipelines.dynamics.pd_loop import advance, loop_at_rest, make_drives
-from pipelines.effects import Side
 from pipelines.effects.friction import Friction
 from pipelines.effects.kernel import Instant, reaction_at
 from pipelines.effects.rigid_body import RigidBody
-from pipelines.errors import SettingsError
+from pipelines.errors import InputError, SettingsError
 from pipelines.mechanics.leg import Geometry, unrealizable
-from pipelines.model import Model, Term, effect_named
+from pipelines.model import Model, Term, effect_named, term_from
 from pipelines.rig.cuffs import cuff_forces
 from pipelines.settings.plant import PlantEffect, PlantSettings
 
@@ -83,9 +82,7 @@ class Plant:
         )
         self.model = _model(settings, self.geometry, effects).for_run(run)
         self._assembly = assemble(self.model, self.geometry, JOINTS)
-        self._of_human = np.array(
-            [term.effect.side is Side.HUMAN or term.effect.run == "with_human" for term in in_order(self.model)]
-        )
+        self._of_human = np.array([term.effect.on_limb for term in in_order(self.model)])
         self._drives = make_drives(
             np.array(settings.kp_nm_rad), np.array(settings.kd_nm_s_rad), np.array(settings.limit_nm),
             np.array(settings.counts_per_turn), settings.drive_rate_hz, self.sample_rate_hz,
@@ -158,17 +155,14 @@ class Plant:
 
 def term_of(effect: PlantEffect, source: str) -> Term:
     """Return a setting as a term of the model; ``source`` starts the message of a refusal."""
-    made = effect_named(effect.effect)(joint=effect.joint)
-    names = [parameter.name for parameter in made.parameters]
-    if set(names) != set(effect.values):
-        raise SettingsError(
-            f"{source}: {made.label} has values {', '.join(effect.values) or 'none'}, expected "
-            f"{', '.join(names)}; correct them"
-        )
-    if (effect.joint is None) != made.whole_leg:
-        wanted = "no joint: it acts on the whole leg" if made.whole_leg else "a joint"
-        raise SettingsError(f"{source}: {made.name} has joint {effect.joint}, expected {wanted}")
-    return Term(made, np.array([effect.values[name] for name in names]))
+    try:
+        made = effect_named(effect.effect)(joint=effect.joint)
+        if (effect.joint is None) != made.whole_leg:
+            wanted = "no joint: it acts on the whole leg" if made.whole_leg else "a joint"
+            raise SettingsError(f"{made.name} has joint {effect.joint}, expected {wanted}")
+        return term_from(made, effect.values)
+    except InputError as error:
+        raise SettingsError(f"{source}: {error}") from None
 
 
 def _model(settings: PlantSettings, geometry: Geometry, effects: Iterable[Term]) -> Model:
