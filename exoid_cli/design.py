@@ -89,13 +89,13 @@ def _show(file: str, found: "Quality") -> None:
     errors = [(name, f"{value:.2g}", found.units[name]) for name, value in found.standard_errors.items()]
     console.table(("parameter", "expected standard error", "unit"), errors, numbers="expected standard error")
     console.say("")
-    headings = ("joint", "quantity", "unit", "lowest", "highest", "allowed from", "to", "margin", "")
+    headings = ("joint", "quantity", "unit", "lowest", "highest", "at least", "at most", "margin", "")
     rows = [
         (m.joint, m.quantity, m.unit, *(f"{x:.4f}" for x in (m.lowest, m.highest, m.low, m.high)), f"{m.margin:.4f}",
-         "" if m.kept else "OUTSIDE")
+         "" if m.kept else "OUT")
         for m in found.margins
     ]  # fmt: skip
-    console.table(headings, rows, numbers="lowest, highest, allowed from, to, margin")
+    console.table(headings, rows, numbers="lowest, highest, at least, at most, margin")
     outside = [str(margin) for margin in found.margins if not margin.kept]
     if outside:
         console.warn(f"{file}: outside its limits, and `exoid acquire` will refuse it: {'; '.join(outside)}")

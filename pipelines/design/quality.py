@@ -83,7 +83,7 @@ def regressor(trajectory: Trajectory, geometry: Geometry, time: NDArray) -> NDAr
         time, q, dq, ddq, torque=nothing, load=nothing, segment=np.zeros(count, np.int64), valid=np.ones(count, bool),
         geometry=geometry,
     )  # fmt: skip
-    return _model().regressor(motion)
+    return paper_model().regressor(motion)
 
 
 def standard_errors(trajectory: Trajectory, noise: NoiseSettings, geometry: Geometry, sample_rate_hz: float) -> NDArray:
@@ -107,7 +107,8 @@ def standard_errors(trajectory: Trajectory, noise: NoiseSettings, geometry: Geom
     return np.sqrt(np.diag(inverse @ (information + cross + cross.T) @ inverse))
 
 
-def _model() -> Model:
+def paper_model() -> Model:
+    """Return the model an excitation is for: the rigid body, Coulomb and viscous friction of both joints."""
     effects = baseline(JOINTS, ("exo_alone",))
     return Model(tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects))
 
@@ -116,7 +117,7 @@ def _parameters() -> dict[str, str]:
     """Return the unit of each column's parameter by its name: ``X1``, ``hip_coulomb``."""
     return {
         f"{effect.joint}_{parameter.name}" if effect.joint else parameter.name: parameter.unit
-        for effect, parameter in _model().linear_parameters
+        for effect, parameter in paper_model().linear_parameters
     }
 
 

@@ -51,7 +51,7 @@ def search(settings: DesignSettings, geometry: Geometry, report: Report = lambda
     rng = np.random.default_rng(settings.seed)
     coarse = _problem(settings, geometry, COARSE_SAMPLES, COARSE_SAMPLES_PER_HARMONIC)
     fine = _problem(settings, geometry, FINE_SAMPLES, FINE_SAMPLES_PER_HARMONIC)
-    spread = _spread(fine)
+    spread = spread_of(fine)
 
     def note(cost: float) -> str:
         return f"{settings.criterion} {-cost if settings.criterion == 'log_det' else cost:.4g}"
@@ -86,12 +86,12 @@ def _problem(settings: DesignSettings, geometry: Geometry, samples: int, samples
         geometry=geometry,
         criterion=settings.criterion,
         theta0=None if settings.theta0_rad == "free" else np.array(settings.theta0_rad),
-        basis=_basis(settings.harmonics, settings.rest_to_rest),
+        basis=basis_of(settings.harmonics, settings.rest_to_rest),
         samples=max(samples, samples_per_harmonic * settings.harmonics),
     )
 
 
-def _basis(harmonics: int, rest_to_rest: bool) -> NDArray:
+def basis_of(harmonics: int, rest_to_rest: bool) -> NDArray:
     """Return what coefficients are combinations of: sine (0) and cosine (1), (2, n, free).
 
     At t = 0 and after each period the velocity is w sum k a_k and the acceleration -w² sum k² b_k; at rest
@@ -103,7 +103,7 @@ def _basis(harmonics: int, rest_to_rest: bool) -> NDArray:
     return np.array([null_space(k[np.newaxis]), null_space(k[np.newaxis] ** 2)])
 
 
-def _spread(problem: Problem) -> NDArray:
+def spread_of(problem: Problem) -> NDArray:
     """Return how far a single coordinate may go before some bound stops it, (D,)."""
     half = 0.5 * (problem.bounds[:, :, 1] - problem.bounds[:, :, 0])
     powers = problem.speeds ** np.arange(3)[:, np.newaxis]

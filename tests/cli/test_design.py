@@ -1,0 +1,76 @@
+"""``exoid design`` on the command line: what it prints, what it writes, what it refuses."""
+
+import json
+
+import pytest
+
+from exoid_cli.app import run
+from pipelines.contracts import TRAJECTORY
+from pipelines.settings import datasets
+
+PUBLISHED = str(datasets() / "paper" / "trajectory.toml")
+QUICK = "[design]\nharmonics = 2\nparticles = 16\niterations = 25\nseed = 4\n"
+
+
+@pytest.fixture
+def config(tmp_path):
+    path = tmp_path / "exoid.toml"
+    path.write_text(QUICK)
+    return str(path)
+
+
+def test_the_published_excitation_is_judged_by_its_three_condition_numbers_and_its_margins(capsys):
+    assert run(["design", "--evaluate", PUBLISHED]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    for words in (["8", "47.3"], ["4", "22.6"], ["scaled", "5.8"], ["log det", "-3.72"]):
+        assert any(all(word in line for word in words) for line in lines), words
+    margins = [line.split() for line in lines if line.startswith(("hip ", "knee "))]
+    assert [row[:2] for row in margins] == [
+        [joint, quantity] for joint in ("hip", "knee") for quantity in ("angle", "velocity", "acceleration")
+    ]
+    assert [row[-1] for row in margins] == ["0.0000", "0.9869", "4.3410", "0.0001", "1.0338", "4.5751"]
+
+
+def test_what_lies_outside_the_bounds_is_marked(tmp_path, capsys):
+    fast = tmp_path / "fast.toml"
+    fast.write_text(
+        'unit = "rad"\nomega_rad_s = 6.0\ntheta0_rad = [0.6, -0.9]\n'
+        "a = [[0.4, 0.0], [0.1, 0.0]]\nb = [[0.0, 0.0], [0.0, 0.0]]\n"
+    )
+    assert run(["design", "--evaluate", str(fast)]) == 0
+    captured = capsys.readouterr()
+    marked = [line.split()[:2] for line in captured.out.splitlines() if line.endswith("OUT")]
+    assert marked == [["hip", "velocity"], ["hip", "acceleration"]]
+    assert "hip velocity goes from -2.4 to 2.4 rad/s, allowed is -1.6449 to 1.6449" in captured.err
+
+
+def test_a_design_is_written_with_what_it_is_worth(tmp_path, config, capsys):
+    out = tmp_path / "t.parquet"
+    assert run(["design", "--config", config, "-o", str(out), "--json"]) == 0
+    told, table = json.loads(capsys.readouterr().out), TRAJECTORY.read(out)
+    assert told["criterion_value"] == table.metadata["criterion_value"] == table.metadata["log_det"]
+    assert table.metadata["seed"] == 4
+    assert table.metadata["config"]["design"]["harmonics"] == 2
+    assert run(["design", "--evaluate", str(out), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["log_det"] == pytest.approx(told["log_det"])
+
+
+def test_options_win_over_the_file(tmp_path, config):
+    out = tmp_path / "t.parquet"
+    options = ["--seed", "9", "--harmonics", "3", "--criterion", "condition"]
+    assert run(["design", "--config", config, "-o", str(out), *options]) == 0
+    metadata = TRAJECTORY.read(out).metadata
+    assert (metadata["seed"], metadata["criterion"], len(metadata["a"][0])) == (9, "condition", 3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ([], "exoid: give either --output FILE, to design an excitation, or --evaluate FILE, to judge one"),
+        (["--evaluate", "no.toml"], "exoid: no.toml: no such file; check the name, or make one with `exoid design`"),
+        (["--evaluate", "no.parquet"], "exoid: no.parquet: no such file; check the name, or make it first"),
+    ],
+)
+def test_a_wrong_call_is_one_line_and_code_2(arguments, told, capsys):
+    assert run(["design", *arguments]) == 2
+    assert capsys.readouterr().err.strip() == told
