@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipelines.dynamics.assembly import Assembly
-from pipelines.dynamics.forward import DQ, THETA, Q, memory_size, resting_state, stages, step, workspace
+from pipelines.dynamics.forward import DQ, HOT, THETA, Q, memory_size, resting_state, stages, step, workspace
 from pipelines.effects.kernel import reading_at, torque_reading_at
 
 SUBSTEPS = 6
@@ -95,7 +95,7 @@ def loop_at_rest(a: Assembly, q: NDArray) -> LoopState:
     )  # fmt: skip
 
 
-@njit(cache=True)
+@njit(**HOT)
 def read_encoders(a, angle):
     """Turn true motor angles into what the encoders say, in place."""
     for i in range(a.bounds[4]):

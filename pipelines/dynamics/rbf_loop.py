@@ -85,6 +85,7 @@ class _Seen(NamedTuple):
     speed: np.ndarray
     angle_error: np.ndarray
     speed_error: np.ndarray
+    reading: np.ndarray
 
 
 @njit(**HOT)
@@ -114,7 +115,7 @@ def _control(c, seen, state, wanted, weights, activation, torque, network, weigh
 def _step(a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturbance, torque, network, drive):
     """Advance leg and weights by ``h``; ``wanted`` (3, 3, J) and ``disturbance`` (3, J) at begin, middle and end.
 
-    ``torque`` and ``network`` (J,) are left as they were at the begin.
+    Torque and network output at the begin are written to ``torque`` and ``network`` (J,); ``drive`` is scratch.
     """
     _control(c, seen, state, wanted[0], net.weights, net.activation, torque, network, net.rates[0])
     for j in range(a.joints):
@@ -128,7 +129,7 @@ def _step(a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturbance,
         for j in range(a.joints):
             for k in range(net.weights.shape[1]):
                 net.stage[j, k] = net.weights[j, k] + reach * net.rates[i - 1, j, k]
-        _control(c, seen, s.state, wanted[half_steps], net.stage, net.activation, drive[0], drive[1], net.rates[i])
+        _control(c, seen, s.state, wanted[half_steps], net.stage, net.activation, drive[0], drive[3], net.rates[i])
         for j in range(a.joints):
             drive[0, j] -= disturbance[half_steps, j]
         accelerations(a, w, t + reach, s.state, s.memory, w.direction, load, drive[0], s.rates[i])
@@ -139,23 +140,52 @@ def _step(a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturbance,
             net.weights[j, k] += h / 6.0 * weighted(net.rates[:, j, k])
 
 
-@njit(cache=True)
+@njit(**HOT)
 def _look(a, encoder, seen, state, k, period):
     """Read the encoders at sample ``k``: how far angle and speed are off what they are."""
     for j in range(a.joints):
-        seen.angle_error[j] = state[THETA, j]
-    read_encoders(a, seen.angle_error)
+        seen.reading[j] = state[THETA, j]
+    read_encoders(a, seen.reading)
     for j in range(a.joints):
-        angle = seen.angle_error[j]
-        if k < encoder.noise.shape[0]:
+        angle = seen.reading[j]
+        if encoder.noise.shape[0] > 0:
             angle += encoder.noise[k, j]
             if encoder.count > 0.0:
                 angle = np.floor(angle / encoder.count + 0.5) * encoder.count
             if k > 0:
                 seen.speed[j] += encoder.speed_share * ((angle - seen.angle[j]) / period - seen.speed[j])
-            seen.angle[j] = angle
             seen.speed_error[j] = seen.speed[j] - state[DTHETA, j]
+        seen.angle[j] = angle
         seen.angle_error[j] = angle - state[THETA, j]
+
+
+@njit(**HOT)
+def _carry_on(
+    a, c, encoder, w, s, net, seen, state, memory, load, reference, disturbance, period, substeps, drive, out
+):
+    """Run sample after sample into ``out`` (n, 4, J); return how many until a joint ran away."""
+    h = period / substeps
+    last = out.shape[0] - 1
+    for k in range(out.shape[0]):
+        _look(a, encoder, seen, state, k, period)
+        for j in range(a.joints):
+            out[k, 0, j], out[k, 1, j] = state[THETA, j], state[DTHETA, j]
+            if not abs(state[THETA, j]) < TURN:
+                return k
+        torque, network = out[k, 2], out[k, 3]
+        at = 2 * k * substeps
+        if k == last:
+            _control(c, seen, state, reference[at], net.weights, net.activation, torque, network, net.rates[0])
+        for i in range(substeps if k < last else 0):
+            now = slice(at + 2 * i, at + 2 * i + 3)
+            begin = k * period + i * h
+            if i > 0:
+                torque, network = drive[1], drive[2]
+            _step(
+                a, c, w, s, net, seen, begin, h, state, memory, load, reference[now], disturbance[now],
+                torque, network, drive,
+            )  # fmt: skip
+    return last + 1
 
 
 @njit(cache=True)
@@ -163,27 +193,11 @@ def _run(a, c, encoder, state, memory, reference, disturbance, period, substeps,
     joints, m = a.joints, c.nodes.shape[0]
     w, s = workspace(joints), stages(joints, memory.shape[0])
     net = _Network(np.zeros((joints, m)), np.zeros((4, joints, m)), np.zeros((joints, m)), np.zeros(m))
-    seen = _Seen(np.zeros(joints), np.zeros(joints), np.zeros(joints), np.zeros(joints))
-    load, drive, torque, network = np.zeros(joints), np.zeros((2, joints)), np.zeros(joints), np.zeros(joints)
-    h = period / substeps
-    for k in range(out.shape[0]):
-        _look(a, encoder, seen, state, k, period)
-        out[k, 0], out[k, 1] = state[THETA], state[DTHETA]
-        # The last sample's step is needed for its torque alone; its references end there.
-        for i in range(substeps if k + 1 < out.shape[0] else 0):
-            at = 2 * (k * substeps + i)
-            begin = k * period + i * h
-            wanted, push = reference[at : at + 3], disturbance[at : at + 3]
-            _step(a, c, w, s, net, seen, begin, h, state, memory, load, wanted, push, torque, network, drive)
-            if i == 0:
-                out[k, 2], out[k, 3] = torque, network
-        for j in range(joints):
-            if not abs(state[THETA, j]) < TURN:
-                return k + 1
-    last = out.shape[0] - 1
-    _control(c, seen, state, reference[-1], net.weights, net.activation, torque, network, net.rates[0])
-    out[last, 2], out[last, 3] = torque, network
-    return last + 1
+    v = np.zeros((6, joints))
+    seen, load, drive = _Seen(v[0], v[1], v[2], v[3], v[4]), v[5], np.zeros((4, joints))
+    return _carry_on(
+        a, c, encoder, w, s, net, seen, state, memory, load, reference, disturbance, period, substeps, drive, out
+    )
 
 
 class RbfRun(NamedTuple):

@@ -1,4 +1,4 @@
-"""A model under recorded torque: from the recorded state, over short windows, how far does it stray?
+"""A model under recorded torque, from the recorded state, over short windows: how far it strays.
 
 The angle error over a window is what control feels of a wrong model; short windows keep the small
 errors of the recorded state from growing into large ones.
@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipelines.dynamics.assembly import Assembly, assemble
+from pipelines.dynamics.assembly import assemble
 from pipelines.dynamics.forward import DTHETA, HOT, THETA, memory_rates, memory_size, stages, step, workspace
 from pipelines.errors import InputError
 from pipelines.mechanics.motion import Motion
@@ -66,21 +66,19 @@ def replay(model: Model, motion: Motion, window_s: float = WINDOW_S, every_s: fl
             f"{motion.file or 'the motion'}: no stretch of valid samples lasts the {window_s:g} s of a window; "
             "replay a longer recording without gaps"
         )
-    motor, link, a = model.sensed(motion), model.corrected(motion), _assembly(model, motion)
+    model = model.for_run(motion.run)
+    a = assemble(model, motion.geometry, motion.joints)
+    motor, link = model.sensed(motion), model.corrected(motion)
     states = np.ascontiguousarray(np.stack([link.q, link.dq, motor.q, motor.dq], axis=1))
     load = np.ascontiguousarray(motor.transmitted[0])
     memory = np.zeros((len(motion), memory_size(a)))
     for stretch in motion.segments():
         _remember(a, motion.time[stretch], states[stretch], load[stretch], memory[stretch])
-    torque = np.ascontiguousarray(motor.torque)
+    torque = np.ascontiguousarray(model.delivered(motor))
     parts = int(np.ceil(0.5 / (motion.sample_rate_hz * LONGEST_STEP_S)))
     out = _windows(a, motion.time, states, load, memory, torque, first, length, parts)
     samples = first[:, np.newaxis] + np.arange(length + 1)
     return ReplayResult(first, out[:, :, 0], out[:, :, 1], motor.q[samples] - out[:, :, 0])
-
-
-def _assembly(model: Model, motion: Motion) -> Assembly:
-    return assemble(model.for_run(motion.run), motion.geometry, motion.joints)
 
 
 def _stretches(motion: Motion) -> Iterator[slice]:

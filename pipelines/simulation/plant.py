@@ -31,7 +31,10 @@ class Plant:
         effects = [
             {
                 "effect": term.effect.label,
-                **{p.name: float(v) for p, v in zip(term.effect.parameters, term.values, strict=True)},
+                **{
+                    p.name: float(v)
+                    for p, v in zip(term.effect.parameters, term.effect.physical(term.values), strict=True)
+                },
             }
             for term in self.model
         ]
