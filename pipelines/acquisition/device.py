@@ -1,6 +1,7 @@
 """A Modbus device: one connection, one request at a time, and every way to fail turned into one sentence."""
 
-from collections.abc import Awaitable, Iterable, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Sequence
+from typing import Any
 
 from pymodbus.client import AsyncModbusTcpClient
 from pymodbus.constants import ExcCodes
@@ -57,29 +58,33 @@ class Device:
 
     async def read(self, address: int, count: int) -> list[int]:
         """Return words read by FC03."""
-        request = self._client.read_holding_registers(address, count=count, device_id=self._unit)
-        return await self._answer(request, f"reading registers {address} to {address + count - 1}", count)
+        what = f"reading registers {address} to {address + count - 1}"
+        return await self._ask(what, count, self._client.read_holding_registers, address=address, count=count)
 
     async def write(self, block: Block, words: Sequence[int]) -> None:
         """Write a block by FC16."""
-        request = self._client.write_registers(block.address, list(words), device_id=self._unit)
-        await self._answer(request, f"writing registers {_range(block)}", None)
+        what = f"writing registers {_range(block)}"
+        await self._ask(what, None, self._client.write_registers, address=block.address, values=list(words))
 
     async def exchange(self, write: Block, words: Sequence[int], read: Block) -> list[int]:
         """Write one block and read another in one FC23 exchange."""
-        request = self._client.readwrite_registers(
+        what = f"an exchange (writing registers {_range(write)}, reading {_range(read)})"
+        return await self._ask(
+            what,
+            read.count,
+            self._client.readwrite_registers,
             read_address=read.address,
             read_count=read.count,
             write_address=write.address,
             values=list(words),
-            device_id=self._unit,
         )
-        what = f"an exchange (writing registers {_range(write)}, reading {_range(read)})"
-        return await self._answer(request, what, read.count)
 
-    async def _answer(self, request: Awaitable[ModbusPDU], what: str, count: int | None) -> list[int]:
+    async def _ask(
+        self, what: str, words: int | None, request: Callable[..., Awaitable[ModbusPDU]], **arguments: Any
+    ) -> list[int]:
+        """Send a request and return the words of the answer, ``words`` of them where it is to bring any."""
         try:
-            response = await request
+            response = await request(**arguments, device_id=self._unit)
         except (ModbusException, OSError) as error:
             raise DeviceError(
                 f"{self.label}: did not answer {what} within {self._timeout_s:g} s; check cable and power, "
@@ -93,9 +98,9 @@ class Device:
                 f"{self.label}: answered {what} with Modbus exception {int(code)}{meaning}; "
                 "compare the register map in the rig file with the device's manual"
             )
-        if count is not None and len(response.registers) != count:
+        if words is not None and len(response.registers) != words:
             raise DeviceError(
-                f"{self.label}: answered {what} with {len(response.registers)} registers, expected {count}; "
+                f"{self.label}: answered {what} with {len(response.registers)} registers, expected {words}; "
                 "compare the register map in the rig file with the device's manual"
             )
         return response.registers

@@ -1,0 +1,80 @@
+"""Recording on a virtual rig, over real Modbus TCP."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pipelines.mechanics.leg import cuff_torque
+from pipelines.mechanics.motion import geometry_of
+from pipelines.mechanics.trajectory import read_trajectory
+from pipelines.rig.plant import Plant
+from pipelines.rig.record import record as record_by_arrays
+from pipelines.settings.rig import load_rig
+
+
+def test_equal_seeds_give_equal_recordings(record):
+    first, second, other = (record(run="with_human", seed=seed).frame for seed in (1, 1, 2))
+    assert first.equals(second)
+    assert not np.array_equal(first["hip_torque_nm"], other["hip_torque_nm"])
+
+
+def test_every_sample_of_the_run_is_there_and_tells_its_time(record):
+    table = record(duration_s=2.0)
+    assert len(table.frame) == 400
+    assert np.diff(table.frame["sequence"]).tolist() == [1] * 399
+    assert_allclose(table.frame["time_s"], np.arange(400) / 200, atol=2e-6)
+    assert table.metadata["gaps"] == []
+    assert table.metadata["period_s"] == pytest.approx(1.0)
+
+
+def test_the_recorded_set_points_are_the_trajectory_at_each_samples_end(record, excitation):
+    frame = record(duration_s=1.0).frame
+    wanted = read_trajectory(excitation).at(frame["time_s"].to_numpy() + 0.5 / 200)[0]
+    assert_allclose(frame[["hip_reference_rad", "knee_reference_rad"]], wanted, atol=1e-6)
+
+
+def test_over_modbus_and_by_arrays_the_leg_moves_alike(record, excitation, rig_file):
+    silent = {"ripple_nm": "[0.0, 0.0]", "noise_n": 0.0, "settle_s": 1.0}
+    over_modbus = record(run="with_human", duration_s=2.0, **silent).frame
+    plant = Plant(load_rig(rig_file(**silent)).plant, "with_human")
+    by_arrays, _ = record_by_arrays(plant, read_trajectory(excitation), 2.0)
+    for quantity, tolerance in {"angle_rad": 1e-4, "reference_rad": 1e-6}.items():
+        for joint in ("hip", "knee"):
+            column = f"{joint}_{quantity}"
+            assert_allclose(over_modbus[column], by_arrays[column], atol=tolerance)
+    # Torque and force hang on single encoder counts and on set-points rounded to a microradian.
+    assert np.std(over_modbus["knee_torque_nm"] - by_arrays["knee_torque_nm"]) < 0.1
+    assert np.std(over_modbus["thigh_back_force_y_n"] - by_arrays["thigh_back_force_y_n"]) < 1.0
+
+
+def test_cuff_forces_are_read_with_the_human_only_and_belong_to_their_sample(record):
+    table = record(run="with_human", ripple_nm="[0.0, 0.0]", noise_n=0.0)
+    alone = record(run="exo_alone")
+    assert not [column for column in alone.frame if "force" in column]
+    forces = table.frame[[column for column in table.frame if "force" in column]].to_numpy().reshape(-1, 4, 3)
+    q = table.stacked("angle")
+    on_leg = cuff_torque(forces[:, :2].sum(axis=1), forces[:, 2:].sum(axis=1), q, geometry_of(table.metadata))
+    # What the drives deliver less what the leg takes is the exoskeleton's own: small, and in step with the motion.
+    own = table.stacked("torque") - on_leg
+    assert (own.std(axis=0) < 0.8 * table.stacked("torque").std(axis=0)).all()
+
+
+def test_a_sensor_read_every_fourth_cycle_leaves_the_rows_between_empty(record):
+    frame = record(run="with_human", replace={'map = "force"': 'map = "force"\nevery = 4'}).frame
+    read = frame["thigh_back_force_y_n"].notna()
+    assert read.sum() == 50
+    assert set(np.diff(np.flatnonzero(read))) == {4}
+
+
+def test_a_drive_that_tells_neither_speed_nor_set_point_is_recorded_all_the_same(record):
+    frame = record(drop=("velocity = {", "reference = { address = 110", "temperature = {")).frame
+    assert "hip_velocity_rad_s" not in frame
+    assert_allclose(frame["hip_reference_rad"], frame["hip_angle_rad"], atol=0.1)
+
+
+def test_real_time_samples_come_on_the_devices_clock(record):
+    table = record(shipped="real_time", duration_s=2.0, watchdog_s=0.5)
+    frame, missed = table.frame, sum(count for _, count in table.metadata["gaps"])
+    assert len(frame) + missed == 400
+    assert missed <= 40  # a busy computer may miss some, and then says so
+    assert_allclose(np.diff(frame["time_s"]), np.diff(frame["sequence"]) / 200, atol=2e-6)
