@@ -14,6 +14,9 @@ from pipelines.contracts.table import Table
 from pipelines.mechanics.leg import Geometry, cuff_torque
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 
+LOAD_CUTOFF_HZ = 5.0
+"""Of a load that is to be differentiated twice: noise at 25 Hz would weigh 600 times what it does at 1 Hz."""
+
 CUFFS = tuple(f"{segment}_{side}" for segment in ("thigh", "shank") for side in ("front", "back"))
 
 
@@ -89,12 +92,12 @@ class Motion:
         return self._smoothed(cuff_torque(thigh, shank, self.q, self.geometry))
 
     def _smoothed(self, torque: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-        """Smooth like the angle, and differentiate: the derivatives would otherwise be those of the noise."""
+        """Smooth and differentiate: the derivatives would otherwise be those of the noise."""
         smooth, rate, curvature = torque.copy(), np.zeros_like(torque), np.zeros_like(torque)
         for stretch in self.segments():
             if stretch.stop - stretch.start < shortest(self.sample_rate_hz, self.cutoff_hz):
                 continue
-            smooth[stretch] = low_pass(torque[stretch], self.sample_rate_hz, self.cutoff_hz)
+            smooth[stretch] = low_pass(torque[stretch], self.sample_rate_hz, min(self.cutoff_hz, LOAD_CUTOFF_HZ))
             rate[stretch] = derivative(smooth[stretch], self.sample_rate_hz, 1)
             curvature[stretch] = derivative(smooth[stretch], self.sample_rate_hz, 2)
         return smooth, rate, curvature
