@@ -36,6 +36,7 @@ class Journal:
         # Exclusive: a journal that is there already is all that is left of a run.
         self._file = open(path, "xb")  # noqa: SIM115, it stays open from the first sample to the last
         self._stream = pa.ipc.new_stream(self._file, self._schema)
+        self._file.flush()
 
     def append(self, row: Sequence[float]) -> None:
         """Add a sample."""
