@@ -67,8 +67,10 @@ class Journal:
         """Return the journal; it is closed at the end of the block."""
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self.close()
+        if kind and not self.rows:
+            self.path.unlink()  # nothing is lost, and nothing stands in the way of the next run
 
 
 def read_journal(path: Path) -> tuple[pd.DataFrame, dict[str, Any]]:

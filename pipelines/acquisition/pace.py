@@ -11,6 +11,8 @@ LEAN = 0.005
 """Share of a sample period by which a look at the counter comes earlier than one period after the last."""
 STEP_BACK = 0.1
 """Share of a sample period to wait after a look that came too early."""
+SLOW = 0.3
+"""Share of a sample period after which an answer is too old to build on."""
 URGENT = -15
 """Niceness while the devices' clock rules; only a privileged user is granted it."""
 
@@ -56,7 +58,10 @@ class PhaseLock:
         began = time.perf_counter()
         while True:
             await asyncio.sleep(max(0.0, self._due - time.perf_counter()))
+            asked = time.perf_counter()
             found, now = await self._counter(), time.perf_counter()
+            if now - asked > SLOW * self._period and now - began < self._patience_s:
+                continue  # by now another sample may be latched
             if found != last:
                 self._due += (found - last - LEAN) * self._period
                 return found

@@ -38,20 +38,30 @@ def experiment(tmp_path, excitation):
     return write
 
 
-def start(arguments):
-    command = [sys.executable, "-m", "exoid_cli.app", *map(str, arguments)]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+@pytest.fixture
+def start():
+    """Start exoid; whatever is still running at the test's end is killed."""
+    started = []
+
+    def run(arguments):
+        command = [sys.executable, "-m", "exoid_cli.app", *map(str, arguments)]
+        started.append(subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True))
+        return started[-1]
+
+    yield run
+    for process in started:
+        process.kill()
+        process.communicate()
 
 
-def wait_for_rows(output, rows):
-    """Wait until a run has written so many rows; returns the process ids of its rigs."""
-    until = time.monotonic() + 60
-    while time.monotonic() < until:
+def wait_for_rows(process, output, rows):
+    """Wait until a run has written so many rows."""
+    while process.poll() is None:
         time.sleep(0.1)
         path = journal_of(output)
         if path.exists() and path.stat().st_size and len(read_journal(path)[0]) >= rows:
             return
-    raise AssertionError("the run did not begin")
+    raise AssertionError(f"the run ended early: {process.stderr.read()}")
 
 
 def rigs_of(folder):
@@ -76,7 +86,7 @@ def ended(folder):
     return not rigs_of(folder)
 
 
-def test_the_default_rig_is_started_recorded_and_ended_and_tells_nothing_sealed(experiment, tmp_path):
+def test_the_default_rig_is_started_recorded_and_ended_and_tells_nothing_sealed(start, experiment, tmp_path):
     arguments, output = experiment("default", 2.0, run="with_human")
     process = start(arguments)
     out, err = process.communicate(timeout=120)
@@ -93,10 +103,10 @@ def test_the_default_rig_is_started_recorded_and_ended_and_tells_nothing_sealed(
 
 
 @pytest.mark.parametrize(("number", "name"), [(signal.SIGINT, "Ctrl-C"), (signal.SIGTERM, "SIGTERM")])
-def test_a_signal_stops_the_leg_keeps_the_record_and_says_so_in_one_line(experiment, tmp_path, number, name):
+def test_a_signal_stops_the_leg_keeps_the_record_and_says_so_in_one_line(start, experiment, tmp_path, number, name):
     arguments, output = experiment("plain", 4000.0)
     process = start(arguments)
-    wait_for_rows(output, 100)
+    wait_for_rows(process, output, 100)
     process.send_signal(number)
     _, err = process.communicate(timeout=60)
     kept = output.with_name("one.aborted.parquet")
@@ -110,10 +120,10 @@ def test_a_signal_stops_the_leg_keeps_the_record_and_says_so_in_one_line(experim
     assert ended(tmp_path)
 
 
-def test_a_killed_run_loses_no_more_than_half_a_second(experiment, tmp_path):
-    arguments, output = experiment("real_time", 60.0, torque_nm=1000.0, watchdog_s=2.0)
+def test_a_killed_run_loses_no_more_than_half_a_second(start, experiment, tmp_path):
+    arguments, output = experiment("real_time", 60.0, torque_nm=1000.0, speed_rad_s=50.0, watchdog_s=2.0)
     process = start(arguments)
-    wait_for_rows(output, 1)
+    wait_for_rows(process, output, 1)
     began = time.monotonic()
     time.sleep(2.0)
     process.kill()
@@ -131,7 +141,7 @@ def test_a_killed_run_loses_no_more_than_half_a_second(experiment, tmp_path):
     assert len(err.strip().splitlines()) == 1
 
 
-def test_a_rig_file_with_a_fault_in_its_plant_is_the_users_to_mend(experiment):
+def test_a_rig_file_with_a_fault_in_its_plant_is_the_users_to_mend(start, experiment):
     arguments, _ = experiment("plain", 1.0, exo_inertial="[1.0, -0.22, 0.55, 2.3]")
     process = start(arguments)
     _, err = process.communicate(timeout=60)
