@@ -176,7 +176,7 @@ def _carry_on(
         at = 2 * k * substeps
         if ends:
             _control(c, seen, state, reference[at], net.weights, net.activation, torque, network, net.rates[0])
-            return k + 1
+            break
         for i in range(substeps):
             now = slice(at + 2 * i, at + 2 * i + 3)
             begin = k * period + i * h
@@ -186,7 +186,7 @@ def _carry_on(
                 a, c, w, s, net, seen, begin, h, state, memory, load, reference[now], disturbance[now],
                 torque, network, drive,
             )  # fmt: skip
-    return 0
+    return k + 1
 
 
 @njit(cache=True)
