@@ -38,6 +38,7 @@ bench: $(INSTALLED) ## measure speed
 
 docs: $(INSTALLED) ## bring the generated pages up to date
 	$(BIN)/python -m pipelines.settings.reference > docs/settings.md
+	$(BIN)/python -m pipelines.effects.reference docs/effects
 
 lock: ## pin the newest versions that fit pyproject.toml, in requirements.lock
 	rm -rf build/lock
