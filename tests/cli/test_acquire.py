@@ -9,11 +9,10 @@ from pipelines.settings.rig import load_rig
 
 
 def progress():
-    hip, knee = (
-        Reading(7, 0.1, angle, torque, 0.0, 0.0, 20.0, angle) for angle, torque in ((0.5, 31.0), (-2.08, -4.0))
-    )
+    hip = Reading(7, 0.1, 0.5, 31.0, 0.0, 0.0, 20.0, 0.5)
+    knee = Reading(7, 0.1, -2.08, -4.0, 0.0, 0.0, 20.0, -2.08)
     forces = np.full((4, 3), np.nan)
-    forces[1, 1] = 85.0
+    forces[1] = -2.0, 85.0, 0.5
     return Progress("run", 12.3, 40.0, Row((hip, knee), forces), 2460, 1, 200.0)
 
 
