@@ -191,7 +191,7 @@ class Effect(ABC):
         for stretch in motion.segments():
             columns_along_with_memory(
                 self.reaction, self.derivative, values, joint, *(a[stretch] for a in arrays), geometry,
-                np.zeros((6, joints)), np.zeros((3, self.states)), out[stretch],
+                np.zeros((11, joints)), np.zeros((3, self.states)), out[stretch],
             )  # fmt: skip
 
     def torque(self, motion: Motion, values: NDArray) -> NDArray:

@@ -133,6 +133,10 @@ _READ_ALONG = void(
 MEMORY_SUBSTEPS = 8
 """Steps per sample along a measured motion: a presliding state turns over within a few milliseconds."""
 
+SETTLING_S = 2.0
+"""For so long a measured motion is taken to have gone on at its first velocity before it begins: a memory that
+began from nothing would be wrong until the first reversal."""
+
 ALLOCATING_NOTHING = {"cache": True, "_nrt": False}
 """How functions are compiled whose arrays are all arguments: numba then leaves out counting references to them,
 which would take most of their time."""
@@ -167,7 +171,7 @@ def columns_along(kernel, values, joint, time, q, dq, ddq, load, geometry, scrat
 
 @njit(inline="always")
 def _between(time, q, dq, ddq, load, k, share, at):
-    """Write the motion a share of the way from sample ``k`` to the next into ``at`` (6, J); return its time."""
+    """Write the motion a share of the way from sample ``k`` to the next into ``at`` (5, J); return its time."""
     for j in range(q.shape[1]):
         at[0, j] = q[k, j] + share * (q[k + 1, j] - q[k, j])
         at[1, j] = dq[k, j] + share * (dq[k + 1, j] - dq[k, j])
@@ -177,33 +181,46 @@ def _between(time, q, dq, ddq, load, k, share, at):
     return time[k] + share * (time[k + 1] - time[k])
 
 
+@njit(inline="always")
+def _advance(rate, at, ahead, h, state, middle, slope, values, geometry, joint):
+    """Advance a memory by the midpoint rule, from the instant ``at``; ``ahead`` is half a step later."""
+    rate(at, state, values, geometry, joint, slope)
+    for m in range(state.shape[0]):
+        middle[m] = state[m] + 0.5 * h * slope[m]
+    rate(ahead, middle, values, geometry, joint, slope)
+    for m in range(state.shape[0]):
+        state[m] += h * slope[m]
+
+
 @njit(_ALONG_WITH_MEMORY, **ALLOCATING_NOTHING)
 def columns_along_with_memory(kernel, rate, values, joint, time, q, dq, ddq, load, geometry, scratch, memory, out):
-    """Evaluate a reaction kernel along one unbroken stretch, its memory from rest, into ``out`` (n, J, p).
+    """Evaluate a reaction kernel along one unbroken stretch, its memory settled, into ``out`` (n, J, p).
 
-    Between samples the motion is taken as linear in time; the memory advances by the midpoint rule.
-    ``scratch`` is (6, J), ``memory`` (3, states), the first row zero.
+    Between samples the motion is taken as linear in time. ``scratch`` is (11, J), ``memory`` (3, states), the
+    first row zero.
     """
     state, middle, slope = memory[0], memory[1], memory[2]
+    now, later = scratch[:5], scratch[5:10]
+    if q.shape[0] > 1:
+        h = (time[1] - time[0]) / MEMORY_SUBSTEPS
+        t = _between(time, q, dq, ddq, load, 0, 0.0, now)
+        at = Instant(t, now[0], now[1], now[2], now[3], now[4])
+        for _ in range(int(SETTLING_S / h)):
+            _advance(rate, at, at, h, state, middle, slope, values, geometry, joint)
     for k in range(q.shape[0]):
         for j in range(q.shape[1]):
-            scratch[3, j] = np.sign(dq[k, j])
-        at = Instant(time[k], q[k], dq[k], ddq[k], scratch[3], load[k])
-        _unit_columns(kernel, at, state, values, geometry, joint, scratch[5], out[k])
+            now[3, j] = np.sign(dq[k, j])
+        at = Instant(time[k], q[k], dq[k], ddq[k], now[3], load[k])
+        _unit_columns(kernel, at, state, values, geometry, joint, scratch[10], out[k])
         if k + 1 == q.shape[0]:
             break
         h = (time[k + 1] - time[k]) / MEMORY_SUBSTEPS
         for i in range(MEMORY_SUBSTEPS):
-            t = _between(time, q, dq, ddq, load, k, i / MEMORY_SUBSTEPS, scratch)
-            at = Instant(t, scratch[0], scratch[1], scratch[2], scratch[3], scratch[4])
-            rate(at, state, values, geometry, joint, slope)
-            for m in range(state.shape[0]):
-                middle[m] = state[m] + 0.5 * h * slope[m]
-            t = _between(time, q, dq, ddq, load, k, (i + 0.5) / MEMORY_SUBSTEPS, scratch)
-            at = Instant(t, scratch[0], scratch[1], scratch[2], scratch[3], scratch[4])
-            rate(at, middle, values, geometry, joint, slope)
-            for m in range(state.shape[0]):
-                state[m] += h * slope[m]
+            t = _between(time, q, dq, ddq, load, k, i / MEMORY_SUBSTEPS, now)
+            at = Instant(t, now[0], now[1], now[2], now[3], now[4])
+            t = _between(time, q, dq, ddq, load, k, (i + 0.5) / MEMORY_SUBSTEPS, later)
+            ahead = Instant(t, later[0], later[1], later[2], later[3], later[4])
+            _advance(rate, at, ahead, h, state, middle, slope, values, geometry, joint)
 
 
 @njit(_READ_ALONG, **ALLOCATING_NOTHING)
