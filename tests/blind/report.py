@@ -15,6 +15,7 @@ from tests.blind.scoring import SILENT, Score
 from tests.blind.statistics import Rate, brier, calibration_error, reliability
 
 BINS = ((0.0, 0.03), (0.03, 0.06), (0.06, 0.12), (0.12, 1.0))
+VISIBILITY = ((0.0, 0.1), (0.1, 0.2), (0.2, 0.5), (0.5, 1.0), (1.0, float("inf")))
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,7 @@ def pages(scores: Sequence[Score]) -> list[Page]:
         _summary(scores),
         _rates("By cause and joint", singles, lambda s: _label(s.truth[0])),
         _rates("By magnitude (share of the joint's rms torque)", singles, _bin_of),
+        _rates("By visibility (what the baseline cannot imitate, over the noise floor)", singles, _visibility_of),
         _rates("By functional form", singles, lambda s: f"{s.truth[0][0]}: {s.forms[0]}{' (own)' * s.own_form}"),
         _rates("By kinds of run", singles, lambda s: ", ".join(s.kinds)),
         _rates("Outside the catalogue", _of(scores, "outside"), lambda s: f"{s.forms[0]}"),
@@ -56,6 +58,11 @@ def _label(named: tuple[str, str | None]) -> str:
 def _bin_of(s: Score) -> str:
     low, high = next(b for b in BINS if b[0] <= s.magnitude < b[1])
     return f"{100 * low:2.0f} to {100 * high:.0f} %"
+
+
+def _visibility_of(s: Score) -> str:
+    low, high = next(b for b in VISIBILITY if b[0] <= s.visibility < b[1])
+    return f"{low:g} to {high:g}"
 
 
 def _summary(scores: Sequence[Score]) -> Page:

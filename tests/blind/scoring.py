@@ -23,6 +23,8 @@ class Score:
     """Are all hidden forms the catalogue's own?"""
     magnitude: float | None
     """Of a single effect."""
+    visibility: float
+    """What rigid body and friction cannot imitate of it, over the noise floor, at the joint where that is most."""
     kinds: tuple[str, ...]
     status: str
     """The verdict's, or ``refused``, ``crashed``, ``fault`` where a data fault was named."""
@@ -76,6 +78,7 @@ def score(truth: Mapping[str, Any], answer: Mapping[str, Any], smallest: Mapping
         forms=tuple(h["form"] for h in truth["hidden"]),
         own_form=all(h["own_form"] for h in truth["hidden"]),
         magnitude=truth["hidden"][0]["magnitude"] if len(hidden) == 1 else None,
+        visibility=max(truth["left_by_baseline_nm"][joint] / truth["noise_floor_nm"][joint] for joint in JOINTS),
         kinds=tuple(truth["case"]["kinds"]),
         status=verdict["status"],
         named=tuple((c["effect"], c["joint"]) for c in causes),

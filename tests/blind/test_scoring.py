@@ -21,7 +21,7 @@ def truth_of(category, *hidden, fault=None):
         for effect, joint in hidden
     ]  # fmt: skip
     case = {"seed": 1, "category": category, "kinds": ["exo_alone", "with_human"]}
-    return {"case": case, "hidden": effects, "fault": fault, "noise_floor_nm": SECRET}
+    return {"case": case, "hidden": effects, "fault": fault, "noise_floor_nm": SECRET, "left_by_baseline_nm": SECRET}
 
 
 def cause(effect, joint, *ties, probability=0.9, parameters=()):
