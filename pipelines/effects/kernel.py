@@ -6,7 +6,7 @@ signature, so that the dynamics can hold a tuple of them without being compiled 
 """
 
 import warnings
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, types
@@ -137,7 +137,7 @@ SETTLING_S = 2.0
 """For so long a measured motion is taken to have gone on at its first velocity before it begins: a memory that
 began from nothing would be wrong until the first reversal."""
 
-ALLOCATING_NOTHING = {"cache": True, "_nrt": False}
+ALLOCATING_NOTHING: dict[str, Any] = {"cache": True, "_nrt": False}
 """How functions are compiled whose arrays are all arguments: numba then leaves out counting references to them,
 which would take most of their time."""
 
