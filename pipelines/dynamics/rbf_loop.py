@@ -7,7 +7,8 @@ With e the error of the angle and r = de + Lambda e (the paper's q)::
     H_i(x) = exp(-|x - c_i|² / b²),         x = (e, de, qd, dqd, ddqd) of the joint
 
 Leg, memories and weights are integrated together by the classical Runge-Kutta method; the direction of
-dry friction is held over a step, as everywhere in the forward dynamics.
+dry friction is held over a step, as everywhere in the forward dynamics. A step in which a joint turns back, or
+a torque reaches or leaves its limit, is halved until the switch is found: its time is what limits the accuracy.
 """
 
 from typing import NamedTuple
@@ -34,6 +35,12 @@ from pipelines.dynamics.forward import (
     workspace,
 )
 from pipelines.dynamics.pd_loop import read_encoders
+
+PARTS = 256
+"""How finely a step is cut where something switches in it, a power of two."""
+
+ROUNDING, CREEP = 1e-6, 1e-3
+"""Against its direction a joint may move this much, rad/s; held by friction, as much as torque changes in a step."""
 
 TURN = 2.0 * np.pi
 """A joint that leaves ± one turn has run away, rad."""
@@ -78,6 +85,17 @@ class _Network(NamedTuple):
     activation: np.ndarray
 
 
+class _Kept(NamedTuple):
+    """State, memory, load and weights at the begin of a step, and references and disturbance within it."""
+
+    state: np.ndarray
+    memory: np.ndarray
+    load: np.ndarray
+    weights: np.ndarray
+    wanted: np.ndarray
+    disturbance: np.ndarray
+
+
 class _Seen(NamedTuple):
     """Last reading, low-passed speed, and by how much angle and speed were misread; (J,) each."""
 
@@ -116,11 +134,13 @@ def _step(a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturbance,
     """Advance leg and weights by ``h``; ``wanted`` (3, 3, J) and ``disturbance`` (3, J) at begin, middle and end.
 
     Torque and network output at the begin are written to ``torque`` and ``network`` (J,); ``drive`` is scratch.
+    Returns True where nothing switched on the way: no joint turned back, no torque reached or left its limit.
     """
     _control(c, seen, state, wanted[0], net.weights, net.activation, torque, network, net.rates[0])
     for j in range(a.joints):
         drive[0, j] = torque[j] - disturbance[0, j]
     find_direction(a, w, t, h, state, memory, load, drive[0], s.rates[0])
+    smooth = _keeps_going(w.direction, state)
     begin_stages(a, w, s, t, state, memory, load)
     for i in range(1, 4):
         half_steps = 2 if i == 3 else 1
@@ -131,6 +151,7 @@ def _step(a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturbance,
                 net.stage[j, k] = net.weights[j, k] + reach * net.rates[i - 1, j, k]
         _control(c, seen, s.state, wanted[half_steps], net.stage, net.activation, drive[0], drive[3], net.rates[i])
         for j in range(a.joints):
+            smooth &= (abs(drive[0, j]) == c.limit) == (abs(torque[j]) == c.limit)
             drive[0, j] -= disturbance[half_steps, j]
         accelerations(a, w, t + reach, s.state, s.memory, w.direction, load, drive[0], s.rates[i])
         memory_rates(a, w, t + reach, s.state, s.memory, w.direction, load, s.memory_rates[i])
@@ -138,6 +159,66 @@ def _step(a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturbance,
     for j in range(a.joints):
         for k in range(net.weights.shape[1]):
             net.weights[j, k] += h / 6.0 * weighted(net.rates[:, j, k])
+    return smooth and _keeps_going(w.direction, state)
+
+
+@njit(cache=True, inline="always")
+def _keeps_going(direction, state):
+    """Tell whether every motor moves in the direction of its friction, or stands where friction holds it."""
+    agrees = True
+    for j in range(direction.shape[0]):
+        v = state[DTHETA, j]
+        agrees &= v * direction[j] >= -ROUNDING if abs(direction[j]) == 1.0 else abs(v) < CREEP
+    return agrees
+
+
+@njit(cache=True, inline="always")
+def _copy(state, memory, load, weights, into_state, into_memory, into_load, into_weights):
+    for j in range(load.shape[0]):
+        into_load[j] = load[j]
+        for row in range(4):
+            into_state[row, j] = state[row, j]
+        for k in range(weights.shape[1]):
+            into_weights[j, k] = weights[j, k]
+    for m in range(memory.shape[0]):
+        into_memory[m] = memory[m]
+
+
+@njit(cache=True, inline="always")
+def _within(wanted, disturbance, begin, length, kept):
+    """Write references and disturbance of a part of a step, in shares of it; parabolas through the three given."""
+    for i in range(3):
+        x = begin + 0.5 * i * length
+        first, middle, last = (1.0 - x) * (1.0 - 2.0 * x), 4.0 * x * (1.0 - x), x * (2.0 * x - 1.0)
+        for j in range(wanted.shape[2]):
+            kept.disturbance[i, j] = first * disturbance[0, j] + middle * disturbance[1, j] + last * disturbance[2, j]
+            for k in range(3):
+                kept.wanted[i, k, j] = first * wanted[0, k, j] + middle * wanted[1, k, j] + last * wanted[2, k, j]
+
+
+@njit(**HOT)
+def _advance(a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturbance, torque, network, drive, kept):
+    """As ``_step``, but a part in which something switches is taken again as two halves, down to a ``PARTS``-th."""
+    done, size = 0, PARTS
+    while done < PARTS:
+        _copy(state, memory, load, net.weights, kept.state, kept.memory, kept.load, kept.weights)
+        if size == PARTS:
+            smooth = _step(
+                a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturbance, torque, network, drive
+            )
+        else:
+            _within(wanted, disturbance, done / PARTS, size / PARTS, kept)
+            smooth = _step(
+                a, c, w, s, net, seen, t + done * h / PARTS, size * h / PARTS, state, memory, load,
+                kept.wanted, kept.disturbance, drive[1], drive[2], drive,
+            )  # fmt: skip
+        if smooth or size == 1:
+            done += size
+            while size < PARTS and done % (2 * size) == 0:
+                size *= 2
+        else:
+            _copy(kept.state, kept.memory, kept.load, kept.weights, state, memory, load, net.weights)
+            size //= 2
 
 
 @njit(**HOT)
@@ -161,7 +242,7 @@ def _look(a, encoder, seen, state, k, period):
 
 @njit(**HOT)
 def _carry_on(
-    a, c, encoder, w, s, net, seen, state, memory, load, reference, disturbance, period, substeps, drive, out
+    a, c, encoder, w, s, net, seen, state, memory, load, reference, disturbance, period, substeps, drive, kept, out
 ):
     """Run sample after sample into ``out`` (n, 4, J); return how many: a joint that runs away ends it."""
     h = period / substeps
@@ -182,9 +263,9 @@ def _carry_on(
             begin = k * period + i * h
             if i > 0:
                 torque, network = drive[1], drive[2]
-            _step(
+            _advance(
                 a, c, w, s, net, seen, begin, h, state, memory, load, reference[now], disturbance[now],
-                torque, network, drive,
+                torque, network, drive, kept,
             )  # fmt: skip
     return k + 1
 
@@ -196,8 +277,12 @@ def _run(a, c, encoder, state, memory, reference, disturbance, period, substeps,
     net = _Network(np.zeros((joints, m)), np.zeros((4, joints, m)), np.zeros((joints, m)), np.zeros(m))
     v = np.zeros((6, joints))
     seen, load, drive = _Seen(v[0], v[1], v[2], v[3], v[4]), v[5], np.zeros((4, joints))
+    kept = _Kept(
+        np.zeros((4, joints)), np.zeros(memory.shape[0]), np.zeros(joints), np.zeros((joints, m)),
+        np.zeros((3, 3, joints)), np.zeros((3, joints)),
+    )  # fmt: skip
     return _carry_on(
-        a, c, encoder, w, s, net, seen, state, memory, load, reference, disturbance, period, substeps, drive, out
+        a, c, encoder, w, s, net, seen, state, memory, load, reference, disturbance, period, substeps, drive, kept, out
     )
 
 
