@@ -25,6 +25,7 @@ from exoid_cli.init import init
 from exoid_cli.rig import rig
 from exoid_cli.settings import settings
 from exoid_cli.show import show
+from exoid_cli.simulate import simulate
 from pipelines import __version__
 from pipelines.errors import ExoidError
 
@@ -40,6 +41,7 @@ app.command("acquire")(acquire)
 app.command("filter")(filter_)
 app.command("identify")(identify)
 app.command("rig")(rig)
+app.command("simulate")(simulate)
 app.command("show")(show)
 app.command("design")(design)
 app.add_typer(settings, name="settings")

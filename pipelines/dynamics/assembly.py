@@ -1,6 +1,6 @@
 """A model laid out for compiled code: addresses of kernels, values and memory in flat arrays."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -63,6 +63,9 @@ class Assembly(NamedTuple):
     sprung: np.ndarray
     """For each joint the term that is its transmission, -1 for a rigid one."""
     motor_inertia: np.ndarray
+    cuffed: bool
+    """True where the springs are cuffs: links are then the limb's, and the machine's own bodies are on the
+    motors' side."""
     geometry: np.ndarray
 
 
@@ -83,12 +86,17 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
     for i, effect in enumerate(effects):
         if effect.spring is None:
             continue
+        if effect.at_cuff != cuffed(effects):
+            raise InputError(
+                f"{effect.label}: a simulation holds compliant cuffs or joints that are not rigid, not both; "
+                "leave out the one or the other"
+            )
         if sprung[joint[i]] >= 0:
             raise InputError(f"{effect.joint}: {effect.name} is a second transmission; a joint has one at most")
         sprung[joint[i]], motor_inertia[joint[i]] = i, effect.motor_inertia
     return Assembly(
         joints=len(joints),
-        bounds=np.searchsorted([_group(e) for e in effects], np.arange(5)).astype(np.int64),
+        bounds=np.searchsorted([_group(e, cuffed(effects)) for e in effects], np.arange(5)).astype(np.int64),
         reactions=_addresses([e.reaction for e in effects], _no_reaction),
         derivatives=_addresses([e.derivative for e in effects], _no_memory),
         springs=_addresses([e.spring for e in effects], _no_spring),
@@ -101,17 +109,25 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
         sensed_at=_offsets([e.reading_states for e in effects]),
         sprung=sprung,
         motor_inertia=motor_inertia,
+        cuffed=cuffed(effects),
         geometry=geometry.array(),
     )
 
 
 def in_order(model: Model) -> list[Term]:
     """Return a model's terms in the order in which an assembly holds them."""
-    return sorted(model, key=lambda term: _group(term.effect))
+    has_cuffs = cuffed([term.effect for term in model])
+    return sorted(model, key=lambda term: _group(term.effect, has_cuffs))
 
 
-def _group(effect: Effect) -> int:
-    return 2 * (effect.side is Side.DRIVE) + (not effect.inertial)
+def cuffed(effects: Iterable[Effect]) -> bool:
+    """Tell whether a limb moves against its cuff."""
+    return any(effect.at_cuff for effect in effects)
+
+
+def _group(effect: Effect, has_cuffs: bool) -> int:
+    on_motor = not effect.on_limb if has_cuffs else effect.side is Side.DRIVE
+    return 2 * on_motor + (not effect.inertial)
 
 
 def _offsets(lengths: Sequence[int]) -> NDArray:

@@ -6,7 +6,8 @@ carry the drive's effects and the encoder; links carry everything else. With T t
     M(q) ddq + rest(q, dq) = T          links (structure, human)
     J dd_theta + drive(theta, d_theta) + T = drive torque     motors; T from the spring
 
-and a rigid joint is the sum of its two rows.
+and a rigid joint is the sum of its two rows. Where a limb moves against its cuff, the cuff is the spring,
+the limb the link, and the whole machine the motors, whose J is then the machine's mass matrix.
 
 Dry friction is a set-valued function of speed. The step looks for the ``direction`` in [-1, 1]
 of each joint that is consistent with the speed at the step's end (projected Gauss-Seidel on the
@@ -54,6 +55,8 @@ class Workspace(NamedTuple):
     slope: np.ndarray
     direction: np.ndarray
     link_direction: np.ndarray
+    both_masses: np.ndarray
+    both: np.ndarray
 
 
 @njit(cache=True)
@@ -61,7 +64,8 @@ def workspace(joints):
     """Make the scratch arrays for a number of joints."""
     v = np.zeros((10, joints))
     m = np.zeros((2, joints, joints))
-    return Workspace(v[0], v[1], m[0], m[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8], v[9])
+    both = np.zeros((2 * joints, 2 * joints))
+    return Workspace(v[0], v[1], m[0], m[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8], v[9], both, np.zeros(2 * joints))
 
 
 # Inlined: a call hands over the whole assembly, which costs as much as the equations do.
@@ -120,12 +124,63 @@ def _prepare(a, w, t, state, memory, load):
     for j in range(a.joints):
         term = a.sprung[j]
         if term < 0:
-            w.mass[j, j] += w.motor_mass[j, j]
+            if not a.cuffed:
+                w.mass[j, j] += w.motor_mass[j, j]
         else:
             values = a.values[a.value_at[term] : a.value_at[term + 1]]
             w.passed[j] = spring_at(a.springs[term])(
                 state[THETA, j] - state[Q, j], state[DTHETA, j] - state[DQ, j], values
             )
+
+
+@njit(**HOT)
+def _accelerate_both(a, w, state, drive, rates):
+    """Write d(state)/dt of machine and limb, whose masses are coupled across the joints that are rigid.
+
+    Unknown are the links' accelerations, then the motors'; a rigid joint's are equal.
+    """
+    joints = a.joints
+    w.both_masses[:] = 0.0
+    for j in range(joints):
+        motor = joints + j
+        row = j if a.sprung[j] < 0 else motor
+        for k in range(joints):
+            w.both_masses[j, k] = w.mass[j, k]
+            w.both_masses[row, joints + k] = w.motor_mass[j, k]
+        if a.sprung[j] < 0:
+            w.both[j] = drive[j] - w.friction[j] - w.rest[j]
+            w.both_masses[motor, motor], w.both_masses[motor, j], w.both[motor] = 1.0, -1.0, 0.0
+        else:
+            w.both[j] = w.passed[j] - w.rest[j]
+            w.both_masses[motor, motor] += a.motor_inertia[j]
+            w.both[motor] = drive[j] - w.friction[j] - w.passed[j]
+    _eliminate(w.both_masses, w.both)
+    for j in range(joints):
+        rates[Q, j], rates[DQ, j] = state[DQ, j], w.both[j]
+        rates[THETA, j], rates[DTHETA, j] = state[DTHETA, j], w.both[joints + j]
+
+
+@njit(**HOT)
+def _eliminate(A, b):
+    """Solve A x = b in place by Gaussian elimination with partial pivoting; ``b`` is left holding x."""
+    n = b.shape[0]
+    for i in range(n):
+        pivot = i
+        for row in range(i + 1, n):
+            if abs(A[row, i]) > abs(A[pivot, i]):
+                pivot = row
+        for column in range(n):
+            A[i, column], A[pivot, column] = A[pivot, column], A[i, column]
+        b[i], b[pivot] = b[pivot], b[i]
+        for row in range(i + 1, n):
+            factor = A[row, i] / A[i, i]
+            for column in range(i, n):
+                A[row, column] -= factor * A[i, column]
+            b[row] -= factor * b[i]
+    for i in range(n - 1, -1, -1):
+        for column in range(i + 1, n):
+            b[i] -= A[i, column] * b[column]
+        b[i] /= A[i, i]
 
 
 @njit(cache=True, inline="always")
@@ -134,6 +189,9 @@ def _finish(a, w, t, state, memory, direction, load, drive, rates):
     w.friction[:] = 0.0
     at = Instant(t, state[THETA], state[DTHETA], w.zero, direction, load)
     _react(a, a.bounds[2], a.bounds[4], at, memory, w.friction)
+    if a.cuffed:
+        _accelerate_both(a, w, state, drive, rates)
+        return
     for j in range(a.joints):
         if a.sprung[j] < 0:
             w.push[j] = drive[j] - w.friction[j] - w.rest[j]

@@ -1,20 +1,62 @@
 """Every effect exoid knows, in plain sight. Adding one is a file and a line here."""
 
-from pipelines.effects.effect import RUNS, Effect, Parameter, Side
+from pipelines.effects.backlash import Backlash
+from pipelines.effects.base_tilt import BaseTilt
+from pipelines.effects.cogging import Cogging
+from pipelines.effects.coulomb_asymmetry import CoulombAsymmetry
+from pipelines.effects.cuff_compliance import CuffCompliance
+from pipelines.effects.effect import RUNS, Effect, Parameter, Parity, Side
 from pipelines.effects.encoder_offset import EncoderOffset
 from pipelines.effects.friction import Friction
+from pipelines.effects.friction_warmup import FrictionWarmup
 from pipelines.effects.joint_elasticity import JointElasticity
+from pipelines.effects.load_dependent_friction import LoadDependentFriction
+from pipelines.effects.mass_off_axis import MassOffAxis
+from pipelines.effects.outside import effects_of_other_packages
+from pipelines.effects.parallel_spring import ParallelSpring
+from pipelines.effects.passive_joint_torque import PassiveJointTorque
+from pipelines.effects.payload_change import PayloadChange
 from pipelines.effects.presliding_hysteresis import PreslidingHysteresis
+from pipelines.effects.quadratic_drag import QuadraticDrag
 from pipelines.effects.rigid_body import RigidBody
+from pipelines.effects.rotor_inertia import RotorInertia
+from pipelines.effects.spasticity import Spasticity
 from pipelines.effects.stribeck_friction import StribeckFriction
+from pipelines.effects.time_delay import TimeDelay
+from pipelines.effects.torque_drift import TorqueDrift
+from pipelines.effects.torque_gain import TorqueGain
+from pipelines.effects.torque_offset import TorqueOffset
+from pipelines.effects.viscous_asymmetry import ViscousAsymmetry
+from pipelines.effects.voluntary_torque import VoluntaryTorque
 
 EFFECTS: tuple[type[Effect], ...] = (
     RigidBody,
     Friction,
     StribeckFriction,
+    CoulombAsymmetry,
+    ViscousAsymmetry,
+    LoadDependentFriction,
+    QuadraticDrag,
     PreslidingHysteresis,
+    FrictionWarmup,
+    Cogging,
+    RotorInertia,
+    Backlash,
     JointElasticity,
+    ParallelSpring,
+    BaseTilt,
+    MassOffAxis,
+    PayloadChange,
+    TorqueGain,
+    TorqueOffset,
+    TorqueDrift,
     EncoderOffset,
+    TimeDelay,
+    PassiveJointTorque,
+    VoluntaryTorque,
+    Spasticity,
+    CuffCompliance,
 )
+EFFECTS += effects_of_other_packages(EFFECTS)
 
-__all__ = ["EFFECTS", "RUNS", "Effect", "Parameter", "Side"]
+__all__ = ["EFFECTS", "RUNS", "Effect", "Parameter", "Parity", "Side"]

@@ -1,6 +1,6 @@
 """Coulomb and viscous friction of a drive: the baseline every other drive effect is judged against."""
 
-from pipelines.effects.effect import Effect, Parameter, Side
+from pipelines.effects.effect import Effect, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
 
@@ -18,6 +18,8 @@ class Friction(Effect):
         Parameter("coulomb", "N·m", "friction torque once the joint moves", "Ks", (0.5, 8.0)),
         Parameter("viscous", "N·m·s/rad", "friction torque per unit of speed", "Km", (0.5, 10.0)),
     )
+    parity = Parity.ODD
+    dissipative = True
 
     @reaction
     def reaction(at, state, values, geometry, joint, out):

@@ -10,13 +10,14 @@ class PreslidingHysteresis(Effect):
     name = "presliding_hysteresis"
     title = "Presliding hysteresis"
     side = Side.DRIVE
-    equation = "tau = F z, dz/dt = (v - abs(v) z) / travel"
-    source = "Dahl (1976), AIAA Journal 14(12), eq. 4 with exponent 1"
+    equation = "tau = F z, dz/dt = v / travel * (1 - z sgn(v))^i, i = 1 where nothing else is said"
+    source = "Dahl (1976), AIAA Journal 14(12), eq. 4"
     looks_like = "friction against angle: a loop whose corners are rounded after each reversal"
     confirm = "move the empty joint to and fro by a few hundredths of a radian and plot torque against angle"
     linear = (Parameter("friction_torque", "N·m", "friction torque once sliding", "F", (0.5, 8.0)),)
     shape = (
         Parameter("presliding_angle", "rad", "travel over which friction builds up to 63 %", "travel", (0.003, 0.15)),
+        Parameter("exponent", "1", "form of the build-up", "i", (0.5, 2.0), default=1.0, forms=(1.0, 2.0, 0.5)),
     )
     states = 1
 
@@ -27,6 +28,8 @@ class PreslidingHysteresis(Effect):
 
     @derivative
     def derivative(at, state, values, geometry, joint, out):
-        """Write dz/dt = (v - abs(v) z) / travel."""
-        v = at.dq[joint]
-        out[0] = (v - abs(v) * state[0]) / values[1]
+        """Write dz/dt = v / travel (1 - z sgn v)^i."""
+        v, z = at.dq[joint], state[0]
+        left = max(0.0, 1.0 - z) if v > 0.0 else max(0.0, 1.0 + z)
+        # A power costs ten times as much as the rest.
+        out[0] = v / values[1] * (left if values[2] == 1.0 else left ** values[2])

@@ -1,6 +1,6 @@
 """The two rigid links of leg and exoskeleton together."""
 
-from pipelines.effects.effect import Effect, Parameter, Side
+from pipelines.effects.effect import Effect, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 from pipelines.mechanics.leg import regressor_at
 
@@ -17,6 +17,7 @@ class RigidBody(Effect):
     confirm = "weigh the segments, or hold the leg still at several angles and read the torque"
     whole_leg = True
     inertial = True
+    parity = Parity.EVEN
     linear = (
         Parameter("X1", "kg·m²", "inertia about the hip with the knee at a right angle", "X1", (1.0, 12.0)),
         Parameter("X2", "kg·m²", "inertia of the shank about the knee", "X2", (0.2, 4.0)),

@@ -2,7 +2,7 @@
 
 from math import exp
 
-from pipelines.effects.effect import Effect, Parameter, Side
+from pipelines.effects.effect import Effect, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
 
@@ -12,15 +12,20 @@ class StribeckFriction(Effect):
     name = "stribeck_friction"
     title = "Stribeck friction"
     side = Side.DRIVE
-    equation = "tau = F exp(-(v / vs)²) sgn(v)"
+    equation = "tau = F exp(-abs(v / vs)^d) sgn(v), d = 2 where nothing else is said"
     source = "Stribeck (1902); Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), eq. 3"
     looks_like = "a narrow peak of friction on both sides of zero speed"
     confirm = "creep the empty joint through 0.01 to 0.3 rad/s and plot torque against speed"
     linear = (Parameter("stribeck_torque", "N·m", "friction above the Coulomb level at standstill", "F", (0.3, 6.0)),)
-    shape = (Parameter("stribeck_velocity", "rad/s", "speed at which the excess has fallen to 1/e", "vs", (0.03, 0.8)),)
+    shape = (
+        Parameter("stribeck_velocity", "rad/s", "speed at which the excess has fallen to 1/e", "vs", (0.03, 0.8)),
+        Parameter("exponent", "1", "form of the fall", "d", (0.5, 2.0), default=2.0, forms=(2.0, 1.0, 0.5)),
+    )
+    parity = Parity.ODD
+    dissipative = True
 
     @reaction
     def reaction(at, state, values, geometry, joint, out):
-        """Add F exp(-(v/vs)²) sgn v at the joint."""
-        ratio = at.dq[joint] / values[1]
-        out[joint] += values[0] * exp(-ratio * ratio) * at.direction[joint]
+        """Add F exp(-abs(v/vs)^d) sgn v at the joint."""
+        ratio = abs(at.dq[joint] / values[1])
+        out[joint] += values[0] * exp(-(ratio ** values[2])) * at.direction[joint]

@@ -1,0 +1,156 @@
+"""``exoid simulate``: the identified leg under the adaptive controller, or beside a recording."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from exoid_cli.console import console
+
+if TYPE_CHECKING:
+    from pipelines.contracts import Table
+    from pipelines.settings import Experiment
+
+
+def simulate(
+    parameters: Annotated[Path, typer.Argument(help="A parameters/1 file, as `exoid identify` writes it.")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Folder for the loop's table and figures; with --replay, a file.")
+    ],
+    config: Annotated[Path | None, typer.Option("--config", help="exoid.toml: geometry, [simulate].")] = None,
+    run: Annotated[str, typer.Option("--run", help="Whose parameters: exo_alone or with_human.")] = "with_human",
+    reference: Annotated[
+        Path | None, typer.Option("--reference", help="What to follow: trajectory/1 or TOML; a gait unless given.")
+    ] = None,
+    replay: Annotated[
+        Path | None, typer.Option("--replay", help="A recording/1 or motion/1 to simulate again; its run counts.")
+    ] = None,
+) -> None:
+    """Simulate the leg under adaptive RBF control, or replay a recording on the model.
+
+    Example: exoid simulate identified/parameters.parquet -o simulated/
+    """
+    from pipelines.contracts import PARAMETERS
+    from pipelines.errors import SettingsError
+    from pipelines.settings import Experiment
+
+    if replay and reference:
+        raise SettingsError("--reference and --replay exclude each other: a replay follows its recording; drop one")
+    settings = Experiment.load(config) if config else Experiment()
+    table = PARAMETERS.read(parameters)
+    if replay:
+        _replay(table, replay, settings, output)
+    else:
+        _track(table, run, reference, settings, output)
+
+
+def _track(table: "Table", run: str, reference: Path | None, settings: "Experiment", output: Path) -> None:
+    from pipelines.contracts import SIMULATION, describe
+    from pipelines.contracts.atomic import write_text
+    from pipelines.errors import InputError
+    from pipelines.mechanics.read import geometry_from
+    from pipelines.mechanics.trajectory import read_trajectory
+    from pipelines.simulation.closed_loop import sweep, track
+    from pipelines.simulation.gait import gait
+    from pipelines.simulation.plant import plant_from_table
+
+    chosen = settings.simulate
+    plant = plant_from_table(table, run, geometry_from(settings.mechanism))
+    wanted = read_trajectory(reference) if reference else gait()
+    loop = track(plant, chosen, wanted)
+    if loop.ran_away:
+        raise InputError(
+            f"{loop.ran_away}: the loop is unstable; lower simulate.feedback_gain_nm_s_rad or "
+            "simulate.adaptation_gain, or shorten simulate.step_s"
+        )
+    gains = sweep(plant, chosen, wanted, chosen.sweep_nm_s_rad)
+    frame = loop.frame()
+    described = describe([path for path in (table.path, reference) if path], chosen.model_dump(mode="json")) | {
+        "joints": [{"name": joint.name, "kind": joint.kind} for joint in plant.joints],
+        "plant": plant.metadata(),
+        "controller": {"type": "rbf", "reference": str(reference.name) if reference else "gait"},
+        "disturbance": {"amplitude_nm": chosen.disturbance_nm, "omega_rad_s": chosen.disturbance_rad_s},
+        "noise": {"counts_per_turn": chosen.encoder_counts_per_turn, "angle_rad": chosen.encoder_noise_rad},
+        "seed": chosen.seed,
+    }
+    SIMULATION.write(output / "rbf.parquet", frame, described)
+    if len(gains):
+        write_text(output / "kv-sweep.csv", gains.to_csv(index=False))
+    if chosen.figures:
+        from pipelines.simulation.figures import draw_sweep, draw_tracking
+
+        draw_tracking(frame, plant.joints, output, chosen.torque_limit_nm, chosen.settled_after_s)
+        if len(gains):
+            draw_sweep(gains, plant.joints, output, chosen.feedback_gain_nm_s_rad)
+    worst = loop.worst_error(chosen.settled_after_s)
+    peak = abs(loop.run.torque).max(axis=0)
+    names = [joint.name for joint in plant.joints]
+    console.emit(
+        {
+            "largest_error_rad": dict(zip(names, worst.tolist(), strict=True)),
+            "peak_torque_nm": dict(zip(names, peak.tolist(), strict=True)),
+            "sweep": gains.to_dict("records"),
+        }
+    )
+    settled = f"largest error after {chosen.settled_after_s:g} s (rad)"
+    console.table(
+        ("joint", settled, "peak torque (N·m)"),
+        [(name, f"{e:.4f}", f"{t:.1f}") for name, e, t in zip(names, worst, peak, strict=True)],
+        numbers=f"{settled}, peak torque (N·m)",
+    )
+    console.say(f"{output}: rbf.parquet" + (", kv-sweep.csv" if len(gains) else "") + (", figures" * chosen.figures))
+
+
+def _replay(table: "Table", recording: Path, settings: "Experiment", output: Path) -> None:
+    from pipelines.contracts import SIMULATION, describe
+    from pipelines.dynamics.replay import replay
+    from pipelines.mechanics.read import geometry_from, read_motion
+    from pipelines.simulation import recorded
+    from pipelines.simulation.plant import plant_from_table
+
+    default = geometry_from(settings.mechanism)
+    motion = read_motion(recording, settings.filter, default)
+    plant = plant_from_table(table, motion.run, motion.geometry)
+    replayed = replay(plant.model, motion)
+    open_loop, closed_loop = recorded.open_loop_frame(replayed, motion, plant.joints), None
+    inputs = [path for path in (table.path, recording) if path]
+    shared: dict[str, Any] = describe(inputs, settings.simulate.model_dump(mode="json")) | {
+        "joints": motion.joint_metadata,
+        "plant": plant.metadata(),
+    }
+    names = [joint.name for joint in plant.joints]
+    rmse = dict(zip(names, replayed.rmse.tolist(), strict=True))
+    SIMULATION.write(output, open_loop, shared | {"simulation_rmse_rad": rmse, "windows": len(replayed.first)})
+    result: dict[str, Any] = {"simulation_rmse_rad": rmse}
+    lacks = recorded.why_no_closed_loop(motion)
+    if not lacks:
+        made = recorded.follow_references(plant, motion)
+        closed_loop = recorded.closed_loop_frame(made, motion, plant.joints)
+        result["closed_loop_rmse_rad"] = dict(zip(names, made.angle_rmse.tolist(), strict=True))
+        result["closed_loop_rmse_nm"] = dict(zip(names, made.torque_rmse.tolist(), strict=True))
+        scores = {key: value for key, value in result.items() if key.startswith("closed")}
+        controller = motion.metadata["controller"]
+        beside = output.with_name(f"{output.stem}-closed-loop{output.suffix}")
+        SIMULATION.write(beside, closed_loop, shared | scores | {"controller": controller})
+    if settings.simulate.figures:
+        from pipelines.simulation.figures import draw_replay
+
+        draw_replay(open_loop, closed_loop, plant.joints, output.with_suffix(""), f"{recording.stem}, simulated again")
+    _report_replay(result, names, lacks)
+
+
+def _report_replay(result: dict[str, Any], names: list[str], lacks: str) -> None:
+    console.emit(result | ({"no_closed_loop": lacks} if lacks else {}))
+    headings = {
+        "simulation_rmse_rad": "1 s windows (rad)",
+        "closed_loop_rmse_rad": "closed loop (rad)",
+        "closed_loop_rmse_nm": "closed loop (N·m)",
+    }
+    shown = [key for key in headings if key in result]
+    console.table(
+        ("RMSE", *(headings[key] for key in shown)),
+        [(name, *(f"{result[key][name]:.5f}" for key in shown)) for name in names],
+        numbers=", ".join(headings[key] for key in shown),
+    )
+    if lacks:
+        console.warn(f"no closed loop: {lacks}")

@@ -1,0 +1,25 @@
+"""Dry friction that differs with direction."""
+
+from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.kernel import reaction
+
+
+class CoulombAsymmetry(Effect):
+    """More Coulomb friction one way than the other."""
+
+    name = "coulomb_asymmetry"
+    title = "Coulomb asymmetry"
+    side = Side.DRIVE
+    equation = "tau = a abs(sgn v): Ks + a forward, Ks - a backward"
+    source = "Janot, Vandanjon, Gautier (2014), IEEE Trans. Control Systems Technology 22(1): the drive chain's offset"
+    looks_like = "a constant while the joint moves, whichever way; at standstill it is gone"
+    confirm = "move the empty joint slowly both ways through the same angles: the mean torque less gravity is a"
+    linear = (
+        Parameter("asymmetry", "N·m", "half of forward less backward Coulomb friction", "a", (-3.0, 3.0)),
+    )  # fmt: skip
+    parity = Parity.EVEN
+
+    @reaction
+    def reaction(at, state, values, geometry, joint, out):
+        """Add a abs(sgn v) at the joint."""
+        out[joint] += values[0] * abs(at.direction[joint])

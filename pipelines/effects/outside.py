@@ -1,0 +1,59 @@
+"""Effects that other packages bring: entry points of the group ``exoid.effects``.
+
+A package names its class in its own pyproject.toml::
+
+    [project.entry-points."exoid.effects"]
+    tendon_slack = "their_package.tendon_slack:TendonSlack"
+"""
+
+import inspect
+from collections.abc import Iterable
+from importlib.metadata import EntryPoint, entry_points
+
+from pipelines.effects.effect import Effect
+from pipelines.errors import InputError
+
+GROUP = "exoid.effects"
+
+STATED = ("name", "title", "side", "equation", "source", "looks_like", "confirm")
+"""What every effect says of itself."""
+
+
+def effects_of_other_packages(known: Iterable[type[Effect]]) -> tuple[type[Effect], ...]:
+    """Load the effects of all installed packages, in the order of their names.
+
+    Raises
+    ------
+    InputError
+        Where one cannot be loaded, is not an effect, or takes a name that is already there.
+    """
+    taken = {effect.name: effect.__module__ for effect in known}
+    found = []
+    for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
+        effect = _loaded(entry)
+        if effect.name in taken:
+            raise _broken(entry, f"its name {effect.name} is already that of {taken[effect.name]}", "rename it")
+        taken[effect.name] = effect.__module__
+        found.append(effect)
+    return tuple(found)
+
+
+def _loaded(entry: EntryPoint) -> type[Effect]:
+    try:
+        effect = entry.load()
+    except Exception as error:
+        raise _broken(entry, f"loading it failed: {type(error).__name__}: {error}", "mend it") from error
+    if not (inspect.isclass(effect) and issubclass(effect, Effect)):
+        raise _broken(entry, f"it is {effect!r}, expected a subclass of pipelines.effects.Effect", "mend it")
+    silent = [name for name in STATED if not hasattr(effect, name)]
+    if silent:
+        raise _broken(entry, f"{effect.__name__} does not state {', '.join(silent)}", "add what is missing")
+    return effect
+
+
+def _broken(entry: EntryPoint, what: str, remedy: str) -> InputError:
+    package = entry.dist.name if entry.dist else "an unknown package"
+    return InputError(
+        f"effect {entry.name} ({entry.value}) of package {package} cannot be used: {what}; {remedy}, "
+        f"or uninstall {package}"
+    )

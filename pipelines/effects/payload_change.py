@@ -1,0 +1,37 @@
+"""A mass that comes or goes during a run."""
+
+from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.kernel import reaction
+from pipelines.mechanics.leg import regressor_at
+
+
+class PayloadChange(Effect):
+    """A point mass on the segment's axis from some time on; negative where it is lost."""
+
+    name = "payload_change"
+    title = "Payload change"
+    side = Side.STRUCTURE
+    equation = "tau = p (t >= t0) dA/dp, p = m r; shank: A3 + r A2 + (r + L1²/r) A1 + L1/r A4; thigh: A4 + r A1"
+    source = "Khalil, Gautier, Lemoine (2007), ICRA: identification of the payload inertial parameters"
+    looks_like = "gravity residual that begins at one instant and stays"
+    confirm = "ask what was picked up or fell off then; weigh it"
+    linear = (Parameter("mass_moment", "kg·m", "mass times distance along the segment", "p", (-1.0, 1.0)),)
+    shape = (
+        Parameter("time", "s", "when it comes, from the run's begin", "t0", (0.0, 120.0), per_run=True),
+        Parameter("distance", "m", "from the segment's joint to the mass", "r", (0.1, 0.45), default=0.3),
+    )
+    inertial = True
+    parity = Parity.EVEN
+
+    @reaction
+    def reaction(at, state, values, geometry, joint, out):
+        """Add what a point mass adds to X1..X4, once it is there."""
+        if at.t < values[1]:
+            return
+        moment, r, length = values[0], values[2], geometry[0]
+        hip, knee = regressor_at(at.q, at.dq, at.ddq, geometry[0], geometry[1])
+        if joint == 0:
+            out[0] += moment * (hip[3] + r * hip[0])
+        else:
+            out[0] += moment * (hip[2] + r * hip[1] + (r + length * length / r) * hip[0] + length / r * hip[3])
+            out[1] += moment * (knee[2] + r * knee[1])

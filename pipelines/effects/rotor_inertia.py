@@ -1,0 +1,26 @@
+"""The rotor behind the gear: an inertia that only its own joint's acceleration feels."""
+
+from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.kernel import reaction
+
+
+class RotorInertia(Effect):
+    """The motor's inertia times the gear ratio squared."""
+
+    name = "rotor_inertia"
+    title = "Rotor inertia"
+    side = Side.DRIVE
+    equation = "tau = J ddq, at its own joint only"
+    source = "Sciavicco, Siciliano, Villani (1996), Advanced Robotics 10(3): motor inertia in gear-driven manipulators"
+    looks_like = "residual in step with the knee's own acceleration; X2 too large for a shank of that weight"
+    confirm = "look up the rotor's inertia and the gear ratio: J is the one times the square of the other"
+    joints = ("knee",)
+    absorbed = {"hip": "X1"}  # noqa: RUF012 - a constant, like every other class attribute here
+    linear = (Parameter("inertia", "kg·m²", "rotor inertia reflected to the joint", "J", (0.03, 1.0)),)
+    inertial = True
+    parity = Parity.EVEN
+
+    @reaction
+    def reaction(at, state, values, geometry, joint, out):
+        """Add J ddq at the joint."""
+        out[joint] += values[0] * at.ddq[joint]

@@ -1,0 +1,29 @@
+"""A stretch reflex."""
+
+from pipelines.effects.effect import Effect, Parameter, Side
+from pipelines.effects.kernel import reaction
+
+
+class Spasticity(Effect):
+    """Muscle that resists a stretch faster than its threshold, in the direction that stretches it."""
+
+    name = "spasticity"
+    title = "Spasticity"
+    side = Side.HUMAN
+    equation = "tau = gain (v - v0) beyond v0 on the side of v0's sign, else 0"
+    source = "Lance (1980), in Spasticity: Disordered Motor Control; Falisse et al. (2018), PLoS ONE 13(12)"
+    looks_like = "residual against speed: flat, then a ramp beyond a speed, one way only and only with the human"
+    confirm = "stretch the relaxed leg at several speeds: the torque jumps at the fast ones (Tardieu's test)"
+    acts_in = ("with_human",)
+    linear = (Parameter("gain", "N·m·s/rad", "torque per speed beyond the threshold", "G", (1.0, 20.0)),)
+    shape = (
+        Parameter("threshold_velocity", "rad/s", "speed from which it acts; its sign is the way", "v0", (-1.5, 1.5)),
+    )  # fmt: skip
+    dissipative = True
+
+    @reaction
+    def reaction(at, state, values, geometry, joint, out):
+        """Add gain (v - v0) beyond the threshold."""
+        excess = at.dq[joint] - values[1]
+        if excess * values[1] > 0.0:
+            out[joint] += values[0] * excess

@@ -1,0 +1,50 @@
+"""A torque channel that is late."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.effects.effect import Effect, Parameter, Side
+from pipelines.effects.kernel import torque_reading
+from pipelines.mechanics.motion import Motion
+
+SLOTS = 128
+"""Samples that the channel remembers; a longer delay than these is cut to them."""
+
+
+class TimeDelay(Effect):
+    """The measured torque is the one of some milliseconds ago: a filter or a bus in its way."""
+
+    name = "time_delay"
+    title = "Time delay"
+    side = Side.SENSOR
+    equation = "measured torque(t) = true torque(t - delay)"
+    source = "Björklund (2003), A Survey and Comparison of Time-Delay Estimation Methods in Linear Systems, Linköping"
+    looks_like = "residual in step with the torque's rate of change; friction steps smeared to one side of reversals"
+    confirm = "knock on the link and compare when the torque and when the encoder answers"
+    shape = (Parameter("delay", "s", "by which the torque channel is late", "T", (0.0, 0.06)),)
+    reading_states = 1 + 2 * SLOTS
+
+    @torque_reading
+    def torque_reading(t, torque, values, joint, state):
+        """Return the torque of then, in a straight line between samples; the first one's until there is one."""
+        newest = int(state[0])
+        state[0] += 1.0
+        slot = 1 + 2 * (newest % SLOTS)
+        state[slot], state[slot + 1] = t, torque[joint]
+        then = t - values[0]
+        k = newest
+        while k > max(0, newest - SLOTS + 1) and state[1 + 2 * (k % SLOTS)] > then:
+            k -= 1
+        before, after = 1 + 2 * (k % SLOTS), 1 + 2 * (min(k + 1, newest) % SLOTS)
+        torque[joint] = state[before + 1]
+        if state[before] < then and after != before:
+            share = (then - state[before]) / (state[after] - state[before])
+            torque[joint] += share * (state[after + 1] - state[before + 1])
+
+    def delivered(self, torque: NDArray, motion: Motion, values: NDArray) -> NDArray:
+        """Move the torque earlier; the last one's holds to the end of each stretch."""
+        true, j = torque.copy(), motion.joint_index(self.joint)
+        for stretch in motion.segments():
+            time = motion.time[stretch]
+            true[stretch, j] = np.interp(time + values[0], time, torque[stretch, j])
+        return true

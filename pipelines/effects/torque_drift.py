@@ -1,0 +1,26 @@
+"""A torque channel whose zero wanders."""
+
+from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.kernel import torque_reading
+
+
+class TorqueDrift(Effect):
+    """The measured torque is the true one plus an offset that grows with time."""
+
+    name = "torque_drift"
+    title = "Torque drift"
+    side = Side.SENSOR
+    equation = "measured torque = true torque + level + rate t"
+    source = "Fraden (2016), Handbook of Modern Sensors, 5th ed., ch. 3 (zero drift)"
+    looks_like = "a residual that climbs through the run and does not repeat from period to period"
+    confirm = "switch the drive off and read its torque for some minutes while the electronics warm"
+    linear = (
+        Parameter("rate", "N·m/s", "growth of the offset", "d", (-0.1, 0.1)),
+        Parameter("level", "N·m", "offset when the run begins", "o", (-4.0, 4.0), per_run=True, default=0.0),
+    )
+    parity = Parity.EVEN
+
+    @torque_reading
+    def torque_reading(t, torque, values, joint, state):
+        """Shift the torque by what has gathered."""
+        torque[joint] += values[0] * t + values[1]

@@ -1,0 +1,31 @@
+"""A torque channel with the wrong gain."""
+
+from numpy.typing import NDArray
+
+from pipelines.effects.effect import Effect, Parameter, Side
+from pipelines.effects.kernel import torque_reading
+from pipelines.mechanics.motion import Motion
+
+
+class TorqueGain(Effect):
+    """The measured torque is the true one times a factor: a wrong torque constant or gear efficiency."""
+
+    name = "torque_gain"
+    title = "Torque gain"
+    side = Side.SENSOR
+    equation = "measured torque = gain * true torque"
+    source = "Gautier, Briot (2014), ASME J. Dyn. Sys. Meas. Control 136(5): identification of joint drive gains"
+    looks_like = "hip and knee disagree about the shank: what both carry, X2 and X3, differs between the rows"
+    confirm = "hang a known weight on the joint and compare the change of torque with the weight's"
+    shape = (Parameter("gain", "1", "measured per true torque", "g", (0.7, 1.4)),)
+
+    @torque_reading
+    def torque_reading(t, torque, values, joint, state):
+        """Multiply the torque."""
+        torque[joint] *= values[0]
+
+    def delivered(self, torque: NDArray, motion: Motion, values: NDArray) -> NDArray:
+        """Divide by the gain."""
+        true = torque.copy()
+        true[:, motion.joint_index(self.joint)] /= values[0]
+        return true

@@ -1,0 +1,23 @@
+"""A torque channel whose zero is off."""
+
+from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.kernel import torque_reading
+
+
+class TorqueOffset(Effect):
+    """The measured torque is the true one plus a constant."""
+
+    name = "torque_offset"
+    title = "Torque offset"
+    side = Side.SENSOR
+    equation = "measured torque = true torque + offset"
+    source = "Janot, Vandanjon, Gautier (2014), IEEE Trans. Control Systems Technology 22(1): the drive chain's offset"
+    looks_like = "a residual whose mean is not zero, moving or standing"
+    confirm = "switch the drive off and read its torque: it should be zero"
+    linear = (Parameter("offset", "N·m", "measured less true torque", "o", (-4.0, 4.0)),)
+    parity = Parity.EVEN
+
+    @torque_reading
+    def torque_reading(t, torque, values, joint, state):
+        """Shift the torque."""
+        torque[joint] += values[0]

@@ -1,0 +1,33 @@
+"""How exoid's figures look, and how they are written."""
+
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
+
+from pipelines.contracts.atomic import whole_file
+
+GREY, ORANGE, BLUE = "#7a869a", "#c2410c", "#1d4ed8"
+"""What is wanted or measured; what a model gives; what is left between the two."""
+
+STYLE = {
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.alpha": 0.25,
+    "legend.frameon": False,
+    "figure.dpi": 130,
+}
+
+
+def save(figure: Figure, stem: Path) -> None:
+    """Write a figure as ``stem``.png and ``stem``.pdf, and close it."""
+    for kind in ("png", "pdf"):
+        with whole_file(stem.with_name(f"{stem.name}.{kind}")) as path:
+            figure.savefig(path, format=kind, bbox_inches="tight")
+    plt.close(figure)

@@ -1,0 +1,154 @@
+"""The model beside a recording: under the recorded torque, and in its drives' loop under the recorded references."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipelines.contracts import Joint
+from pipelines.dynamics.pd_loop import Drives, LoopState, follow, loop_at_rest, make_drives, read_encoders
+from pipelines.dynamics.replay import EVERY_S, WINDOW_S, ReplayResult
+from pipelines.mechanics.motion import Motion
+from pipelines.simulation.plant import Plant
+
+NO_LIMIT_NM = 1e9
+
+
+@dataclass(frozen=True)
+class UnderReferences:
+    """Simulated beside measured, at the n samples of a motion; J joints."""
+
+    angle: NDArray
+    """(n, J) simulated encoder angle, rad."""
+    velocity: NDArray
+    torque: NDArray
+    """(n, J) simulated torque as the drives tell it, N·m."""
+    angle_rmse: NDArray
+    """(J,) rad, over valid samples."""
+    torque_rmse: NDArray
+    """(J,) N·m."""
+
+
+def why_no_closed_loop(motion: Motion) -> str:
+    """Say what a recording lacks for its drives' loop to be simulated; empty where it lacks nothing."""
+    controller = motion.metadata.get("controller") or {}
+    for joint in motion.joints:
+        about = controller.get(joint)
+        if about is None:
+            return f"its metadata names no controller of the {joint}"
+        if about["type"].lower() != "pd":
+            return f"the controller of its {joint} is of type {about['type']}, and exoid simulates pd only"
+        if about.get("kp_nm_rad") is None or about.get("kd_nm_s_rad") is None:
+            return f"the controller of its {joint} lacks kp_nm_rad or kd_nm_s_rad"
+    if motion.reference is None:
+        return "it holds no references"
+    if not np.isfinite(motion.reference).all():
+        return "its references have missing values"
+    return ""
+
+
+def follow_references(plant: Plant, motion: Motion) -> UnderReferences:
+    """Let the plant follow a motion's references under the drives that its metadata names.
+
+    Every segment begins in its recorded state; ``why_no_closed_loop`` must have nothing to say.
+    """
+    drives = _drives(motion)
+    simulated = [np.full(motion.q.shape, np.nan) for _ in range(3)]
+    assert motion.reference is not None
+    for segment in motion.segments():
+        period = 1.0 / motion.sample_rate_hz
+        loop = _loop_as_recorded(plant, motion, segment.start, period)
+        reference = np.ascontiguousarray(motion.reference[segment])
+        told = follow(plant.assembly, drives, loop, reference, motion.time[segment.start] - 0.5 * period)
+        for whole, part in zip(simulated, told, strict=False):
+            whole[segment] = part
+    angle, velocity, torque = simulated
+    return UnderReferences(
+        angle, velocity, torque, _rms((motion.q - angle)[motion.valid]), _rms((motion.torque - torque)[motion.valid])
+    )
+
+
+def _drives(motion: Motion) -> Drives:
+    of_joints = [motion.metadata["controller"][joint] for joint in motion.joints]
+    return make_drives(
+        kp=np.array([c["kp_nm_rad"] for c in of_joints], dtype=float),
+        kd=np.array([c["kd_nm_s_rad"] for c in of_joints], dtype=float),
+        limit=np.array([c.get("limit_nm") or NO_LIMIT_NM for c in of_joints]),
+        counts_per_turn=np.zeros(len(of_joints)),
+        rate_hz=max(c.get("rate_hz") or motion.sample_rate_hz for c in of_joints),
+        sample_rate_hz=motion.sample_rate_hz,
+    )
+
+
+def _loop_as_recorded(plant: Plant, motion: Motion, k: int, period: float) -> LoopState:
+    """Return the loop in the recorded state at the begin of sample ``k``, half a period before its time."""
+    motor, link = plant.model.sensed(motion), plant.model.corrected(motion)
+    state = np.stack([link.q[k], link.dq[k], motor.q[k], motor.dq[k]])
+    state[::2] -= 0.5 * period * state[1::2]
+    at_rest = loop_at_rest(plant.assembly, link.q[k])
+    counted = state[2].copy()
+    read_encoders(plant.assembly, counted)
+    assert motion.reference is not None
+    ahead = motion.reference[min(k + 1, len(motion) - 1)]
+    return at_rest._replace(
+        state=state,
+        angle=counted,
+        speed=motor.dq[k].copy(),
+        torque=plant.model.delivered(motion)[k].copy(),
+        reference=2.0 * motion.reference[k] - ahead,
+    )
+
+
+def _rms(x: NDArray) -> NDArray:
+    return np.sqrt(np.mean(x**2, axis=0))
+
+
+def open_loop_frame(replayed: ReplayResult, motion: Motion, joints: tuple[Joint, ...]) -> pd.DataFrame:
+    """Return the windows that follow each other without overlap as a ``simulation/1`` table.
+
+    What the model should have done, the recorded angle, stands as its reference; ``window`` numbers the windows.
+    """
+    apart = round(WINDOW_S / EVERY_S)
+    chosen = _without_overlap(replayed.first, replayed.angle.shape[1] - 1) if apart > 1 else replayed.first
+    which = np.searchsorted(replayed.first, chosen)
+    # A window's last sample is the next one's first.
+    rows = (chosen[:, np.newaxis] + np.arange(replayed.angle.shape[1] - 1)).ravel()
+
+    def joined(windows: NDArray) -> NDArray:
+        return windows[which, :-1].reshape(len(rows), -1)
+
+    angle, velocity, error = joined(replayed.angle), joined(replayed.velocity), joined(replayed.error)
+    columns = {"time_s": motion.time[rows], "window": np.repeat(which, replayed.angle.shape[1] - 1)}
+    for j, joint in enumerate(joints):
+        columns[joint.column("reference")] = angle[:, j] + error[:, j]
+        columns[joint.column("angle")] = angle[:, j]
+        columns[joint.column("velocity")] = velocity[:, j]
+        columns[joint.column("error")] = error[:, j]
+        columns[joint.column("torque")] = motion.torque[rows, j]
+        columns[joint.column("network")] = np.nan
+    return pd.DataFrame(columns)
+
+
+def _without_overlap(first: NDArray, length: int) -> NDArray:
+    chosen = [first[0]]
+    for start in first[1:]:
+        if start >= chosen[-1] + length:
+            chosen.append(start)
+    return np.array(chosen)
+
+
+def closed_loop_frame(made: UnderReferences, motion: Motion, joints: tuple[Joint, ...]) -> pd.DataFrame:
+    """Return a closed loop under recorded references as a ``simulation/1`` table, the measured beside it."""
+    assert motion.reference is not None
+    columns = {"time_s": motion.time}
+    for j, joint in enumerate(joints):
+        columns[joint.column("reference")] = motion.reference[:, j]
+        columns[joint.column("angle")] = made.angle[:, j]
+        columns[joint.column("velocity")] = made.velocity[:, j]
+        columns[joint.column("error")] = motion.reference[:, j] - made.angle[:, j]
+        columns[joint.column("torque")] = made.torque[:, j]
+        columns[joint.column("network")] = np.nan
+        columns[joint.column("angle_measured")] = motion.q[:, j]
+        columns[joint.column("torque").replace("torque", "torque_measured")] = motion.torque[:, j]
+    return pd.DataFrame(columns)
