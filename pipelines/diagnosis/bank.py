@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.candidates import Candidate, gram_of_runs, proposals, shape_grid, signatures
+from pipelines.diagnosis.candidates import Candidate, expanded, gram_of_runs, proposals, signatures
 from pipelines.diagnosis.gram import Gram, error, solve
 from pipelines.diagnosis.observations import Baseline, Run, with_load
-from pipelines.effects import Effect
+from pipelines.diagnosis.scan import Scan, worth_a_look
 
 PASSES = 3
 
@@ -50,6 +50,7 @@ def fill(runs: Sequence[Run], baseline: Baseline, report: Callable[[float, str],
     plain = gram_of_runs(runs, untouched)
     weights = weights_under(plain)
     runs = [with_load(run, baseline, solve(plain, weights)) for run in runs]
+    scan = Scan.of(runs, untouched, weights)
     candidates: list[Candidate] = []
     where: list[slice] = []
     columns = [untouched]
@@ -57,16 +58,11 @@ def fill(runs: Sequence[Run], baseline: Baseline, report: Callable[[float, str],
     effects = list(proposals(baseline.joints, baseline.kinds))
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
-        for candidate in candidates_of(effect, runs):
-            made = signatures(candidate, runs, baseline, untouched, weights)
+        for candidate in worth_a_look(effect, scan):
+            made = expanded(signatures(candidate, runs, baseline, untouched, weights), candidate, runs)
             candidates.append(candidate)
             where.append(slice(at, at + made[0].shape[2]))
             columns.append(made)
             at += made[0].shape[2]
     stacked = [np.concatenate([column[r] for column in columns], axis=2) for r in range(len(runs))]
     return Bank(tuple(runs), baseline, tuple(candidates), tuple(where), gram_of_runs(runs, stacked), weights)
-
-
-def candidates_of(effect: Effect, runs: Sequence[Run]) -> list[Candidate]:
-    """Return the shapes of an effect that are tried first."""
-    return [Candidate(effect, (shape,) * len(runs)) for shape in shape_grid(effect)]

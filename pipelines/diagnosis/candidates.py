@@ -6,7 +6,6 @@ refitted there, and its difference from the untouched baseline under the same pa
 Linearised at biased parameters, elasticity would pass for an encoder offset.
 """
 
-import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -15,11 +14,11 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.gram import Gram, gram_of, solve
 from pipelines.diagnosis.observations import FOLDS, Baseline, Run
-from pipelines.effects import EFFECTS, Effect, Parameter, Side
+from pipelines.effects import EFFECTS, Effect, Side
 from pipelines.model import Model, Term
 
-GRID = 7
-"""Values of a shape parameter tried before refinement."""
+WORN = ("mass_off_axis", "payload_change")
+"""Effects of the structure that the person may carry instead: then in their runs only, and felt by the cuffs."""
 BASELINE = ("rigid_body", "friction")
 
 
@@ -43,8 +42,12 @@ class Candidate:
     @property
     def bends(self) -> bool:
         """Whether the effect changes kinematics or readings rather than adding torque of its own."""
-        e = self.effect
-        return type(e).corrected is not Effect.corrected or bool(e.torque_reading is not None and e.shape)
+        return bends_motion(self.effect)
+
+
+def bends_motion(effect: Effect) -> bool:
+    """Tell whether an effect changes kinematics or readings rather than adding torque of its own."""
+    return type(effect).corrected is not Effect.corrected or bool(effect.torque_reading is not None and effect.shape)
 
 
 def proposals(joints: Sequence[str], kinds: Sequence[str]) -> Iterator[Effect]:
@@ -54,26 +57,13 @@ def proposals(joints: Sequence[str], kinds: Sequence[str]) -> Iterator[Effect]:
             continue
         if effect.whole_leg:
             yield effect()
-        else:
-            yield from (effect(joint=j) for j in effect.joints or joints if j not in effect.absorbed)
-
-
-def shape_grid(effect: Effect) -> Iterator[tuple[float, ...]]:
-    """Yield the shapes tried first."""
-    yield from itertools.product(*(_values(parameter) for parameter in effect.shape))
-
-
-def _values(parameter: Parameter) -> NDArray:
-    if parameter.forms:
-        return np.array(parameter.forms)
-    if parameter.default is not None:
-        return np.array([parameter.default])
-    low, high = parameter.typical
-    if low > 0 and high / low > 4:
-        return np.geomspace(low, high, GRID)
-    values = np.linspace(low, high, GRID)
-    # Nothing is no candidate.
-    return values[np.abs(values) > 1e-3 * max(abs(low), abs(high))]
+            continue
+        for joint in effect.joints or joints:
+            if joint in effect.absorbed:
+                continue
+            yield effect(joint=joint)
+            if effect.name in WORN and "with_human" in kinds:
+                yield effect(joint=joint, run="with_human")
 
 
 def columns_under(terms: Sequence[Term], run: Run, baseline: Baseline) -> tuple[NDArray, NDArray]:
@@ -139,3 +129,31 @@ def torque_columns(candidate: Candidate, number: int, run: Run) -> NDArray:
     effect = candidate.effect
     own = run.average(effect.columns(run.motion, candidate.shapes[number]))
     return np.concatenate([own, own if effect.on_limb else np.zeros_like(own)], axis=1)
+
+
+def expanded(columns: Sequence[NDArray], candidate: Candidate, runs: Sequence[Run]) -> list[NDArray]:
+    """Give linear parameters that each run has for itself a column for each run the effect acts in, (m, O, k')."""
+    effect = candidate.effect
+    apart = [] if candidate.bends else [p.per_run for p in effect.linear]
+    if not any(apart):
+        return list(columns)
+    acting = [r for r, run in enumerate(runs) if effect.explains(run.motion)]
+    wide = iter(expanded_columns([columns[r].reshape(-1, len(apart)) for r in acting], apart))
+    width = apart.count(False) + apart.count(True) * len(acting)
+    shapes = [c.shape[:2] for c in columns]
+    return [
+        next(wide).reshape(*shapes[r], width) if r in acting else np.zeros((*shapes[r], width))
+        for r in range(len(runs))
+    ]
+
+
+def expanded_columns(parts: Sequence[NDArray], apart: Sequence[bool]) -> list[NDArray]:
+    """Give those columns of each part (rows, k) that are ``apart`` a place of their own, nought in all other parts."""
+    if not any(apart):
+        return list(parts)
+    shared, own = [i for i, a in enumerate(apart) if not a], [i for i, a in enumerate(apart) if a]
+    wide = []
+    for number, part in enumerate(parts):
+        blocks = [part[:, own] if k == number else np.zeros((len(part), len(own))) for k in range(len(parts))]
+        wide.append(np.hstack([part[:, shared], *blocks]))
+    return wide
