@@ -17,7 +17,7 @@ CONTACT_DAMPING_RATIO = 0.3
 """Of the motor's swing on its teeth."""
 
 CROSSING_TORQUE = 2.0
-"""N·m on both sides of zero over which a measured motion crosses the play: the link does not jump, it swings over."""
+"""N·m on both sides of zero within which the estimate of the transmitted torque does not tell the side."""
 
 
 class Backlash(Effect):
@@ -45,14 +45,12 @@ class Backlash(Effect):
         return 0.0
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
-        """Return the motion of the link, which swings over smoothly where the transmitted torque changes sign."""
+        """Return the motion with the link's angle.
+
+        Speed and acceleration stay the motor's: how the link swings over and bounces while the torque changes
+        sign no measured motion tells, and a smooth guess at it does more harm than none.
+        """
         j = motion.joint_index(self.joint)
-        load, rate, curvature = (torque[:, j] / CROSSING_TORQUE for torque in motion.transmitted)
-        side = np.tanh(load)
-        slope = 1.0 - side**2
-        half = 0.5 * shape[0]
-        q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
-        q[:, j] -= half * side
-        dq[:, j] -= half * slope * rate
-        ddq[:, j] -= half * slope * (curvature - 2.0 * side * rate**2)
-        return motion.with_state(q, dq, ddq)
+        q = motion.q.copy()
+        q[:, j] -= 0.5 * shape[0] * np.tanh(motion.transmitted[0][:, j] / CROSSING_TORQUE)
+        return motion.with_state(q, motion.dq, motion.ddq)

@@ -8,7 +8,7 @@ from pipelines.effects.effect import Effect, Parameter, Side
 from pipelines.effects.kernel import spring
 from pipelines.mechanics.motion import Motion
 
-MOTOR_INERTIA = 0.02
+MOTOR_INERTIA = 0.1
 """kg·m², reflected to the joint; what little of a rigid drive's inertia stays with the motor."""
 
 DAMPING_RATIO = 0.1

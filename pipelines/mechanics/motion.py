@@ -50,6 +50,8 @@ class Motion:
     """Of the zero-phase filter that made q."""
     load: NDArray | None = None
     """(n, J) N·m that the drive trains pass on to the links, where a fit has estimated it."""
+    limb_load: NDArray | None = None
+    """(n, J) N·m of the machine on the wearer's limb, where a fit has estimated it."""
     file: str = ""
     metadata: dict[str, Any] = field(default_factory=dict)
 
@@ -84,8 +86,10 @@ class Motion:
     def on_limb(self) -> tuple[NDArray, NDArray, NDArray]:
         """Torque of the machine on the wearer's limb, its first and its second derivative, (n, J) each.
 
-        From the cuff forces where they were read; else what is passed on to the links.
+        The estimate where there is one; else from the cuff forces; else what is passed on to the links.
         """
+        if self.limb_load is not None:
+            return self._smoothed(self.limb_load)
         if self.forces is None or self.geometry.thigh_cuff_distance_m is None:
             return self.transmitted
         thigh, shank = self.forces[:, :2].sum(axis=1), self.forces[:, 2:].sum(axis=1)

@@ -76,11 +76,11 @@ def test_the_fitness_agrees_with_singular_values(criterion):
 def test_a_repaired_motion_keeps_its_bounds_between_samples(samples, harmonics, theta0, rest):
     of = a_problem(harmonics, "log_det", theta0, max(samples, 40 * harmonics), rest)
     bounds = bounds_array(JointBounds())
-    for seed in range(20):
+    for seed in range(3):
         candidate = random_candidate(of, seed, size=3.0)
         cost(candidate, of, workspace(of))
         motion = as_trajectory(candidate, of)
-        fine = np.array(motion.at(np.linspace(0.0, 10.0, 100 * 200)))  # a grid 100 times finer than the coarsest
+        fine = np.array(motion.at(np.linspace(0.0, 10.0, 100 * samples)))
         assert np.all(fine.min(axis=1) >= bounds[..., 0] - 1e-12)
         assert np.all(fine.max(axis=1) <= bounds[..., 1] + 1e-12)
         reached = motion.extrema()

@@ -55,7 +55,7 @@ def test_velocity_and_acceleration_are_the_derivatives_of_the_angle(random_traje
 
 @pytest.mark.parametrize("harmonics", [1, 2, 5, 12, 20])
 def test_extrema_are_those_of_a_very_fine_grid(random_trajectory, harmonics):
-    for seed in range(20):
+    for seed in range(5):
         trajectory = random_trajectory(seed, harmonics)
         fine = trajectory.at(np.linspace(0.0, trajectory.period_s, 100_001))
         low, high = (np.array([pick(x, axis=0) for x in fine]) for pick in (np.min, np.max))

@@ -1,0 +1,91 @@
+"""Which cases an examination consists of: what is hidden in each, by its number alone."""
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from tests.blind.causes import CAUSES, HUMAN_CAUSES, joints_of
+from tests.blind.faults import FAULTS
+from tests.blind.outside import OUTSIDE
+from tests.blind.plan import HIP, JOINTS, KNEE
+
+MIX = {"single": 0.55, "none": 0.10, "imperfect": 0.08, "pair": 0.12, "outside": 0.09, "fault": 0.06}
+"""Shares of the categories in a mixed examination."""
+Spec = tuple[str, int | None]
+SINGLES: tuple[Spec, ...] = tuple((effect, joint) for effect in CAUSES for joint in joints_of(effect))
+NOT_TOGETHER = (
+    {"backlash", "joint_elasticity"},  # one transmission a joint, and each hides the other
+    {"cuff_compliance", "passive_joint_torque"},
+)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One session to be simulated."""
+
+    seed: int
+    category: str
+    hidden: tuple[Spec, ...] = ()
+    """Effects and their joints (0 hip, 1 knee, none for the whole leg)."""
+    fault: str | None = None
+    kinds: tuple[str, ...] = ("exo_alone", "with_human")
+
+    @property
+    def label(self) -> str:
+        """What is hidden, for reports."""
+        names = [e if j is None else f"{e}@{JOINTS[j]}" for e, j in self.hidden]
+        return " + ".join(names) or self.fault or self.category
+
+    def as_dict(self) -> dict:
+        """Return what a truth file says of the case."""
+        return asdict(self)
+
+
+def mixed(cases: int, seed_base: int, mix: dict[str, float] = MIX) -> list[Case]:
+    """Return cases of all categories; each goes through its causes in turn."""
+    total = sum(mix.values())
+    counts = {category: int(np.floor(cases * share / total)) for category, share in mix.items()}
+    counts[max(mix, key=mix.__getitem__)] += cases - sum(counts.values())
+    planned = [(category, i) for category, count in counts.items() for i in range(count)]
+    return [case(seed_base + k, category, i) for k, (category, i) in enumerate(planned)]
+
+
+def full(seed_base: int, each: int = 30, none: int = 300) -> list[Case]:
+    """Return ``none`` cases with nothing hidden and ``each`` of every cause and joint."""
+    silent = [case(seed_base + k, "none", k) for k in range(none)]
+    singles = [case(seed_base + none + k, "single", k) for k in range(each * len(SINGLES))]
+    return silent + singles
+
+
+def case(seed: int, category: str, turn: int) -> Case:
+    """Return a case; ``turn`` counts through what the category can hide."""
+    rng = np.random.default_rng([seed, 1])
+    if category == "single":
+        hidden: tuple[Spec, ...] = (SINGLES[turn % len(SINGLES)],)
+    elif category == "pair":
+        hidden = _pair(rng, SINGLES[turn * 7 % len(SINGLES)])
+    elif category == "outside":
+        kind = OUTSIDE[turn % len(OUTSIDE)].__name__
+        hidden = ((f"outside:{kind}", int(rng.choice([HIP, KNEE]))),)
+    else:
+        hidden = ()
+    fault = FAULTS[turn % len(FAULTS)].__name__ if category == "fault" else None
+    return Case(seed, category, hidden, fault, _kinds(rng, category, hidden))
+
+
+def _pair(rng: np.random.Generator, first: Spec) -> tuple[Spec, ...]:
+    while True:
+        second = SINGLES[int(rng.integers(len(SINGLES)))]
+        both = {first[0], second[0]}
+        if len(both) == 2 and both not in NOT_TOGETHER:
+            return first, second
+
+
+def _kinds(rng: np.random.Generator, category: str, hidden: tuple[Spec, ...]) -> tuple[str, ...]:
+    """Most sessions have runs of both kinds; some singles and faultless ones have one."""
+    both = ("exo_alone", "with_human")
+    draw = rng.random()
+    if category not in ("single", "none") or draw < 0.8:
+        return both
+    needs_human = any(effect in HUMAN_CAUSES for effect, _ in hidden)
+    return ("with_human",) if needs_human or draw < 0.9 else ("exo_alone",)

@@ -1,0 +1,75 @@
+"""Random exoskeletons: links, friction, drives, encoders, and how well torque and forces are measured."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from tests.blind.body import Leg, Segment
+
+SPEED_CUTOFF_HZ = 40.0
+DRIVE_RATE_HZ = 1000.0
+CHATTER_NM = 0.8
+"""Damping torque of one encoder count: a coarse encoder allows little damping."""
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A powered leg. Arrays are hip, knee; SI units."""
+
+    leg: Leg
+    coulomb: NDArray
+    viscous: NDArray
+    hip_rotor: float
+    kp: NDArray
+    kd: NDArray
+    limit: NDArray
+    counts: NDArray
+    """Encoder counts per turn of the joint."""
+    ripple: NDArray
+    """RMS of the error of the measured torque, N·m."""
+    ripple_time: NDArray
+    """Its correlation time, s."""
+    ripple_cycles: NDArray
+    """Cycles per turn of the part of it that goes with the motor's angle."""
+    ripple_share: NDArray
+    """Of the ripple's power, what goes with the motor's angle."""
+    cuff_distance: tuple[float, float]
+    cuff_zero: NDArray
+    """(4, 3) N."""
+    cuff_noise: float
+    carried: float
+    """Share of the limb's weight that the cuffs carry along it."""
+    preload: float
+
+
+def random_machine(rng: Generator, thigh_length: float) -> Machine:
+    """Draw an exoskeleton for a thigh of this length."""
+    thigh_mass, shank_mass = rng.uniform(2.5, 5.0), rng.uniform(1.5, 3.0)
+    leg = Leg(
+        Segment(thigh_mass, rng.uniform(0.35, 0.6) * thigh_length, thigh_mass * rng.uniform(0.01, 0.02)),
+        Segment(shank_mass, rng.uniform(0.12, 0.24), shank_mass * rng.uniform(0.008, 0.02)),
+        thigh_length,
+    )
+    counts = np.round(2.0 ** rng.uniform(14.0, 19.0, 2))
+    fine = CHATTER_NM / (2 * np.pi / counts * 2 * np.pi * SPEED_CUTOFF_HZ)
+    return Machine(
+        leg=leg,
+        coulomb=rng.uniform([1.0, 1.0], [4.0, 4.5]),
+        viscous=rng.uniform([1.5, 1.5], [5.0, 6.0]),
+        hip_rotor=rng.uniform(0.05, 0.4),
+        kp=rng.uniform([700.0, 300.0], [1500.0, 700.0]),
+        kd=np.minimum(rng.uniform([30.0, 10.0], [60.0, 25.0]), fine),
+        limit=np.array([200.0, 200.0]),
+        counts=counts,
+        ripple=rng.uniform(0.3, 1.0, 2),
+        ripple_time=np.exp(rng.uniform(np.log(0.004), np.log(0.05), 2)),
+        ripple_cycles=rng.integers(150, 600, 2).astype(float),
+        ripple_share=np.where(rng.random(2) < 0.4, rng.uniform(0.05, 0.25, 2), 0.0),
+        cuff_distance=(rng.uniform(0.5, 0.7) * thigh_length, rng.uniform(0.18, 0.26)),
+        cuff_zero=rng.normal(0.0, 1.5, (4, 3)),
+        cuff_noise=rng.uniform(0.2, 0.8),
+        carried=rng.uniform(0.0, 0.3),
+        preload=rng.uniform(5.0, 25.0),
+    )

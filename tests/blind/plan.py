@@ -1,0 +1,95 @@
+"""What is hidden in one run: every place where an effect can act, gathered before the run is simulated."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from tests.blind.body import Payload, Segment
+from tests.blind.loop import RIGID, Hidden
+from tests.blind.smooth import MEMORIES
+
+HIP, KNEE = 0, 1
+JOINTS = ("hip", "knee")
+MOTOR_INERTIA = 0.04
+"""kg·m² behind a soft transmission."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run to be recorded; ``rng`` is that of what differs from run to run."""
+
+    kind: str
+    purpose: str
+    duration_s: float
+    rng: Generator
+
+    @property
+    def has_human(self) -> bool:
+        """Is a person in the machine?"""
+        return self.kind == "with_human"
+
+
+@dataclass
+class Channel:
+    """What becomes of a joint's torque between motor and file; arrays (2,)."""
+
+    gain: NDArray = field(default_factory=lambda: np.ones(2))
+    bend: NDArray = field(default_factory=lambda: np.zeros(2))
+    """Change of gain per N·m of the torque's size."""
+    fade: NDArray = field(default_factory=lambda: np.zeros((2, 2)))
+    """Change of gain as the sensor warms, and its time constant."""
+    offset: NDArray = field(default_factory=lambda: np.zeros(2))
+    moving_offset: list = field(default_factory=lambda: [None, None])
+    """Function of time, N·m."""
+    delay_s: NDArray = field(default_factory=lambda: np.zeros(2))
+    lag_s: NDArray = field(default_factory=lambda: np.zeros(2))
+    cross: NDArray = field(default_factory=lambda: np.zeros((2, 2)))
+    """Share of the other joint's torque that leaks in."""
+
+
+class Plan:
+    """Everything hidden in one run."""
+
+    def __init__(self) -> None:
+        self.rows: list[tuple] = []
+        self.channel = Channel()
+        self.added_mass = np.zeros((2, 2))
+        self.transmission = np.full(2, RIGID)
+        self.motor_inertia = np.zeros(2)
+        self.spring = np.zeros((2, 5))
+        self.encoder_offset = np.zeros(2)
+        self.wobble = np.zeros((2, 2))
+        self.tilt = np.zeros(3)
+        self.lumps: list[tuple[int, Segment]] = []
+        self.payload: Payload | None = None
+        self.load = np.array([0.0, 0.0, 1.0, 1.0])
+        """Payload's mass, start, ramp, and whether it comes (+1) or goes (-1)."""
+        self.cuffs: NDArray | None = None
+        """(2, 3) stiffness (N·m/rad about the joint), damping (N·m·s/rad), hardening (1/rad²) of thigh and shank cuff.
+
+        None where the wearer is strapped so firmly that both legs are one.
+        """
+
+    def torque(self, kind: int, joint: int, *p: float, human: bool = False, table: NDArray | None = None) -> None:
+        """Hide a torque at a joint."""
+        self.rows.append((kind, joint, human, p, table))
+
+    def soft(self, joint: int, kind: int, *spring: float) -> None:
+        """Put a spring or a play between a motor and its link."""
+        self.transmission[joint] = kind
+        self.motor_inertia[joint] = MOTOR_INERTIA
+        self.spring[joint, : len(spring)] = spring
+
+    def hidden(self) -> Hidden:
+        """Lay the hidden torques out for the compiled loop."""
+        n = len(self.rows)
+        longest = max([2, *(len(row[4]) for row in self.rows if row[4] is not None)])
+        p, table = np.zeros((n, 8)), np.zeros((n, longest))
+        for i, (_, _, _, values, curve) in enumerate(self.rows):
+            p[i, : len(values)] = values
+            if curve is not None:
+                table[i] = np.concatenate([curve, np.full(longest - len(curve), curve[-1])])
+        columns = [np.array([row[c] for row in self.rows], dtype=np.int64) for c in range(3)]
+        return Hidden(*columns, p, np.zeros((n, MEMORIES)), table)

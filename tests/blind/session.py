@@ -1,0 +1,228 @@
+"""A whole session: its runs in files that say nothing, its truth in a file that nobody may read."""
+
+import hashlib
+import json
+import shutil
+from dataclasses import asdict, dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.random import Generator
+
+from tests.blind import outside
+from tests.blind.cases import Case
+from tests.blind.causes import Cause, log_uniform, random_cause
+from tests.blind.excitation import PERIOD_S, random_excitation
+from tests.blind.faults import IN_EVERY_RUN, fault_named
+from tests.blind.floor import left_by_the_baseline, noise_floor, ripple_floor
+from tests.blind.imperfections import random_imperfections
+from tests.blind.machine import DRIVE_RATE_HZ, random_machine
+from tests.blind.magnitude import magnitude, size_for
+from tests.blind.people import random_person
+from tests.blind.plan import HIP, JOINTS, KNEE, Plan, Run
+from tests.blind.plant import Recorded, Rig, record
+from tests.blind.smooth import SPRING
+
+LEAST, MOST = 0.03, 0.25
+"""Magnitudes of what is hidden."""
+PILOT_S = 12.0
+ATTEMPTS = 6
+PURPOSES = ("train", "validate")
+
+
+@dataclass(frozen=True)
+class Session:
+    """One session in memory."""
+
+    case: Case
+    rig: Rig
+    hidden: list[tuple[Cause, float, float]]
+    """Cause, size, wanted magnitude."""
+    runs: list[Recorded]
+
+    def of(self, purpose: str) -> list[Recorded]:
+        """Return the runs with this purpose."""
+        return [r for r in self.runs if r.run.purpose == purpose]
+
+
+def simulate(case: Case) -> Session:
+    """Draw a rig, a person and what is hidden, and simulate all runs; the case's seed decides everything.
+
+    A leg that what is hidden makes unstable is drawn anew: no lab would record it.
+    """
+    for attempt in range(ATTEMPTS):
+        try:
+            return _Draw(case, attempt).session()
+        except FloatingPointError:
+            continue
+    raise FloatingPointError(f"seed {case.seed}: {ATTEMPTS} legs in a row were unstable")
+
+
+class _Draw:
+    """Everything that a case's seed draws, each part from a stream of its own."""
+
+    def __init__(self, case: Case, attempt: int) -> None:
+        self.case = case
+        self.stream = [case.seed, 2, attempt]
+        rng = self.rng(0)
+        self.person = random_person(rng)
+        self.rig = Rig(random_machine(rng, self.person.thigh_length), self.person)
+        self.excitation = {purpose: random_excitation(rng) for purpose in PURPOSES}
+        self.duration = float(rng.choice([60.0, 70.0, 80.0]))
+        self.softness = rng.uniform(0.0, 0.25, 2)
+
+    def rng(self, *part: int) -> Generator:
+        return np.random.default_rng([*self.stream, *part])
+
+    def session(self) -> Session:
+        hidden = [(cause, self._size(cause, wanted), wanted) for cause, wanted in self._wanted()]
+        runs = [(kind, purpose) for kind in self.case.kinds for purpose in PURPOSES]
+        causes = [(cause, size) for cause, size, _ in hidden]
+        recorded = [self._record(causes, kind, purpose, self.duration) for kind, purpose in runs]
+        return Session(self.case, self.rig, hidden, recorded)
+
+    def _wanted(self) -> list[tuple[Cause, float]]:
+        rng = self.rng(1)
+        if self.case.category == "imperfect":
+            return random_imperfections(rng)
+        wanted = []
+        for effect, joint in self.case.hidden:
+            if effect.startswith("outside:"):
+                kind = getattr(outside, effect.removeprefix("outside:"))
+                cause = outside.random_outside(rng, kind, joint)
+            else:
+                cause = random_cause(rng, effect, joint)
+            wanted.append((cause, log_uniform(rng, LEAST, MOST)))
+        return wanted
+
+    def _size(self, cause: Cause, wanted: float) -> float:
+        kinds = [kind for kind in self.case.kinds if cause.acts_in(kind)]
+        duration = self.duration if cause.slow else PILOT_S
+
+        def pilot(size: float) -> list[Recorded]:
+            return [
+                self._record([(cause, size)], kind, purpose, duration) for kind, purpose in product(kinds, PURPOSES)
+            ]
+
+        return size_for(cause, wanted, pilot)
+
+    def _record(self, causes: list[tuple[Cause, float]], kind: str, purpose: str, duration: float) -> Recorded:
+        number = 2 * (kind == "with_human") + (purpose == "validate")
+        run = Run(kind, purpose, duration, self.rng(2, number))
+        plan = Plan()
+        if self.case.category != "none" and run.has_human:
+            # Relaxed muscles are a little elastic: far below what is hidden.
+            for j, rest in ((HIP, 0.5), (KNEE, -0.9)):
+                plan.torque(SPRING, j, self.softness[j], rest, 0.0, 0.1, human=True)
+        for cause, size in causes:
+            cause.install(plan, size, run)
+        return record(self.rig, self.excitation[purpose], plan, run, self.rng(3, number))
+
+
+def write(session: Session, recordings: Path, truth: Path) -> None:
+    """Write a session's recordings into a new folder, and its truth into a file elsewhere."""
+    shutil.rmtree(recordings, ignore_errors=True)
+    recordings.mkdir(parents=True)
+    rng = np.random.default_rng([session.case.seed, 4])
+    names = [f"run_{number}.parquet" for number in rng.permutation(len(session.runs)) + 1]
+    label = hashlib.sha256(f"session {session.case.seed}".encode()).hexdigest()[:8]
+    tables = [_columns(r) for r in session.runs]
+    fault = _spoil(session, tables, names, rng) if session.case.fault else None
+    for r, columns, name in zip(session.runs, tables, names, strict=True):
+        table = pa.table({key: pa.array(values) for key, values in columns.items()})
+        header = json.dumps(_header(session.rig, r, label)).encode()
+        pq.write_table(table.replace_schema_metadata({b"exoid": header}), recordings / name)
+    truth.parent.mkdir(parents=True, exist_ok=True)
+    # Last and whole: a truth that is there means that the session is complete.
+    part = truth.with_suffix(".part")
+    part.write_text(json.dumps(_truth(session, names, fault), indent=1))
+    part.rename(truth)
+
+
+def _columns(r: Recorded) -> dict[str, np.ndarray]:
+    columns = {"time_s": r.time.copy()}
+    pairs = {"angle_rad": r.angle, "torque_nm": r.torque, "reference_rad": r.reference, "velocity_rad_s": r.drive_speed}
+    for quantity, values in pairs.items():
+        for j, joint in enumerate(JOINTS):
+            columns[f"{joint}_{quantity}"] = values[:, j].copy()
+    if r.forces is not None:
+        for s, sensor in enumerate(("thigh_front", "thigh_back", "shank_front", "shank_back")):
+            for i, axis in enumerate("xyz"):
+                columns[f"{sensor}_force_{axis}_n"] = r.forces[:, s, i].copy()
+    columns["sequence"] = np.arange(len(r.time), dtype=np.int64)
+    return columns
+
+
+def _header(rig: Rig, r: Recorded, label: str) -> dict[str, Any]:
+    machine = rig.machine
+    geometry = {"thigh_length_m": machine.leg.length, "gravity_m_s2": machine.leg.gravity}
+    if r.run.has_human:
+        thigh, shank = machine.cuff_distance
+        geometry |= {"thigh_cuff_distance_m": thigh, "shank_cuff_distance_m": shank}
+    controller = {
+        joint: {
+            "type": "pd", "kp_nm_rad": float(machine.kp[j]), "kd_nm_s_rad": float(machine.kd[j]),
+            "rate_hz": DRIVE_RATE_HZ, "limit_nm": float(machine.limit[j]),
+        }
+        for j, joint in enumerate(JOINTS)
+    }  # fmt: skip
+    return {
+        "contract": "recording/1", "run": r.run.kind, "purpose": r.run.purpose, "sample_rate_hz": 200.0,
+        "period_s": PERIOD_S, "session": label, "controller": controller, "geometry": geometry,
+    }  # fmt: skip
+
+
+def _spoil(session: Session, tables: list[dict], names: list[str], rng: Generator) -> dict[str, Any]:
+    """Put the case's fault into one run, or into all where it is one of the wiring."""
+    name = session.case.fault
+    spoil, joint = fault_named(name), int(rng.integers(2))
+    chosen = range(len(tables)) if name in IN_EVERY_RUN else [int(rng.integers(len(tables)))]
+    # The same stream for every run: a wrong unit is the same wrong unit everywhere.
+    seed = int(rng.integers(2**32))
+    channel = [spoil(tables[i], np.random.default_rng(seed), joint) for i in chosen]
+    return {"fault": name, "files": [names[i] for i in chosen], "channel": channel[0]}
+
+
+def _truth(session: Session, names: list[str], fault: dict[str, Any] | None) -> dict[str, Any]:
+    validate, rig = session.of("validate"), session.rig
+    alone = len(session.hidden) == 1
+    return {
+        "case": session.case.as_dict(),
+        "hidden": [
+            {
+                "effect": cause.effect,
+                "joint": None if cause.joint is None else JOINTS[cause.joint],
+                "form": cause.form,
+                "own_form": cause.own,
+                "size": size,
+                "shape": [float(x) for x in cause.shape],
+                "parameters": cause.parameters(size),
+                "wanted_magnitude": wanted,
+                "magnitude": magnitude(cause, session.runs) if alone else wanted,
+            }
+            for cause, size, wanted in session.hidden
+        ],
+        "fault": fault,
+        "noise_floor_nm": _by_joint(noise_floor(rig, validate)),
+        "ripple_floor_nm": _by_joint(ripple_floor(validate)),
+        "left_by_baseline_nm": _by_joint(left_by_the_baseline(rig, session.runs)),
+        "torque_rms_nm": _by_joint(np.sqrt(np.mean([np.mean(r.torque**2, axis=0) for r in validate], axis=0))),
+        "runs": [
+            {"file": name, "run": r.run.kind, "purpose": r.run.purpose, "duration_s": r.run.duration_s}
+            for name, r in zip(names, session.runs, strict=True)
+        ],
+        "person": asdict(rig.person),
+        "X": {kind: rig.leg(Run(kind, "train", 0.0, None)).inertial().tolist() for kind in session.case.kinds},
+        "machine": {
+            name: np.asarray(getattr(rig.machine, name)).tolist()
+            for name in ("coulomb", "viscous", "hip_rotor", "counts", "ripple", "ripple_time")
+        },
+    }
+
+
+def _by_joint(values: np.ndarray) -> dict[str, float]:
+    return dict(zip(JOINTS, np.asarray(values, float).tolist(), strict=True))
