@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from pipelines.diagnosis.candidates import Candidate, columns_under, gram_of_runs
+from pipelines.diagnosis.candidates import Candidate, columns_under, expanded, gram_of_runs
 from pipelines.diagnosis.gram import Gram, error, solve
 from pipelines.diagnosis.observations import Baseline, Run
-from pipelines.effects import Parameter
+from pipelines.effects import Parameter, Side
 
 SWEEPS = 2
 EVALUATIONS = 14
@@ -31,15 +31,44 @@ class Fit:
     rms: NDArray
     """(O,) N·m on what was fitted."""
     cost: float
-    """Sum over outputs of independent samples times log rms: what refinement lowers."""
+    """Sum over outputs of samples times log rms: what refinement lowers."""
+    kinds: tuple[str, ...]
+    """The kind of each run fitted."""
+
+    def acting(self, cause: Candidate) -> int:
+        """Return in how many of the runs a cause acts."""
+        effect = cause.effect
+        return sum(kind in effect.acts_in and effect.run in (None, kind) for kind in self.kinds)
 
 
 def fit(causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline, weights: NDArray) -> Fit:
     """Fit baseline and causes at the shapes they have."""
-    made = [columns_under([c.term(r) for c in causes], run, baseline) for r, run in enumerate(runs)]
-    gram = gram_of_runs(runs, *zip(*made, strict=True))
+    gram = gram_of_runs(runs, *zip(*stacked_columns(causes, runs, baseline), strict=True))
     values = solve(gram, weights)
-    return Fit(tuple(causes), values, *_errors(gram, values))
+    return Fit(tuple(sorted(causes, key=_last_sensors)), values, *_errors(gram, values), tuple(r.motion.run for r in runs))
+
+
+def _last_sensors(cause: Candidate) -> bool:
+    return cause.effect.side is Side.SENSOR
+
+
+def stacked_columns(
+    causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline
+) -> list[tuple[NDArray, NDArray]]:
+    """Return columns (m, O, c) and measured torque (m, O) of each run, run-wise parameters in places of their own."""
+    made = [columns_under([c.term(r) for c in causes], run, baseline) for r, run in enumerate(runs)]
+    if not any(p.per_run for c in causes for p in c.effect.linear):
+        return made
+    at = baseline.size
+    parts = [[columns[:, :, :at] for columns, _ in made]]
+    # ``columns_under`` puts sensors' columns last.
+    for cause in sorted(causes, key=_last_sensors):
+        width = len(cause.effect.linear)
+        parts.append(expanded([columns[:, :, at : at + width] for columns, _ in made], cause, runs))
+        at += width
+    return [
+        (np.concatenate([part[r] for part in parts], axis=2), measured) for r, (_, measured) in enumerate(made)
+    ]
 
 
 def _errors(gram: Gram, values: NDArray) -> tuple[NDArray, NDArray, float]:

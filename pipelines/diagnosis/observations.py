@@ -176,12 +176,12 @@ def baseline_of(runs: Sequence[Run]) -> Baseline:
 
 
 def with_load(run: Run, baseline: Baseline, values: NDArray) -> Run:
-    """Return the run with the torque its links take estimated from the baseline's rigid bodies.
+    """Return the run with the loads of links and limb estimated from the baseline's rigid bodies.
 
-    The measured torque would not do: its noise would stand on both sides of the regression.
+    The measured torques would not do: their noise would stand on both sides of the regression.
     """
     columns = baseline.columns(run.motion, run.motion)
-    bodies = BODY * len(baseline.bodies)
-    J = len(baseline.joints)
+    J, bodies = len(baseline.joints), BODY * len(baseline.bodies)
     load = columns[:, :J, :bodies] @ values[:bodies]
-    return replace(run, motion=replace(run.motion, load=load))
+    limb = columns[:, :J, BODY:bodies] @ values[BODY:bodies] if bodies > BODY else load
+    return replace(run, motion=replace(run.motion, load=load, limb_load=limb))

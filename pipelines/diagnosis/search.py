@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.bank import Bank
-from pipelines.diagnosis.gram import held_out_error
+from pipelines.diagnosis.candidates import Candidate
+from pipelines.diagnosis.gram import Gram, held_out_error, solve
 
 BEAM = 10
 """Sets carried from one size to the next."""
@@ -48,6 +49,8 @@ class Scorer:
     def __call__(self, chosen: Sequence[int]) -> Scored:
         """Score a set."""
         gram = self.bank.gram.select(self.bank.columns_of(chosen))
+        if not self._possible(gram, chosen):
+            return Scored(tuple(chosen), -np.inf, np.full(len(self.count), np.nan))
         squares = held_out_error(gram, self.bank.weights)
         rms = np.sqrt(squares / np.maximum(self.count, 1))
         gain = 0.0
@@ -56,6 +59,28 @@ class Scorer:
             gain = float(np.sum(self.independent[a] * np.log(self._plain[a] / rms[a])))
         shapes = sum(len(self.bank.candidates[i].effect.shape) for i in chosen)
         return Scored(tuple(chosen), gain - SHAPE_COST * shapes, rms)
+
+
+    def _possible(self, gram: Gram, chosen: Sequence[int]) -> bool:
+        """Tell whether no cause comes out with a sign that physics forbids it."""
+        values = solve(gram, self.bank.weights)[self.bank.baseline.size :]
+        at = 0
+        for i in chosen:
+            candidate, width = self.bank.candidates[i], self.bank.where[i].stop - self.bank.where[i].start
+            if np.any(values[at : at + width][one_way(candidate, width)] < 0):
+                return False
+            at += width
+        return True
+
+
+def one_way(candidate: Candidate, width: int) -> NDArray:
+    """Tell which of a candidate's columns may only have a positive amplitude, (width,) bool."""
+    effect = candidate.effect
+    if candidate.bends:
+        # Its one column is the effect at a shape: turned over, it would be a spring that pushes.
+        return np.array([all(p.typical[0] > 0 and p.unit != "1" for p in effect.shape if p.default is None)])
+    positive = [p.typical[0] >= 0 for p in effect.linear]
+    return np.array(positive) if len(positive) == width else np.zeros(width, dtype=bool)
 
 
 def best_of_each_label(bank: Bank, scored: Sequence[Scored]) -> dict[tuple[str, ...], Scored]:
