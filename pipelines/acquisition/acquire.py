@@ -16,6 +16,7 @@ from pipelines.acquisition.embedded import embedded
 from pipelines.acquisition.journal import Journal, journal_of, read_journal, refuse_leftover
 from pipelines.acquisition.loop import Loop, Progress, Report
 from pipelines.acquisition.machine import Machine
+from pipelines.acquisition.pace import urgent
 from pipelines.acquisition.plan import check_start, check_trajectory, make_plan
 from pipelines.contracts import RECORDING
 from pipelines.contracts.provenance import describe
@@ -71,7 +72,8 @@ def acquire(
     metadata |= {"trajectory": trajectory_path.name}
     metadata |= describe([trajectory_path, rig_path], {"run": run.model_dump(mode="json"), "rig": rig.public()})
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # what it would print, our errors say
-    with embedded(rig, rig_path, run, sample_rate_hz) if rig.embedded else nullcontext(rig) as present:
+    place = embedded(rig, rig_path, run, sample_rate_hz) if rig.embedded else nullcontext(rig)
+    with place as present, nullcontext() if rig.clock == "lockstep" else urgent():
         abort, gaps = asyncio.run(_record(present, run, trajectory, journal, metadata, sample_rate_hz, report))
     return _finish(output, journal, abort, gaps)
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from pipelines.errors import DeviceError
+from pipelines.errors import DeviceError, SettingsError
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import RigSettings
 
@@ -45,8 +45,12 @@ def _port(process: subprocess.Popen, path: Path, complaints) -> int:
         return int(line.rpartition(":")[2])
     _end(process)
     complaints.seek(0)
-    said = complaints.read().decode(errors="replace").strip().removeprefix("exoid: ")
-    raise DeviceError(said.splitlines()[-1] if said else f"{path}: the embedded rig did not start in {START_S:g} s")
+    said = complaints.read().decode(errors="replace").strip()
+    if not said:
+        raise DeviceError(f"{path}: the embedded rig did not start within {START_S:g} s; run `exoid rig {path}` to see why")
+    # What the rig could not use is the user's to mend here as there.
+    kind = SettingsError if process.returncode == SettingsError.exit_code else DeviceError
+    raise kind(said.splitlines()[-1].removeprefix("exoid: "))
 
 
 def _at(rig: RigSettings, port: int) -> RigSettings:

@@ -36,6 +36,7 @@ class Journal:
         # Exclusive: a journal that is there already is all that is left of a run.
         self._file = open(path, "xb")  # noqa: SIM115, it stays open from the first sample to the last
         self._stream = pa.ipc.new_stream(self._file, self._schema)
+        self._file.flush()
 
     def append(self, row: Sequence[float]) -> None:
         """Add a sample."""
@@ -66,8 +67,10 @@ class Journal:
         """Return the journal; it is closed at the end of the block."""
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self.close()
+        if kind and not self.rows:
+            self.path.unlink()  # nothing is lost, and nothing stands in the way of the next run
 
 
 def read_journal(path: Path) -> tuple[pd.DataFrame, dict[str, Any]]:

@@ -78,7 +78,9 @@ class Loop:
         return why
 
     def _pace(self) -> Lockstep | PhaseLock:
-        return Lockstep() if self.machine.rig.clock == "lockstep" else PhaseLock(self.rate)
+        if self.machine.rig.clock == "lockstep":
+            return Lockstep()
+        return PhaseLock(self.rate, self.machine.drives[0].count, self._watchdog)
 
     async def _follow(self) -> None:
         """Send set-point after set-point; raise DeviceError as soon as something is wrong."""
@@ -87,17 +89,15 @@ class Loop:
         began = fresh = reported = time.monotonic()
         # What is sent while a sample is latched is reached at the end of the next one.
         while last.sequence - first.sequence < len(path):
-            await pace.wait()
+            found = await pace.wait(last.sequence)
             if self.stopped_by:
                 raise DeviceError(f"stopped by {self.stopped_by[0]}")
-            index = min(last.sequence - first.sequence + 1, len(path) - 1)
+            index = min(found - first.sequence, len(path) - 1)
             row = await self._exchange(path[index], (path[index] - path[index - 1]) * self.rate)
             now = time.monotonic()
             self._watch(now - fresh, last, row)
             if row.sequence == last.sequence:
-                pace.stale()
                 continue
-            pace.fresh(row.sequence - last.sequence)
             self._keep(row, row.sequence - first.sequence - 2, row.sequence - last.sequence - 1)
             if row.sequence - first.sequence >= RATE_SAMPLES:
                 self._check_rate(first, row)
@@ -159,7 +159,7 @@ class Loop:
         """Bring every drive to rest and take its torque away; return what went wrong with that."""
         safety, told = self.machine.rig.safety, zip(self.machine.drives, self.sent, self._speed, strict=True)
         stops = [
-            stop(drive, float(reference), float(speed), safety.deceleration_rad_s2, self.rate, self._pace())
+            stop(drive, float(reference), float(speed), safety.deceleration_rad_s2, self.rate)
             for drive, reference, speed in told
             if drive.touched
         ]

@@ -55,10 +55,12 @@ class Drive:
 
     def __init__(self, rig: RigSettings, settings: DriveSettings) -> None:
         self.settings = settings
+        self.in_lockstep = rig.clock == "lockstep"
         self.map = rig.map.drive[settings.map]
         self.device = Device(f"drive {settings.joint}", settings, rig.safety.watchdog_s)
         self.told = Block(registers_of(self.map.read))
         self.tell = Block(registers_of(self.map.write))
+        self._counter = Block({"sequence": self.map.read.sequence})
         self._sequence = Counter(self.told.span("sequence"))
         self._time = Counter(self.told.span("time"))
         self._sent = np.nan
@@ -68,6 +70,11 @@ class Drive:
     async def look(self) -> Reading:
         """Read without telling the drive anything."""
         return self._reading(await self.device.read(self.told.address, self.told.count))
+
+    async def count(self) -> int:
+        """Read the sample counter alone."""
+        words = await self.device.read(self._counter.address, self._counter.count)
+        return int(self._sequence(self._counter.decode(words)["sequence"]))
 
     async def exchange(self, reference: float, *, enable: bool = True) -> Reading:
         """Send a set-point (rad) and return the sample that is latched."""

@@ -1,47 +1,70 @@
 """When to exchange: at once in lockstep; in step with the devices' own clock in real time."""
 
 import asyncio
+import gc
+import os
 import time
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager, suppress
 
 LEAN = 0.005
-"""Share of a sample period by which each exchange comes earlier than one period after the last."""
-STEP_BACK = 0.25
-"""Share of a sample period to wait after an exchange came too early."""
+"""Share of a sample period by which a look at the counter comes earlier than one period after the last."""
+STEP_BACK = 0.1
+"""Share of a sample period to wait after a look that came too early."""
+SLOW = 0.3
+"""Share of a sample period after which an answer is too old to build on."""
+URGENT = -15
+"""Niceness while the devices' clock rules; only a privileged user is granted it."""
+
+
+@contextmanager
+def urgent() -> Iterator[None]:
+    """Ask the system to let this process go first: a sample that is not fetched within its period is lost."""
+    gc.freeze()  # else looking through all that was imported would cost several samples now and then
+    before = os.getpriority(os.PRIO_PROCESS, 0)
+    with suppress(PermissionError):
+        os.setpriority(os.PRIO_PROCESS, 0, min(before, URGENT))
+    try:
+        yield
+    finally:
+        with suppress(PermissionError):
+            os.setpriority(os.PRIO_PROCESS, 0, before)
 
 
 class Lockstep:
     """The devices wait for the exchange."""
 
-    async def wait(self) -> None:
-        """Return at once."""
-
-    def fresh(self, samples: int) -> None:
-        """Note that the exchange brought a new sample."""
-
-    def stale(self) -> None:
-        """Note that it brought the last one again."""
+    async def wait(self, last: int) -> int:
+        """Return at once; the exchange after that of sample ``last`` finds the next one."""
+        return last + 1
 
 
 class PhaseLock:
     """The host's clock locked to the devices' samples, of which only the counter is seen.
 
-    Each exchange leans a little towards the instant at which the sample is latched. When one comes too early
-    (the counter has not moved) the phase steps back. So exchanges stay in the first part of each sample, as
-    far as possible from missing it, whichever of the two clocks runs faster.
+    Each look at the counter leans a little towards the instant at which a sample is latched, and steps back when
+    it came too early. So the exchange that follows has nearly the whole sample to be made in, whichever of the two
+    clocks runs faster; and it is known which sample it finds, so that each set-point comes at its time.
     """
 
-    def __init__(self, sample_rate_hz: float) -> None:
+    def __init__(self, sample_rate_hz: float, counter: Callable[[], Awaitable[int]], patience_s: float) -> None:
         self._period = 1.0 / sample_rate_hz
+        self._counter = counter
+        self._patience_s = patience_s
         self._due = time.perf_counter()
 
-    async def wait(self) -> None:
-        """Wait until the next sample should have been latched."""
-        await asyncio.sleep(max(0.0, self._due - time.perf_counter()))
-
-    def fresh(self, samples: int) -> None:
-        """Note that the exchange brought a new sample, ``samples`` after the last one."""
-        self._due += (samples - LEAN) * self._period
-
-    def stale(self) -> None:
-        """Note that it brought the last one again."""
-        self._due = max(self._due, time.perf_counter()) + STEP_BACK * self._period
+    async def wait(self, last: int) -> int:
+        """Wait until the sample after ``last`` is latched; return the one that is (``last`` if none comes)."""
+        began = time.perf_counter()
+        while True:
+            await asyncio.sleep(max(0.0, self._due - time.perf_counter()))
+            asked = time.perf_counter()
+            found, now = await self._counter(), time.perf_counter()
+            if now - asked > SLOW * self._period and now - began < self._patience_s:
+                continue  # by now another sample may be latched
+            if found != last:
+                self._due += (found - last - LEAN) * self._period
+                return found
+            if now - began > self._patience_s:
+                return last
+            self._due = now + STEP_BACK * self._period

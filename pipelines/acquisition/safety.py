@@ -1,10 +1,12 @@
 """What stops a run, and how a drive is stopped."""
 
+import asyncio
+import time
+
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.acquisition.machine import Drive, Row
-from pipelines.acquisition.pace import Lockstep, PhaseLock
 from pipelines.errors import DeviceError
 from pipelines.mechanics.motion import CUFFS
 from pipelines.settings.rig import RigSettings
@@ -51,7 +53,7 @@ class Limits:
 
 
 async def stop(
-    drive: Drive, reference: float, speed: float, deceleration: float, sample_rate_hz: float, pace: Lockstep | PhaseLock
+    drive: Drive, reference: float, speed: float, deceleration: float, sample_rate_hz: float
 ) -> str | None:
     """Bring one drive to rest and take its torque away, whatever happens to the others.
 
@@ -67,12 +69,13 @@ async def stop(
     str or None
         Why it could not be disabled.
     """
-    last = reference
+    last, due = reference, time.perf_counter()
     try:
-        for last in slowing(reference, speed, deceleration, sample_rate_hz, drive.settings.angle_rad):
-            await pace.wait()
+        for last in slowing(reference, speed, deceleration, sample_rate_hz, drive.settings.angle_rad).tolist():
             await drive.exchange(last)
-            pace.fresh(1)
+            # On the host's clock: the device's counter may be what has failed.
+            due += 0.0 if drive.in_lockstep else 1.0 / sample_rate_hz
+            await asyncio.sleep(max(0.0, due - time.perf_counter()))
     except DeviceError:
         pass  # it may still hear that it shall disable
     try:

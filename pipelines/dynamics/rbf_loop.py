@@ -163,20 +163,21 @@ def _look(a, encoder, seen, state, k, period):
 def _carry_on(
     a, c, encoder, w, s, net, seen, state, memory, load, reference, disturbance, period, substeps, drive, out
 ):
-    """Run sample after sample into ``out`` (n, 4, J); return how many until a joint ran away."""
+    """Run sample after sample into ``out`` (n, 4, J); return how many: a joint that runs away ends it."""
     h = period / substeps
     last = out.shape[0] - 1
     for k in range(out.shape[0]):
         _look(a, encoder, seen, state, k, period)
+        ends = k == last
         for j in range(a.joints):
             out[k, 0, j], out[k, 1, j] = state[THETA, j], state[DTHETA, j]
-            if not abs(state[THETA, j]) < TURN:
-                return k
+            ends |= not abs(state[THETA, j]) < TURN
         torque, network = out[k, 2], out[k, 3]
         at = 2 * k * substeps
-        if k == last:
+        if ends:
             _control(c, seen, state, reference[at], net.weights, net.activation, torque, network, net.rates[0])
-        for i in range(substeps if k < last else 0):
+            break
+        for i in range(substeps):
             now = slice(at + 2 * i, at + 2 * i + 3)
             begin = k * period + i * h
             if i > 0:
@@ -185,7 +186,7 @@ def _carry_on(
                 a, c, w, s, net, seen, begin, h, state, memory, load, reference[now], disturbance[now],
                 torque, network, drive,
             )  # fmt: skip
-    return last + 1
+    return k + 1
 
 
 @njit(cache=True)
@@ -243,7 +244,7 @@ def follow_with_rbf(
     Returns
     -------
     RbfRun
-        n samples; fewer, where a joint has left ± one turn on the way.
+        n samples; fewer, where a joint has left ± one turn on the way: then in the last sample.
     """
     n = (len(reference) - 1) // (2 * substeps) + 1
     out = np.empty((n, 4, a.joints))

@@ -5,7 +5,9 @@ run depends on seeds and set-points alone. In real time samples come on the rig'
 """
 
 import asyncio
+import gc
 import logging
+import os
 import sys
 import threading
 from collections import defaultdict
@@ -38,6 +40,12 @@ from pipelines.settings.rig import (
 READ_WRITE = 23
 """Function code of the exchange that lockstep counts."""
 
+URGENT = -15
+"""Niceness of a rig that samples on its own clock, as a device's processor has nothing else to do."""
+
+EXTRAPOLATED = 5
+"""Samples over which a drive goes on at its set-points' speed when none comes; then it holds."""
+
 
 def build_plant(
     rig: RigSettings, path: Path, run: str, seed: int = 0, sample_rate_hz: float | None = None
@@ -60,6 +68,8 @@ class Device:
         self.registers: list[int] = []
         """The words of the device, shared with the server, from ``first`` on."""
         self.first = 0
+        self.written = False
+        """Whether it was told anything since the last sample."""
 
     def as_served(self) -> SimDevice:
         """Return the device as the server knows it."""
@@ -77,6 +87,7 @@ class Device:
     ) -> ExcCodes | None:
         self.registers, self.first = registers, first
         self.rig.catch_up()  # before a write takes effect: until now the old set-point held
+        self.written |= written is not None
         if written is None:
             self.show(self.rig.sample)
             if function == READ_WRITE:
@@ -102,9 +113,19 @@ class Drive(Device):
         self.torque_per_ampere = settings.torque_per_ampere
         self.enable = registers.enable
         self.rest = rest
+        self.last, self.step, self.unheard = rest, 0.0, 0
+
+    def next_command(self) -> tuple[float, bool]:
+        """Return the set-point (rad) for the next sample and whether the drive is enabled."""
+        reference, enabled = self.command()
+        self.unheard = 0 if self.written else self.unheard + 1
+        if self.unheard:
+            reference = self.last + (self.step if self.unheard <= EXTRAPOLATED else 0.0)
+        self.step, self.last, self.written = reference - self.last, reference, False
+        return reference, enabled
 
     def command(self) -> tuple[float, bool]:
-        """Return the set-point (rad) and whether the drive is enabled."""
+        """Return the set-point (rad) that was told last and whether the drive is enabled."""
         start = self.write.address - self.first
         if not self.registers:
             return self.rest, False
@@ -183,7 +204,7 @@ class VirtualRig:
             self.catch_up()
 
     def _advance(self) -> None:
-        told = [drive.command() for drive in self.drives]
+        told = [drive.next_command() for drive in self.drives]
         self.enabled = np.array([enabled for _, enabled in told])
         self.sample = self.plant.run(np.array([[reference for reference, _ in told]]), self.enabled)
         self._waiting = set(self.drives)
@@ -261,6 +282,10 @@ def serve_file(
             threading.Thread(target=wait, daemon=True).start()
         await serve(rig, plant, port, announce, until)
 
+    if rig.clock == "real_time":
+        gc.freeze()  # else looking through all that was imported would cost several samples now and then
+        with suppress(PermissionError):  # granted to privileged users only
+            os.setpriority(os.PRIO_PROCESS, 0, URGENT)
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
     with suppress(KeyboardInterrupt):
         asyncio.run(until_stopped())

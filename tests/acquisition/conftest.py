@@ -127,7 +127,7 @@ def serve(monkeypatch):
 def record(tmp_path, excitation, rig_file, serve):
     """Record a run on a rig served in this process; returns the recording."""
 
-    def run(duration_s=1.0, run="exo_alone", seed=0, fault=None, served_as=None, believed=None, **changes):
+    def run(duration_s=1.0, run="exo_alone", seed=0, fault=None, served_as=None, believed=None, rate_hz=200.0, **changes):
         """``believed`` are changes of the rig file that acquisition reads, not of the rig that is there."""
         port = free_port()
         rig = rig_file(port=port, **changes)
@@ -137,7 +137,7 @@ def record(tmp_path, excitation, rig_file, serve):
         with serve(rig, port, run, seed, fault) as served:
             if served_as is not None:
                 served_as.append(served)
-            acquire(seen, settings, excitation, output)
+            acquire(seen, settings, excitation, output, rate_hz)
         return RECORDING.read(output)
 
     return run

@@ -73,8 +73,11 @@ def test_a_drive_that_tells_neither_speed_nor_set_point_is_recorded_all_the_same
 
 
 def test_real_time_samples_come_on_the_devices_clock(record):
-    table = record(shipped="real_time", duration_s=2.0, watchdog_s=0.5)
-    frame, missed = table.frame, sum(count for _, count in table.metadata["gaps"])
-    assert len(frame) + missed == 400
-    assert missed <= 40  # a busy computer may miss some, and then says so
-    assert_allclose(np.diff(frame["time_s"]), np.diff(frame["sequence"]) / 200, atol=2e-6)
+    slow = {"seed = 1 ": "sample_rate_hz = 50.0\nseed = 1 "}
+    table = record(shipped="real_time", run="with_human", duration_s=2.0, rate_hz=50.0, replace=slow)
+    frame, gaps = table.frame, table.metadata["gaps"]
+    missed = sum(count for _, count in gaps)
+    assert len(frame) + missed == 100
+    assert missed <= 5  # a computer that is busy with something else may miss some, and then says so
+    assert_allclose(np.diff(frame["time_s"]), np.diff(frame["sequence"]) / 50, atol=2e-6)
+    assert frame.notna().all(axis=None)

@@ -1,0 +1,76 @@
+import asyncio
+
+import pytest
+
+from pipelines.acquisition import pace
+from pipelines.acquisition.pace import PhaseLock
+
+PERIOD = 0.005
+
+
+class Clock:
+    """The host's clock: it moves only where something waits."""
+
+    def __init__(self):
+        self.now = 100.0
+
+    def perf_counter(self):
+        return self.now
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    clock = Clock()
+
+    async def sleep(seconds):
+        clock.now += seconds + 0.0007  # a system wakes its sleepers late
+
+    monkeypatch.setattr(pace, "time", clock)
+    monkeypatch.setattr(pace.asyncio, "sleep", sleep)
+    return clock
+
+
+@pytest.mark.parametrize("drift", [-1e-3, 0.0, 1e-3])
+def test_no_sample_is_missed_and_each_is_found_early_whichever_clock_runs_faster(clock, drift):
+    def sample():
+        return (clock.now - 100.0) * (1 + drift) / PERIOD
+
+    async def counter():
+        clock.now += 0.0003  # a short request
+        return int(sample())
+
+    async def run():
+        lock, seen, phases = PhaseLock(1 / PERIOD, counter, 1.0), [0], []
+        while clock.now < 160.0:
+            seen.append(await lock.wait(seen[-1]))
+            clock.now += 0.0006  # an exchange
+            phases.append(sample() - seen[-1])
+        return seen, phases
+
+    seen, phases = asyncio.run(run())
+    assert seen == list(range(len(seen)))
+    assert len(seen) > 11_900
+    assert max(phases) < 0.6  # so the exchange could have been 2 ms late
+
+
+def test_after_a_busy_moment_it_is_known_which_sample_the_exchange_finds(clock):
+    async def counter():
+        return int((clock.now - 100.0) / PERIOD)
+
+    async def run():
+        lock = PhaseLock(1 / PERIOD, counter, 1.0)
+        first = await lock.wait(0)
+        clock.now += 3 * PERIOD
+        return first, await lock.wait(first)
+
+    first, second = asyncio.run(run())
+    assert second - first >= 3
+    assert second == int((clock.now - 100.0) / PERIOD)
+
+
+def test_a_counter_that_stands_still_is_not_waited_for_for_ever(clock):
+    async def counter():
+        return 7
+
+    assert asyncio.run(PhaseLock(1 / PERIOD, counter, 1.0).wait(7)) == 7
+    assert clock.now < 101.1

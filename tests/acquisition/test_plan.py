@@ -1,0 +1,67 @@
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pipelines.acquisition.plan import make_plan
+from pipelines.errors import InputError
+from pipelines.mechanics.fourier import FourierTrajectory
+from pipelines.mechanics.sampled_trajectory import SampledTrajectory
+from pipelines.settings.rig import load_rig
+
+RATE = 200.0
+REST = np.zeros(2)
+
+
+@pytest.fixture
+def motion():
+    return FourierTrajectory(
+        np.array([0.6, -0.9]), np.array([[0.4], [0.5]]), np.array([[0.1], [0.0]]), omega=0.4 * np.pi
+    )
+
+
+def test_set_points_leave_rest_gently_meet_the_motion_at_its_speed_and_come_back(rig_file, motion):
+    plan = make_plan(load_rig(rig_file()), motion, REST, 5.0, RATE)
+    path = np.vstack([REST, REST, plan.reference, REST, REST])
+    speed, acceleration = np.diff(path, axis=0) * RATE, np.diff(path, 2, axis=0) * RATE**2
+    assert np.abs(speed).max() < 3.0
+    # A jump in speed would be an acceleration of at least 0.1 rad/s in one sample, 20 rad/s².
+    assert np.abs(acceleration).max() < 15.0
+    instants = (np.arange(1000) + 0.5) / RATE
+    assert_allclose(plan.reference[plan.first : plan.stop], motion.at(instants)[0], atol=1e-12)
+
+
+def test_before_the_recording_the_motion_itself_runs_for_the_settling_time(rig_file, motion):
+    rig = load_rig(rig_file(settle_s=1.0))
+    plan = make_plan(rig, motion, REST, 5.0, RATE)
+    before = plan.reference[plan.first - 200 : plan.first]
+    assert_allclose(before, motion.at(np.arange(-200, 0) / RATE + 0.5 / RATE)[0], atol=1e-12)
+
+
+def test_a_ramp_too_fast_for_a_joint_is_made_longer(rig_file, motion):
+    slow = {"speed_rad_s = 3.0": "speed_rad_s = 0.55"}
+    quiet = FourierTrajectory(motion.theta0, 0.1 * motion.a, 0.1 * motion.b, motion.omega)
+    plan = make_plan(load_rig(rig_file(replace=slow)), quiet, REST, 5.0, RATE)
+    assert np.abs(np.diff(plan.reference[:, 0])).max() * RATE <= 0.55
+    assert plan.first > (0.8 + 0.2) * RATE
+
+
+def test_a_motion_that_runs_once_is_not_asked_to_repeat(rig_file):
+    time = np.arange(0, 2, 0.01)
+    q = np.column_stack([0.5 + 0.1 * np.sin(time), -0.8 + 0.1 * np.cos(time)])
+    dq, ddq = np.gradient(q, 0.01, axis=0), np.zeros_like(q)
+    once = SampledTrajectory(time, q, dq, ddq)
+    assert make_plan(load_rig(rig_file()), once, REST, 1.9, RATE).stop > 0
+    with pytest.raises(InputError) as caught:
+        make_plan(load_rig(rig_file()), once, REST, 3.0, RATE)
+    assert str(caught.value) == (
+        "the trajectory lasts 1.99 s and does not repeat, but the run's duration_s is 3; shorten the run, or give "
+        "the trajectory's omega_rad_s if it repeats"
+    )
+
+
+def test_a_motion_too_fast_for_the_rig_is_refused(rig_file, motion):
+    fast = FourierTrajectory(motion.theta0, motion.a, motion.b, omega=8 * np.pi)
+    with pytest.raises(InputError) as caught:
+        make_plan(load_rig(rig_file()), fast, REST, 5.0, RATE)
+    assert "trajectory: the hip would move at" in str(caught.value)
+    assert str(caught.value).endswith("but the rig allows 3 rad/s; make the excitation slower or smaller")

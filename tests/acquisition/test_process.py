@@ -1,0 +1,149 @@
+"""``exoid acquire`` as a process of its own: with its embedded rig, under signals, and killed."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from pipelines.acquisition.journal import journal_of, read_journal
+from pipelines.contracts import RECORDING
+from pipelines.settings import datasets
+
+
+@pytest.fixture
+def experiment(tmp_path, excitation):
+    """Write an experiment on a shipped rig; returns the arguments that record its one run."""
+
+    def write(shipped, duration_s, run="exo_alone", **changes):
+        text = (datasets() / "rigs" / f"{shipped}.toml").read_text()
+        for key, value in {"ramp_s": 0.5, "settle_s": 0.1, **changes}.items():
+            text = re.sub(rf"^{key} = [^#\n]*", f"{key} = {value} ", text, flags=re.MULTILINE)
+        (tmp_path / "rig.toml").write_text(text)
+        sealed = datasets() / "rigs" / "sealed" / "default.toml"
+        (tmp_path / "sealed").mkdir()
+        (tmp_path / "sealed" / "default.toml").write_text(sealed.read_text())
+        config = tmp_path / "exoid.toml"
+        config.write_text(
+            f'[acquire]\nrig = "rig.toml"\n[[run]]\nname = "one"\nrun = "{run}"\npurpose = "train"\n'
+            f"duration_s = {duration_s}\nseed = 3\n"
+        )
+        output = tmp_path / "recordings" / "one.parquet"
+        return ["acquire", "--config", config, "--run", "one", "--trajectory", excitation, "-o", output], output
+
+    return write
+
+
+@pytest.fixture
+def start():
+    """Start exoid; whatever is still running at the test's end is killed."""
+    started = []
+
+    def run(arguments):
+        command = [sys.executable, "-m", "exoid_cli.app", *map(str, arguments)]
+        started.append(subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True))
+        return started[-1]
+
+    yield run
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+def wait_for_rows(process, output, rows):
+    """Wait until a run has written so many rows."""
+    while process.poll() is None:
+        time.sleep(0.1)
+        path = journal_of(output)
+        if path.exists() and path.stat().st_size and len(read_journal(path)[0]) >= rows:
+            return
+    raise AssertionError(f"the run ended early: {process.stderr.read()}")
+
+
+def rigs_of(folder):
+    """Return the processes that serve a rig file below a folder."""
+    found = []
+    for entry in os.listdir("/proc"):
+        if entry.isdigit():
+            try:
+                with open(f"/proc/{entry}/cmdline", "rb") as file:
+                    words = file.read().split(b"\0")
+            except OSError:
+                continue
+            if b"rig" in words and any(word.startswith(str(folder).encode()) for word in words):
+                found.append(int(entry))
+    return found
+
+
+def ended(folder):
+    until = time.monotonic() + 10
+    while time.monotonic() < until and rigs_of(folder):
+        time.sleep(0.05)
+    return not rigs_of(folder)
+
+
+def test_the_default_rig_is_started_recorded_and_ended_and_tells_nothing_sealed(start, experiment, tmp_path):
+    arguments, output = experiment("default", 2.0, run="with_human")
+    process = start(arguments)
+    out, err = process.communicate(timeout=120)
+    assert (process.returncode, err) == (0, "")
+    assert "400 samples of run one, 0 missed" in out
+    table = RECORDING.read(output)
+    assert table.metadata["run"] == "with_human"
+    assert [entry["name"] for entry in table.metadata["inputs"]] == ["excitation.toml", "rig.toml"]
+    assert os.listdir(output.parent) == ["one.parquet"]
+    assert ended(tmp_path)
+    told = output.read_bytes().decode(errors="replace") + str(table.metadata) + out
+    for secret in ("sealed", "stribeck", "presliding", "elasticity", "encoder_offset", "inertial", "coulomb"):
+        assert secret not in told
+
+
+@pytest.mark.parametrize(("number", "name"), [(signal.SIGINT, "Ctrl-C"), (signal.SIGTERM, "SIGTERM")])
+def test_a_signal_stops_the_leg_keeps_the_record_and_says_so_in_one_line(start, experiment, tmp_path, number, name):
+    arguments, output = experiment("plain", 4000.0)
+    process = start(arguments)
+    wait_for_rows(process, output, 100)
+    process.send_signal(number)
+    _, err = process.communicate(timeout=60)
+    kept = output.with_name("one.aborted.parquet")
+    table = RECORDING.read(kept)
+    assert process.returncode == 3
+    assert err.strip() == (
+        f"exoid: stopped by {name}; the leg was stopped, its {len(table.frame)} samples so far are in {kept}"
+    )
+    assert table.metadata["abort"] == f"stopped by {name}"
+    assert len(table.frame) >= 100
+    assert ended(tmp_path)
+
+
+def test_a_killed_run_loses_no_more_than_half_a_second(start, experiment, tmp_path):
+    arguments, output = experiment("real_time", 60.0, torque_nm=1000.0, speed_rad_s=50.0, watchdog_s=2.0)
+    process = start(arguments)
+    wait_for_rows(process, output, 1)
+    began = time.monotonic()
+    time.sleep(2.0)
+    process.kill()
+    killed = time.monotonic()
+    process.communicate()
+    frame, metadata = read_journal(journal_of(output))
+    assert metadata["run"] == "exo_alone"
+    assert frame["time_s"].iloc[-1] > killed - began - 0.5
+    assert np.isfinite(frame["hip_torque_nm"]).all()
+    assert ended(tmp_path)
+    again = start(arguments)
+    _, err = again.communicate(timeout=60)
+    assert again.returncode == 2
+    assert f"{journal_of(output)}: holds {len(frame)} samples" in err
+    assert len(err.strip().splitlines()) == 1
+
+
+def test_a_rig_file_with_a_fault_in_its_plant_is_the_users_to_mend(start, experiment):
+    arguments, _ = experiment("plain", 1.0, exo_inertial="[1.0, -0.22, 0.55, 2.3]")
+    process = start(arguments)
+    _, err = process.communicate(timeout=60)
+    assert "plant.exo_inertial: no real leg has these" in err
+    assert (process.returncode, len(err.strip().splitlines())) == (2, 1)

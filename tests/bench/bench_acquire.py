@@ -1,0 +1,53 @@
+"""Speed of acquisition over Modbus TCP on this machine: rig and client in a process each."""
+
+import re
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from pipelines.acquisition.acquire import acquire
+from pipelines.settings import datasets
+from pipelines.settings.acquire import RunSettings
+
+
+def bench() -> list[tuple[str, str, str]]:
+    """Return what was measured, the number, and what is asked for."""
+    alone, human = cycles_a_second("exo_alone", 40.0), cycles_a_second("with_human", 20.0)
+    samples, missed = real_time(60.0)
+    return [
+        ("lockstep, two drives", f"{alone:.0f} cycles/s", "900"),
+        ("lockstep, two drives and four sensors", f"{human:.0f} cycles/s", "400"),
+        (f"real time, 200 Hz, 60 s ({samples} samples)", f"{missed} missed", "0"),
+    ]
+
+
+def cycles_a_second(run: str, duration_s: float) -> float:
+    """Return how many cycles a second a run in lockstep reaches, start of the rig not counted."""
+    rates = []
+    with TemporaryDirectory() as folder:
+        _record(datasets() / "rigs" / "plain.toml", run, duration_s, Path(folder), lambda p: rates.append(p.rate_hz))
+    return rates[-1]
+
+
+def real_time(duration_s: float) -> tuple[int, int]:
+    """Return samples and missed samples of a run in real time, without and with the sensors the same."""
+    with TemporaryDirectory() as folder:
+        text = (datasets() / "rigs" / "real_time.toml").read_text()
+        # A missed sample shall be counted here, not end the run for the jerk that it gives the leg.
+        path = Path(folder) / "real_time.toml"
+        path.write_text(re.sub(r"^(torque_nm|cuff_force_n) = .*$", r"\1 = 1e4", text, flags=re.MULTILINE))
+        outcome = _record(path, "exo_alone", duration_s, Path(folder), lambda progress: None)
+    return outcome.samples, outcome.missed
+
+
+def _record(rig: Path, run: str, duration_s: float, folder: Path, report):
+    settings = RunSettings(name="bench", run=run, purpose="train", duration_s=duration_s)
+    excitation = datasets() / "paper" / "trajectory.toml"
+    return acquire(rig, settings, excitation, folder / "bench.parquet", report=report)
+
+
+if __name__ == "__main__":
+    began = time.monotonic()
+    for what, found, wanted in bench():
+        print(f"{what:<50} {found:>16}   asked for {wanted}")
+    print(f"{time.monotonic() - began:.0f} s")

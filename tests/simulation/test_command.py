@@ -1,0 +1,184 @@
+"""``exoid simulate``: files, figures, and what it says of input that cannot be simulated."""
+
+import json
+
+import numpy as np
+import pytest
+
+from exoid_cli.app import run
+from pipelines.contracts import SIMULATION
+
+LIGHT = ((2.6, 0.63, 1.78, 5.7), (3.0, 4.0), (2.0, 3.0))
+IMPOSSIBLE = ((2.6, 0.63, 4.0, 5.7), (3.0, 4.0), (2.0, 3.0))
+FIGURES = ("tracking", "error", "torque", "kv-sweep")
+
+
+@pytest.fixture
+def exoid(capsys):
+    def call(*arguments):
+        code = run([str(argument) for argument in arguments])
+        captured = capsys.readouterr()
+        return code, captured.out, " ".join(captured.err.split())
+
+    return call
+
+
+@pytest.fixture
+def quick(tmp_path):
+    """An exoid.toml without figures and with a short sweep; lines may be added."""
+
+    def write(*lines):
+        path = tmp_path / "exoid.toml"
+        path.write_text("\n".join(["[simulate]", "figures = false", "sweep_nm_s_rad = [300.0]", *lines]))
+        return path
+
+    return write
+
+
+def test_tracking_writes_the_loop_the_sweep_and_every_figure(exoid, parameters_file, tmp_path):
+    code, out, err = exoid("simulate", parameters_file(), "-o", tmp_path / "out")
+    assert (code, err) == (0, "")
+    assert "hip" in out and "0.0103" in out and "0.0129" in out and "200.0" in out
+    table = SIMULATION.read(tmp_path / "out" / "rbf.parquet")
+    assert len(table.frame) == 10001
+    assert np.allclose(table.frame["hip_error_rad"], table.frame["hip_reference_rad"] - table.frame["hip_angle_rad"])
+    about = table.metadata
+    assert about["plant"]["effects"][0] == {
+        "effect": "rigid_body", "X1": 10.3016, "X2": 3.0157, "X3": 2.2664, "X4": 5.5354
+    }  # fmt: skip
+    assert about["controller"] == {"type": "rbf", "reference": "gait"}
+    assert about["config"]["feedback_gain_nm_s_rad"] == 300.0 and about["seed"] == 0
+    assert [made["name"] for made in about["inputs"]] == ["parameters.parquet"]
+    assert (tmp_path / "out" / "kv-sweep.csv").read_text().startswith("feedback_gain_nm_s_rad,hip_error_rad,")
+    for figure in FIGURES:
+        assert (tmp_path / "out" / f"{figure}.png").read_bytes().startswith(b"\x89PNG")
+        assert (tmp_path / "out" / f"{figure}.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_tracking_can_be_read_by_a_program(exoid, parameters_file, quick, tmp_path):
+    code, out, _ = exoid("simulate", parameters_file(), "--config", quick(), "-o", tmp_path, "--json")
+    told = json.loads(out)
+    assert code == 0 and told["largest_error_rad"]["hip"] == pytest.approx(0.010277, abs=1e-5)
+    assert told["sweep"][0]["feedback_gain_nm_s_rad"] == 300.0
+
+
+def test_a_reference_file_is_followed_instead_of_the_gait(exoid, parameters_file, quick, tmp_path):
+    (tmp_path / "wave.toml").write_text(
+        'unit = "rad"\nomega_rad_s = 3.0\ntheta0_rad = [0.2, -0.5]\na = [[0.2], [0.1]]\nb = [[0.0], [0.1]]\n'
+    )
+    reference = tmp_path / "wave.toml"
+    assert exoid("simulate", parameters_file(), "--config", quick(), "--reference", reference, "-o", tmp_path)[0] == 0
+    table = SIMULATION.read(tmp_path / "rbf.parquet")
+    assert table.metadata["controller"]["reference"] == "wave.toml"
+    expected = 0.2 + 0.2 * np.sin(3.0 * table.frame["time_s"])
+    assert np.allclose(table.frame["hip_reference_rad"], expected)
+
+
+def test_replay_of_the_true_model_stays_on_the_recording(exoid, parameters_file, recording_file, tmp_path):
+    made = tmp_path / "replay.parquet"
+    code, out, err = exoid("simulate", parameters_file(LIGHT), "--replay", recording_file(), "-o", made, "--json")
+    assert (code, err) == (0, "")
+    told = json.loads(out)
+    assert max(told["simulation_rmse_rad"].values()) < 1e-4
+    assert max(told["closed_loop_rmse_rad"].values()) < 1e-3
+    assert max(told["closed_loop_rmse_nm"].values()) < 0.5
+    open_loop = SIMULATION.read(made)
+    assert open_loop.metadata["simulation_rmse_rad"] == told["simulation_rmse_rad"]
+    assert open_loop.frame["window"].nunique() == 19
+    closed = SIMULATION.read(tmp_path / "replay-closed-loop.parquet").frame
+    difference = closed["knee_torque_nm"] - closed["knee_torque_measured_nm"]
+    assert np.sqrt(np.mean(difference[100:-100] ** 2)) < 0.1
+    assert (tmp_path / "replay.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"controller": None}, "its metadata names no controller of the hip"),
+        (
+            {"controller": {"hip": {"type": "impedance"}, "knee": {"type": "pd"}}},
+            "the controller of its hip is of type impedance, and exoid simulates pd only",
+        ),
+        (
+            {"controller": {"hip": {"type": "pd", "kp_nm_rad": 9.0}}},
+            "the controller of its hip lacks kp_nm_rad or kd_nm_s_rad",
+        ),
+        ({"columns": ["hip_reference_rad"]}, "it holds no references"),
+    ],
+)
+def test_replay_without_a_controller_skips_the_closed_loop_and_says_why(
+    exoid, parameters_file, recording_file, quick, tmp_path, changes, told
+):
+    made, settings = tmp_path / "replay.parquet", quick()
+    recording = recording_file(**changes)
+    code, _, err = exoid("simulate", parameters_file(LIGHT), "--config", settings, "--replay", recording, "-o", made)
+    assert (code, err) == (0, f"warning: no closed loop: {told}")
+    assert made.exists() and not (tmp_path / "replay-closed-loop.parquet").exists()
+
+
+def test_parameters_without_the_run_are_told_with_those_there_are(exoid, parameters_file, quick, tmp_path):
+    parameters = parameters_file(run="exo_alone")
+    code, _, err = exoid("simulate", parameters, "--config", quick(), "-o", tmp_path / "out")
+    assert (code, err) == (
+        2, f"exoid: {parameters}: holds no model of the run with_human, only of: exo_alone; choose one with --run"
+    )  # fmt: skip
+    assert not (tmp_path / "out").exists()
+
+
+def test_parameters_of_no_real_leg_are_refused_with_the_reason(exoid, parameters_file, quick, tmp_path):
+    code, _, err = exoid("simulate", parameters_file(IMPOSSIBLE), "--config", quick(), "-o", tmp_path / "out")
+    assert (code, err) == (
+        2,
+        "exoid: the with_human parameters are no real leg: X2 (X1 - X2) = 1.241 is not above (L1 X3)² = 2.428 "
+        "kg²·m⁴: the mass matrix is not positive definite. A simulation of it would run away; identify again from "
+        "motions that separate X1, X2 and X3 better, or choose another --run",
+    )
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_loop_that_runs_away_is_told_with_its_time_and_writes_nothing(exoid, parameters_file, quick, tmp_path):
+    wild = quick("adaptation_gain = 1e7")
+    code, _, err = exoid("simulate", parameters_file(), "--config", wild, "-o", tmp_path / "out")
+    assert code == 2
+    assert err.startswith("exoid: the simulated hip ran past one full turn at t = ")
+    assert err.endswith(
+        "s: the loop is unstable; lower simulate.feedback_gain_nm_s_rad or simulate.adaptation_gain, "
+        "or shorten simulate.step_s"
+    )
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_recording_in_place_of_parameters_is_told(exoid, recording_file, tmp_path):
+    recording = recording_file()
+    code, _, err = exoid("simulate", recording, "-o", tmp_path / "out")
+    assert (code, err) == (
+        2,
+        f"exoid: {recording}: holds recording/1, expected parameters/1; `exoid identify` makes a parameters file",
+    )
+
+
+def test_parameters_in_place_of_a_recording_are_told(exoid, parameters_file, tmp_path):
+    parameters = parameters_file()
+    code, _, err = exoid("simulate", parameters, "--replay", parameters, "-o", tmp_path / "r.parquet")
+    assert code == 2
+    assert err.startswith(f"exoid: {parameters}: holds parameters/1, expected motion/1")
+
+
+def test_reference_and_replay_exclude_each_other(exoid, parameters_file, recording_file, tmp_path):
+    recording = recording_file()
+    code, _, err = exoid(
+        "simulate", parameters_file(), "--replay", recording, "--reference", recording, "-o", tmp_path / "r.parquet"
+    )
+    assert (code, err) == (
+        2, "exoid: --reference and --replay exclude each other: a replay follows its recording; drop one"
+    )  # fmt: skip
+
+
+def test_settling_after_the_end_is_told(exoid, parameters_file, quick, tmp_path):
+    config = quick("duration_s = 3.0")
+    code, _, err = exoid("simulate", parameters_file(), "--config", config, "-o", tmp_path / "out")
+    assert (code, err) == (
+        2,
+        f"exoid: {config}: simulate: settled_after_s: found 5, expected less than duration_s = 3; "
+        "lengthen the simulation",
+    )
