@@ -8,8 +8,11 @@ INSTALLED := $(VENV)/.installed
 EXPERIMENT := $(MAKE) --no-print-directory -f datasets/experiments/experiment.mk \
 	EXOID=$(BIN)/exoid CONFIG=datasets/experiments/default.toml OUT=build/default
 
+# Seeds of the blind examination: tests/blind/README.md says why there are two ranges.
+SEEDS ?= tuning
+
 .DEFAULT_GOAL := help
-.PHONY: help all test test-slow check format bench docs lock clean install
+.PHONY: help all test test-slow check format bench blind blind-full docs lock clean install
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | sort | expand -t 12
@@ -36,8 +39,15 @@ format: $(INSTALLED) ## format the code
 bench: $(INSTALLED) ## measure speed
 	$(BIN)/python -m tests.bench
 
+blind: $(INSTALLED) ## examine `exoid diagnose` on 300 sessions whose truth it cannot see; SEEDS=reporting to report
+	$(BIN)/python -m tests.blind --cases 300 --seeds $(SEEDS) --out build/blind
+
+blind-full: $(INSTALLED) ## the same on 300 sessions with nothing hidden and 30 of each cause and joint; takes hours
+	$(BIN)/python -m tests.blind --full --seeds $(SEEDS) --out build/blind-full
+
 docs: $(INSTALLED) ## bring the generated pages up to date
 	$(BIN)/python -m pipelines.settings.reference > docs/settings.md
+	$(BIN)/python -m pipelines.effects.reference docs/effects
 
 lock: ## pin the newest versions that fit pyproject.toml, in requirements.lock
 	rm -rf build/lock

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 LINE_S = 5.0
 """From one line of progress to the next where there is no terminal."""
 BAR = 24
+CUFFS = ("thigh front", "thigh back", "shank front", "shank back")
 
 
 def acquire(
@@ -79,10 +80,10 @@ def _picture(progress: "Progress", rig: "RigSettings") -> Table:
         table.add_row(f"{settings.joint} angle", *_bar(drive.angle, *settings.angle_rad, "rad"))
         table.add_row(f"{settings.joint} torque", *_bar(drive.torque, -settings.torque_nm, settings.torque_nm, "N·m"))
     limit = rig.safety.cuff_force_n
-    for sensor, force in zip(("thigh front", "thigh back", "shank front", "shank back"), progress.row.forces, strict=True):
+    for cuff, force in zip(CUFFS, progress.row.forces, strict=True):
         largest = max(force, key=abs)
         if largest == largest:  # not NaN: the sensor was read
-            table.add_row(f"{sensor} force", *_bar(largest, -limit, limit, "N"))
+            table.add_row(f"{cuff} force", *_bar(largest, -limit, limit, "N"))
     table.add_row("rate", f"{progress.rate_hz:.0f} Hz", f"{progress.samples} samples", f"{progress.missed} missed")
     return table
 

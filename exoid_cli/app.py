@@ -19,6 +19,7 @@ from typer.exceptions import TyperException
 from exoid_cli.acquire import acquire
 from exoid_cli.console import console
 from exoid_cli.design import design
+from exoid_cli.effects import effects
 from exoid_cli.filter import filter_
 from exoid_cli.identify import identify
 from exoid_cli.init import init
@@ -44,6 +45,7 @@ app.command("rig")(rig)
 app.command("simulate")(simulate)
 app.command("show")(show)
 app.command("design")(design)
+app.command("effects")(effects)
 app.add_typer(settings, name="settings")
 
 

@@ -131,21 +131,29 @@ def model_from_parameters(frame: pd.DataFrame, run: str) -> Model:
 
     ``run`` is a kind of run, or ``human`` for the wearer's own rigid body.
     """
-    chosen = frame[frame["run"].isna() | (frame["run"] == run)]
-    if not (chosen["effect"] == "rigid_body").any():
-        known = ", ".join(sorted(frame["run"].dropna().unique()))
+    is_body = frame["effect"] == RigidBody.name
+    if not (is_body & (frame["run"] == run)).any():
+        known = ", ".join(sorted(frame.loc[is_body, "run"].dropna().unique()))
         raise InputError(f"the parameters hold no rigid body for run {run!r}, only for {known}")
-    terms = []
-    for (name, joint), rows in chosen.groupby(["effect", "joint"], sort=False, dropna=False):
-        # Of the wearer's limb where the rows say so: a compliant cuff stands before it.
-        own = run if run in RUNS and (rows["run"] == run).all() else None
-        effect = effect_named(str(name))(joint=None if pd.isna(joint) else joint, run=own)
-        values = {str(key): float(value) for key, value in zip(rows["name"], rows["value"], strict=True)}
-        try:
-            terms.append(term_from(effect, values))
-        except InputError as error:
-            raise InputError(f"the parameters table: {error}") from None
-    return Model(tuple(terms))
+    others = frame[~is_body & (frame["run"].isna() | (frame["run"] == run))]
+    terms = [
+        _term_from_rows(effect_named(str(name))(joint=joint if isinstance(joint, str) else None), rows)
+        for (name, joint), rows in others.groupby(["effect", "joint"], sort=False, dropna=False)
+    ]
+    bodies = {str(kind): rows for kind, rows in frame[is_body].groupby("run")}
+    if any(term.effect.at_cuff for term in terms) and {"exo_alone", "human"} <= set(bodies):
+        # Machine and limb move apart: each needs its own.
+        parts = [(RigidBody(), bodies["exo_alone"]), (RigidBody(run="with_human"), bodies["human"])]
+    else:
+        parts = [(RigidBody(run=run if run in RUNS else None), bodies[run])]
+    return Model((*(_term_from_rows(effect, rows) for effect, rows in parts), *terms))
+
+
+def _term_from_rows(effect: Effect, rows: pd.DataFrame) -> Term:
+    try:
+        return term_from(effect, dict(zip(rows["name"], rows["value"].astype(float), strict=True)))
+    except InputError as error:
+        raise InputError(f"the parameters table: {error}") from None
 
 
 def term_from(effect: Effect, values: Mapping[str, float]) -> Term:

@@ -47,9 +47,7 @@ class Block:
             value = (values[name] - offset) / scale
             raw.append(value if limits is None else min(max(round(value), limits[0]), limits[1]))
         words = [0] * self.count
-        for place, word in zip(
-            self._places, self._words_format.unpack(self._values_format.pack(*raw)), strict=True
-        ):
+        for place, word in zip(self._places, self._words_format.unpack(self._values_format.pack(*raw)), strict=True):
             words[place] = word
         return words
 

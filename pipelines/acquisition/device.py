@@ -12,7 +12,7 @@ from pipelines.errors import DeviceError
 from pipelines.registers import Block
 from pipelines.settings.rig import DeviceSettings, Identity
 
-MEANING = {
+MEANING: dict[int, str] = {
     ExcCodes.ILLEGAL_FUNCTION: "it does not know this function",
     ExcCodes.ILLEGAL_ADDRESS: "it has no such register",
     ExcCodes.ILLEGAL_VALUE: "it does not take this value",
@@ -92,10 +92,10 @@ class Device:
             ) from error
         # An exception reply is an answer like any other to pymodbus: nothing is raised.
         if response.isError():
-            code = getattr(response, "exception_code", 0)
+            code = int(getattr(response, "exception_code", 0))
             meaning = f": {MEANING[code]}" if code in MEANING else ""
             raise DeviceError(
-                f"{self.label}: answered {what} with Modbus exception {int(code)}{meaning}; "
+                f"{self.label}: answered {what} with Modbus exception {code}{meaning}; "
                 "compare the register map in the rig file with the device's manual"
             )
         if words is not None and len(response.registers) != words:
@@ -103,7 +103,7 @@ class Device:
                 f"{self.label}: answered {what} with {len(response.registers)} registers, expected {words}; "
                 "compare the register map in the rig file with the device's manual"
             )
-        return response.registers
+        return list(response.registers)
 
 
 def _range(block: Block) -> str:

@@ -39,15 +39,18 @@ def embedded(rig: RigSettings, path: Path, run: RunSettings, sample_rate_hz: flo
 
 def _port(process: subprocess.Popen, path: Path, complaints) -> int:
     """Wait for the line in which the rig says where it listens."""
+    assert process.stdout is not None  # it was asked for
     ready, _, _ = select.select([process.stdout], [], [], START_S)
-    line = process.stdout.readline().decode() if ready and process.stdout else ""
+    line = process.stdout.readline().decode() if ready else ""
     if ":" in line:
         return int(line.rpartition(":")[2])
     _end(process)
     complaints.seek(0)
     said = complaints.read().decode(errors="replace").strip()
     if not said:
-        raise DeviceError(f"{path}: the embedded rig did not start within {START_S:g} s; run `exoid rig {path}` to see why")
+        raise DeviceError(
+            f"{path}: the embedded rig did not start within {START_S:g} s; run `exoid rig {path}` to see why"
+        )
     # What the rig could not use is the user's to mend here as there.
     kind = SettingsError if process.returncode == SettingsError.exit_code else DeviceError
     raise kind(said.splitlines()[-1].removeprefix("exoid: "))

@@ -3,6 +3,7 @@
 import json
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
 
@@ -81,10 +82,8 @@ def read_journal(path: Path) -> tuple[pd.DataFrame, dict[str, Any]]:
         metadata = json.loads(stream.schema.metadata[KEY])
     except (pa.ArrowException, KeyError, TypeError, ValueError) as error:
         raise ContractError(f"{path}: is no journal of a run, or not even its head was written; delete it") from error
-    try:
+    with suppress(pa.ArrowException, OSError):  # the last batch was cut off; those before it are whole
         batches.extend(stream)
-    except (pa.ArrowException, OSError):
-        pass  # the last batch was cut off; those before it are whole
     return pa.Table.from_batches(batches, schema=stream.schema).to_pandas(), metadata
 
 

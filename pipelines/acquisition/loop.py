@@ -131,8 +131,8 @@ class Loop:
         device = self.machine.drives[0].device.label
         if waited > self._watchdog:
             raise DeviceError(
-                f"watchdog: no new sample from {device} for {waited:.3f} s, allowed are {self._watchdog:g} s; its counter "
-                "stands still, or this computer is too busy"
+                f"watchdog: no new sample from {device} for {waited:.3f} s, allowed are {self._watchdog:g} s; its "
+                "counter stands still, or this computer is too busy"
             )
         if row.sequence < last.sequence:
             raise DeviceError(
@@ -164,4 +164,3 @@ class Loop:
             if drive.touched
         ]
         return [complaint for complaint in await asyncio.gather(*stops) if complaint]
-

@@ -157,19 +157,20 @@ class Machine:
         self.rig = rig
         self.drives = [Drive(rig, settings) for settings in rig.drive]
         self.sensors = [Sensor(rig, settings) for settings in rig.sensor] if with_sensors else []
+        self._parts: list[Drive | Sensor] = [*self.drives, *self.sensors]
         self._no_force = np.full((len(CUFFS), 3), np.nan)
         self._ahead = [0 for _ in self.drives]
         """How far each drive's counter is ahead of the first one's at the same sample."""
 
     async def connect(self) -> None:
         """Open every line and make sure who is at its end."""
-        for part in (*self.drives, *self.sensors):
+        for part in self._parts:
             await part.device.connect()
             await part.device.check_identity(part.map.identity)
 
     def close(self) -> None:
         """Close every line."""
-        for part in (*self.drives, *self.sensors):
+        for part in self._parts:
             part.device.close()
 
     async def look(self) -> Row:

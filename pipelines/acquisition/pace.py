@@ -13,22 +13,24 @@ STEP_BACK = 0.1
 """Share of a sample period to wait after a look that came too early."""
 SLOW = 0.3
 """Share of a sample period after which an answer is too old to build on."""
-URGENT = -15
-"""Niceness while the devices' clock rules; only a privileged user is granted it."""
 
 
 @contextmanager
 def urgent() -> Iterator[None]:
-    """Ask the system to let this process go first: a sample that is not fetched within its period is lost."""
+    """Ask the system to let this process go first: a sample that is not fetched within its period is lost.
+
+    Linux grants that to privileged users; others take their chance with whatever else the computer does.
+    """
     gc.freeze()  # else looking through all that was imported would cost several samples now and then
-    before = os.getpriority(os.PRIO_PROCESS, 0)
-    with suppress(PermissionError):
-        os.setpriority(os.PRIO_PROCESS, 0, min(before, URGENT))
+    granted = False
+    with suppress(PermissionError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
+        granted = True
     try:
         yield
     finally:
-        with suppress(PermissionError):
-            os.setpriority(os.PRIO_PROCESS, 0, before)
+        if granted:
+            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 class Lockstep:

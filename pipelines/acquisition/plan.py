@@ -68,8 +68,8 @@ def check_start(rig: RigSettings, angle: NDArray) -> str | None:
         low, high = drive.angle_rad
         if not low <= found <= high:
             return (
-                f"the {drive.joint} stands at {found:.3f} rad, outside its limits {low:g} to {high:g} rad; move the leg "
-                "by hand, or check the encoder's zero"
+                f"the {drive.joint} stands at {found:.3f} rad, outside its limits {low:g} to {high:g} rad; move the "
+                "leg by hand, or check the encoder's zero"
             )
     return None
 
@@ -87,10 +87,7 @@ def _ramp(
         # Time runs backwards from the motion's beginning, forwards from its end; the share grows towards it.
         motion = _extended(trajectory, -ahead[::-1] if before else end_s + ahead)
         reference = rest + (share if before else share[::-1]) * (motion - rest)
-        if before or len(reference) == 0:
-            path = np.vstack([rest, reference])
-        else:
-            path = np.vstack([reference, rest])
+        path = np.vstack([rest, reference] if before else [reference, rest])
         speed = np.abs(np.diff(path, axis=0)).max(axis=0) * rate
         if all(found <= drive.speed_rad_s for found, drive in zip(speed, rig.drive, strict=True)):
             return reference

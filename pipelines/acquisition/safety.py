@@ -52,9 +52,7 @@ class Limits:
         )
 
 
-async def stop(
-    drive: Drive, reference: float, speed: float, deceleration: float, sample_rate_hz: float
-) -> str | None:
+async def stop(drive: Drive, reference: float, speed: float, deceleration: float, sample_rate_hz: float) -> str | None:
     """Bring one drive to rest and take its torque away, whatever happens to the others.
 
     Parameters

@@ -14,7 +14,7 @@ of each joint that is consistent with the speed at the step's end (projected Gau
 complementarity problem; Stewart and Trinkle, 1996), so joints stick without chatter.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -26,7 +26,7 @@ from pipelines.effects.kernel import Instant, derivative_at, reaction_at, spring
 STICTION_SWEEPS = 20
 STICTION_TOLERANCE = 1e-9
 
-HOT = {"cache": True, "_nrt": False}
+HOT: dict[str, Any] = {"cache": True, "_nrt": False}
 """How the innermost functions are compiled. They allocate nothing, and numba's counting of references
 to arrays would take more than half of their time; ``_nrt`` is its switch for that."""
 

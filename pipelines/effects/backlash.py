@@ -50,7 +50,7 @@ class Backlash(Effect):
         Speed and acceleration stay the motor's: how the link swings over and bounces while the torque changes
         sign no measured motion tells, and a smooth guess at it does more harm than none.
         """
-        j = motion.joint_index(self.joint)
+        j = self.column(motion)
         q = motion.q.copy()
         q[:, j] -= 0.5 * shape[0] * np.tanh(motion.transmitted[0][:, j] / CROSSING_TORQUE)
         return motion.with_state(q, motion.dq, motion.ddq)

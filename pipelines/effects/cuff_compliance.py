@@ -41,7 +41,7 @@ class CuffCompliance(Effect):
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
         """Return the motion of the limb."""
-        j = motion.joint_index(self.joint)
+        j = self.column(motion)
         q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
         for state, torque in zip((q, dq, ddq), motion.on_limb, strict=True):
             state[:, j] -= torque[:, j] / shape[0]

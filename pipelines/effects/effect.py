@@ -24,7 +24,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.kernel import read_along, torque_along, torque_along_with_memory
+from pipelines.effects.kernel import columns_along, columns_along_with_memory, read_along
 from pipelines.mechanics.motion import Motion
 
 RUNS = ("exo_alone", "with_human")
@@ -140,6 +140,10 @@ class Effect(ABC):
         """Tell whether the effect is there in this kind of run."""
         return motion.run in self.acts_in and self.run in (None, motion.run)
 
+    def column(self, motion: Motion) -> int:
+        """Return the column of its joint in a motion's arrays, -1 for the whole leg."""
+        return motion.joint_index(self.joint) if self.joint else -1
+
     def physical(self, values: NDArray) -> NDArray:
         """Return the values of ``parameters`` for those of ``fitted``."""
         return np.asarray(values, dtype=float)
@@ -162,36 +166,38 @@ class Effect(ABC):
         return np.append(np.asarray(values, dtype=float), [d for d in rest if d is not None])
 
     def columns(self, motion: Motion, shape: NDArray | tuple[float, ...] = ()) -> NDArray:
-        """Torque per unit of each linear parameter, (n, J, p) N·m per unit.
+        """Torque that the effect adds to what is measured, per unit of each linear parameter, (n, J, p) N·m per unit.
 
         ``shape`` holds the nonlinear parameters of this run, in the order of ``self.shape``.
         """
         columns = np.zeros((*motion.q.shape, len(self.linear)))
-        for i, unit in enumerate(np.eye(len(self.linear))):
-            columns[:, :, i] = self.torque(motion, np.append(unit, shape))
+        if not self.linear or not self.explains(motion):
+            return columns
+        values = self.completed(np.append(np.zeros(len(self.linear)), shape))
+        if self.torque_reading is not None:
+            for i, unit in enumerate(np.eye(len(values))[: len(self.linear)]):
+                columns[:, :, i : i + 1] = self._read(columns[:, :, i : i + 1], motion, values + unit)
+        elif self.reaction is not None:
+            self._react(motion, values, columns)
         return columns
+
+    def _react(self, motion: Motion, values: NDArray, out: NDArray) -> None:
+        of_motion = (motion.time, motion.q, motion.dq, motion.ddq, motion.transmitted[0])
+        arrays = [np.ascontiguousarray(array) for array in of_motion]
+        joint, geometry, joints = self.column(motion), motion.geometry.array(), len(motion.joints)
+        if self.derivative is None:
+            columns_along(self.reaction, values, joint, *arrays, geometry, np.zeros(2 * joints), out)
+            return
+        for stretch in motion.segments():
+            columns_along_with_memory(
+                self.reaction, self.derivative, values, joint, *(a[stretch] for a in arrays), geometry,
+                np.zeros((11, joints)), np.zeros((3, self.states)), out[stretch],
+            )  # fmt: skip
 
     def torque(self, motion: Motion, values: NDArray) -> NDArray:
         """Torque that the effect adds to what is measured, (n, J) N·m."""
-        values = self.completed(values)
-        if not self.explains(motion):
-            return np.zeros(motion.q.shape)
-        if self.torque_reading is not None:
-            return self._read(np.zeros((*motion.q.shape, 1)), motion, values)[:, :, 0]
-        if self.reaction is None:
-            return np.zeros(motion.q.shape)
-        joint = motion.joint_index(self.joint) if self.joint else -1
-        geometry = motion.geometry.array()
-        of_motion = (motion.time, motion.q, motion.dq, motion.ddq, motion.transmitted[0])
-        arrays = [np.ascontiguousarray(array) for array in of_motion]
-        if self.derivative is None:
-            return torque_along(self.reaction, values, joint, *arrays, geometry)
-        out = np.empty(motion.q.shape)
-        for stretch in motion.segments():
-            out[stretch] = torque_along_with_memory(
-                self.reaction, self.derivative, self.states, values, joint, *(a[stretch] for a in arrays), geometry
-            )
-        return out
+        linear, shape = np.split(np.asarray(values, dtype=float), [len(self.linear)])
+        return self.columns(motion, shape) @ linear
 
     def observed(self, columns: NDArray, motion: Motion, shape: NDArray | tuple[float, ...] = ()) -> NDArray:
         """Return what the torque sensors make of torques that the drives deliver, both (n, J, p).
@@ -204,11 +210,11 @@ class Effect(ABC):
 
     def _read(self, torque: NDArray, motion: Motion, values: NDArray) -> NDArray:
         out = np.empty_like(torque)
-        joint = motion.joint_index(self.joint) if self.joint else -1
+        joint = self.column(motion)
         for stretch in motion.segments():
-            time = np.ascontiguousarray(motion.time[stretch])
             read_along(
-                self.torque_reading, self.reading_states, values, joint, time, torque[stretch], out[stretch]
+                self.torque_reading, values, joint, np.ascontiguousarray(motion.time[stretch]), torque[stretch],
+                np.zeros(len(motion.joints)), np.zeros(self.reading_states), out[stretch],
             )  # fmt: skip
         return out
 

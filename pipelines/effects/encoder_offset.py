@@ -28,5 +28,5 @@ class EncoderOffset(Effect):
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
         """Return the motion with the true angle."""
         shift = np.zeros(len(motion.joints))
-        shift[motion.joint_index(self.joint)] = shape[0]
+        shift[self.column(motion)] = shape[0]
         return motion.with_state(motion.q - shift, motion.dq, motion.ddq)

@@ -36,7 +36,7 @@ class JointElasticity(Effect):
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
         """Return the motion of the link behind the spring."""
-        j = motion.joint_index(self.joint)
+        j = self.column(motion)
         load = motion.transmitted
         q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
         for state, load_rate in zip((q, dq, ddq), load, strict=True):

@@ -6,7 +6,7 @@ signature, so that the dynamics can hold a tuple of them without being compiled 
 """
 
 import warnings
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, types
@@ -44,7 +44,9 @@ REACTION = void(INSTANT, _vector, _vector, _vector, int64, _vector)
 """reaction(at, state, values, geometry, joint, out): add the torque the drives must supply to ``out``."""
 
 DERIVATIVE = void(INSTANT, _vector, _vector, _vector, int64, _vector)
-"""derivative(at, state, values, geometry, joint, out): write the rate of the effect's memory to ``out``."""
+"""derivative(at, state, values, geometry, joint, out): write the rate of the effect's memory to ``out``.
+
+It may depend on the shape values, never on the linear ones: torque would then not be linear in them."""
 
 SPRING = float64(float64, float64, _vector)
 """spring(twist, twist_rate, values): torque that a transmission passes from motor to link, N·m."""
@@ -116,75 +118,119 @@ reading_at = _kernel_at(READING)
 torque_reading_at = _kernel_at(TORQUE_READING)
 
 _table = float64[:, ::1]
+_columns = float64[:, :, ::1]
 _MOTION = (_vector, _table, _table, _table, _table, _vector)  # time, q, dq, ddq, load, geometry
 # Signatures are spelt out so that one compilation serves every effect: the kernel is an argument.
-_ALONG = _table(types.FunctionType(REACTION), _vector, int64, *_MOTION)
-_ALONG_WITH_MEMORY = _table(
-    types.FunctionType(REACTION), types.FunctionType(DERIVATIVE), int64, _vector, int64, *_MOTION
+_ALONG = void(types.FunctionType(REACTION), _vector, int64, *_MOTION, _vector, _columns)
+_ALONG_WITH_MEMORY = void(
+    types.FunctionType(REACTION), types.FunctionType(DERIVATIVE), _vector, int64, *_MOTION, _table, _table, _columns
 )
 _READ_ALONG = void(
-    types.FunctionType(TORQUE_READING), int64, _vector, int64, _vector, types.Array(float64, 3, "A"),
+    types.FunctionType(TORQUE_READING), _vector, int64, _vector, types.Array(float64, 3, "A"), _vector, _vector,
     types.Array(float64, 3, "A"),
 )  # fmt: skip
 
 MEMORY_SUBSTEPS = 8
 """Steps per sample along a measured motion: a presliding state turns over within a few milliseconds."""
 
+SETTLING_S = 2.0
+"""For so long a measured motion is taken to have gone on at its first velocity before it begins: a memory that
+began from nothing would be wrong until the first reversal."""
 
-@njit(cache=True)
-def _between(time, q, dq, ddq, load, k, share):
-    v = dq[k] + share * (dq[k + 1] - dq[k])
-    return Instant(
-        time[k] + share * (time[k + 1] - time[k]),
-        q[k] + share * (q[k + 1] - q[k]),
-        v,
-        ddq[k] + share * (ddq[k + 1] - ddq[k]),
-        np.sign(v),
-        load[k] + share * (load[k + 1] - load[k]),
-    )
+ALLOCATING_NOTHING: dict[str, Any] = {"cache": True, "_nrt": False}
+"""How functions are compiled whose arrays are all arguments: numba then leaves out counting references to them,
+which would take most of their time."""
 
 
-@njit(_ALONG, cache=True)
-def torque_along(kernel, values, joint, time, q, dq, ddq, load, geometry):
-    """Evaluate a reaction kernel without memory along a motion: (n, J) N·m."""
-    out = np.zeros(q.shape)
-    state = np.zeros(0)
-    for k in range(q.shape[0]):
-        at = Instant(time[k], q[k], dq[k], ddq[k], np.sign(dq[k]), load[k])
-        kernel(at, state, values, geometry, joint, out[k])
-    return out
+@njit(inline="always")
+def _unit_columns(kernel, at, state, values, geometry, joint, torque, out):
+    """Write the torque per unit of each of the first p values into ``out`` (J, p)."""
+    for i in range(out.shape[1]):
+        values[i] = 1.0
+        torque[:] = 0.0
+        kernel(at, state, values, geometry, joint, torque)
+        values[i] = 0.0
+        for j in range(out.shape[0]):
+            out[j, i] = torque[j]
 
 
-@njit(_ALONG_WITH_MEMORY, cache=True)
-def torque_along_with_memory(kernel, rate, states, values, joint, time, q, dq, ddq, load, geometry):
-    """Evaluate a reaction kernel along one unbroken stretch, integrating its memory from rest: (n, J) N·m.
+@njit(_ALONG, **ALLOCATING_NOTHING)
+def columns_along(kernel, values, joint, time, q, dq, ddq, load, geometry, scratch, out):
+    """Evaluate a reaction kernel without memory along a motion, into ``out`` (n, J, p) N·m per unit.
 
-    Between samples the motion is taken as linear in time; the memory advances by the midpoint rule.
+    ``values`` are zero but for the shape; ``scratch`` has room for 2 J.
     """
-    out = np.zeros(q.shape)
-    state = np.zeros(states)
-    slope = np.zeros(states)
+    joints = q.shape[1]
+    direction, torque = scratch[:joints], scratch[joints:]
     for k in range(q.shape[0]):
-        at = Instant(time[k], q[k], dq[k], ddq[k], np.sign(dq[k]), load[k])
-        kernel(at, state, values, geometry, joint, out[k])
+        for j in range(joints):
+            direction[j] = np.sign(dq[k, j])
+        at = Instant(time[k], q[k], dq[k], ddq[k], direction, load[k])
+        _unit_columns(kernel, at, scratch[:0], values, geometry, joint, torque, out[k])
+
+
+@njit(inline="always")
+def _between(time, q, dq, ddq, load, k, share, at):
+    """Write the motion a share of the way from sample ``k`` to the next into ``at`` (5, J); return its time."""
+    for j in range(q.shape[1]):
+        at[0, j] = q[k, j] + share * (q[k + 1, j] - q[k, j])
+        at[1, j] = dq[k, j] + share * (dq[k + 1, j] - dq[k, j])
+        at[2, j] = ddq[k, j] + share * (ddq[k + 1, j] - ddq[k, j])
+        at[3, j] = np.sign(at[1, j])
+        at[4, j] = load[k, j] + share * (load[k + 1, j] - load[k, j])
+    return time[k] + share * (time[k + 1] - time[k])
+
+
+@njit(inline="always")
+def _advance(rate, at, ahead, h, state, middle, slope, values, geometry, joint):
+    """Advance a memory by the midpoint rule, from the instant ``at``; ``ahead`` is half a step later."""
+    rate(at, state, values, geometry, joint, slope)
+    for m in range(state.shape[0]):
+        middle[m] = state[m] + 0.5 * h * slope[m]
+    rate(ahead, middle, values, geometry, joint, slope)
+    for m in range(state.shape[0]):
+        state[m] += h * slope[m]
+
+
+@njit(_ALONG_WITH_MEMORY, **ALLOCATING_NOTHING)
+def columns_along_with_memory(kernel, rate, values, joint, time, q, dq, ddq, load, geometry, scratch, memory, out):
+    """Evaluate a reaction kernel along one unbroken stretch, its memory settled, into ``out`` (n, J, p).
+
+    Between samples the motion is taken as linear in time. ``scratch`` is (11, J), ``memory`` (3, states), the
+    first row zero.
+    """
+    state, middle, slope = memory[0], memory[1], memory[2]
+    now, later = scratch[:5], scratch[5:10]
+    if q.shape[0] > 1:
+        h = (time[1] - time[0]) / MEMORY_SUBSTEPS
+        t = _between(time, q, dq, ddq, load, 0, 0.0, now)
+        at = Instant(t, now[0], now[1], now[2], now[3], now[4])
+        for _ in range(int(SETTLING_S / h)):
+            _advance(rate, at, at, h, state, middle, slope, values, geometry, joint)
+    for k in range(q.shape[0]):
+        for j in range(q.shape[1]):
+            now[3, j] = np.sign(dq[k, j])
+        at = Instant(time[k], q[k], dq[k], ddq[k], now[3], load[k])
+        _unit_columns(kernel, at, state, values, geometry, joint, scratch[10], out[k])
         if k + 1 == q.shape[0]:
             break
         h = (time[k + 1] - time[k]) / MEMORY_SUBSTEPS
         for i in range(MEMORY_SUBSTEPS):
-            start = _between(time, q, dq, ddq, load, k, i / MEMORY_SUBSTEPS)
-            rate(start, state, values, geometry, joint, slope)
-            middle = _between(time, q, dq, ddq, load, k, (i + 0.5) / MEMORY_SUBSTEPS)
-            rate(middle, state + 0.5 * h * slope, values, geometry, joint, slope)
-            state += h * slope
-    return out
+            t = _between(time, q, dq, ddq, load, k, i / MEMORY_SUBSTEPS, now)
+            at = Instant(t, now[0], now[1], now[2], now[3], now[4])
+            t = _between(time, q, dq, ddq, load, k, (i + 0.5) / MEMORY_SUBSTEPS, later)
+            ahead = Instant(t, later[0], later[1], later[2], later[3], later[4])
+            _advance(rate, at, ahead, h, state, middle, slope, values, geometry, joint)
 
 
-@njit(_READ_ALONG, cache=True)
-def read_along(kernel, states, values, joint, time, torque, out):
-    """Write what a sensor makes of p torques (n, J, p) of one unbroken stretch into ``out`` (n, J, p), N·m."""
-    at_once = np.empty(torque.shape[1])
+@njit(_READ_ALONG, **ALLOCATING_NOTHING)
+def read_along(kernel, values, joint, time, torque, at_once, state, out):
+    """Write what a sensor makes of p torques (n, J, p) of one unbroken stretch into ``out`` (n, J, p), N·m.
+
+    ``at_once`` has room for J, ``state`` for the sensor's memory.
+    """
     for i in range(torque.shape[2]):
-        state = np.zeros(states)
+        state[:] = 0.0
         for k in range(torque.shape[0]):
             for j in range(at_once.shape[0]):
                 at_once[j] = torque[k, j, i]

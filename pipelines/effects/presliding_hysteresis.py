@@ -10,7 +10,7 @@ class PreslidingHysteresis(Effect):
     name = "presliding_hysteresis"
     title = "Presliding hysteresis"
     side = Side.DRIVE
-    equation = "tau = F z, dz/dt = v / travel * (1 - z sgn(v))^i, i = 1 where nothing else is said"
+    equation = "tau = F z, dz/dt = v / travel * (1 - z sgn(v))^i, i = 1 unless said"
     source = "Dahl (1976), AIAA Journal 14(12), eq. 4"
     looks_like = "friction against angle: a loop whose corners are rounded after each reversal"
     confirm = "move the empty joint to and fro by a few hundredths of a radian and plot torque against angle"

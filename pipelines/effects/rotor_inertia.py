@@ -1,5 +1,7 @@
 """The rotor behind the gear: an inertia that only its own joint's acceleration feels."""
 
+from typing import ClassVar
+
 from pipelines.effects.effect import Effect, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
@@ -15,7 +17,7 @@ class RotorInertia(Effect):
     looks_like = "residual in step with the knee's own acceleration; X2 too large for a shank of that weight"
     confirm = "look up the rotor's inertia and the gear ratio: J is the one times the square of the other"
     joints = ("knee",)
-    absorbed = {"hip": "X1"}  # noqa: RUF012 - a constant, like every other class attribute here
+    absorbed: ClassVar = {"hip": "X1"}
     linear = (Parameter("inertia", "kg·m²", "rotor inertia reflected to the joint", "J", (0.03, 1.0)),)
     inertial = True
     parity = Parity.EVEN

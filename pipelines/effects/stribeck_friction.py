@@ -12,7 +12,7 @@ class StribeckFriction(Effect):
     name = "stribeck_friction"
     title = "Stribeck friction"
     side = Side.DRIVE
-    equation = "tau = F exp(-abs(v / vs)^d) sgn(v), d = 2 where nothing else is said"
+    equation = "tau = F exp(-abs(v / vs)^d) sgn(v), d = 2 unless said"
     source = "Stribeck (1902); Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), eq. 3"
     looks_like = "a narrow peak of friction on both sides of zero speed"
     confirm = "creep the empty joint through 0.01 to 0.3 rad/s and plot torque against speed"

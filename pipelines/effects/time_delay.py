@@ -43,7 +43,7 @@ class TimeDelay(Effect):
 
     def delivered(self, torque: NDArray, motion: Motion, values: NDArray) -> NDArray:
         """Move the torque earlier; the last one's holds to the end of each stretch."""
-        true, j = torque.copy(), motion.joint_index(self.joint)
+        true, j = torque.copy(), self.column(motion)
         for stretch in motion.segments():
             time = motion.time[stretch]
             true[stretch, j] = np.interp(time + values[0], time, torque[stretch, j])

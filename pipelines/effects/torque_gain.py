@@ -27,5 +27,5 @@ class TorqueGain(Effect):
     def delivered(self, torque: NDArray, motion: Motion, values: NDArray) -> NDArray:
         """Divide by the gain."""
         true = torque.copy()
-        true[:, motion.joint_index(self.joint)] /= values[0]
+        true[:, self.column(motion)] /= values[0]
         return true

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from itertools import groupby
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 from pymodbus.constants import ExcCodes
@@ -40,16 +41,11 @@ from pipelines.settings.rig import (
 READ_WRITE = 23
 """Function code of the exchange that lockstep counts."""
 
-URGENT = -15
-"""Niceness of a rig that samples on its own clock, as a device's processor has nothing else to do."""
-
 EXTRAPOLATED = 5
 """Samples over which a drive goes on at its set-points' speed when none comes; then it holds."""
 
 
-def build_plant(
-    rig: RigSettings, path: Path, run: str, seed: int = 0, sample_rate_hz: float | None = None
-) -> Plant:
+def build_plant(rig: RigSettings, path: Path, run: str, seed: int = 0, sample_rate_hz: float | None = None) -> Plant:
     """Return the plant of a rig file, with what it hides."""
     if rig.plant is None:
         raise SettingsError(f"{path}: plant: missing, so there is no machine to play; add a [plant], see docs/rig.md")
@@ -241,7 +237,7 @@ async def serve(
             servers.append(server)
             if not await server.listen():
                 raise DeviceError(f"127.0.0.1:{number}: cannot listen there; choose a free port with --port")
-            announce("127.0.0.1", server.transport.sockets[0].getsockname()[1])
+            announce("127.0.0.1", cast(asyncio.Server, server.transport).sockets[0].getsockname()[1])
         await until.wait()
     finally:
         if clock:
@@ -284,8 +280,8 @@ def serve_file(
 
     if rig.clock == "real_time":
         gc.freeze()  # else looking through all that was imported would cost several samples now and then
-        with suppress(PermissionError):  # granted to privileged users only
-            os.setpriority(os.PRIO_PROCESS, 0, URGENT)
+        with suppress(PermissionError, AttributeError):  # Linux grants it to privileged users
+            os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
     with suppress(KeyboardInterrupt):
         asyncio.run(until_stopped())

@@ -200,7 +200,8 @@ def test_a_rig_that_is_not_there_is_named_with_its_address(record):
 
 def test_nothing_sealed_is_in_a_recording_of_a_rig_that_hides_something(record, tmp_path):
     (tmp_path / "secret_file.toml").write_text(
-        "seed = 987654\n[[possibility]]\neffect = 'encoder_offset'\njoints = ['knee']\nvalues = { offset = [0.1, 0.1] }\n"
+        "seed = 987654\n[[possibility]]\neffect = 'encoder_offset'\njoints = ['knee']\n"
+        "values = { offset = [0.1, 0.1] }\n"
     )
     table = record(replace={"[plant]": '[plant]\nsealed = "secret_file.toml"'})
     told = json.dumps(table.metadata) + " ".join(table.frame.columns)

@@ -249,7 +249,8 @@ def simulate(h, x, d, jt, w, hid, start, samples, with_drives, out):
                 if k >= 0:
                     out.torque[k * TICKS_PER_SAMPLE + s // STEPS_PER_TICK] = drive
             for i in range(nv):
-                qpos[i], qvel[i] = z[i], u[i]
+                # Speeds belong half a step before the positions; Coriolis torque wants both at one instant.
+                qpos[i], qvel[i] = z[i], 1.5 * u[i] - 0.5 * before[i]
             evaluate(model, data, bias)
             for i in range(nv):
                 for c in range(pattern[1, i]):
@@ -311,8 +312,8 @@ def simulate(h, x, d, jt, w, hid, start, samples, with_drives, out):
                 load[j] = drive[j] - lam[j] / DT - jt.viscous[j] * u[place[j]] - inert
             if k >= 0 and s == half:
                 # Kicks come at the beginning of a step, where the drive's torque is spread over it: half a
-                # step back, motion and torque belong together.
-                _latch(out, k, z, u, place, d, human, ref, speed, pressed)
+                # step back, where the last speeds are, motion and torque belong together.
+                _latch(out, k, z, before, place, d, human, ref, speed, pressed)
             for i in range(n):
                 z[i] += DT * u[i]
         if k >= 0:
@@ -344,6 +345,7 @@ def _grip(V, place, up, down, speed, lam):
 
 @njit(cache=True)
 def _latch(out, k, z, u, place, d, human, ref, speed, pressed):
+    """Log what is measured: positions half a step back, and the speeds ``u`` of that moment."""
     for j in range(2):
         theta = z[place[j]] - 0.5 * DT * u[place[j]]
         seen = _read(d, j, theta)

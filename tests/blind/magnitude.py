@@ -9,17 +9,27 @@ from tests.blind.floor import blocks, moving
 from tests.blind.plan import HIP
 from tests.blind.plant import Recorded
 
-PASSES = 5
+PASSES = 7
 CLOSE = 0.04
+FARTHEST = 5.0
+"""Factor by which a size changes at once: from afar the leg may behave otherwise."""
 
 
 def magnitude(cause: Cause, runs: Sequence[Recorded]) -> float:
     """Return the share, pooled over the runs in which the cause acts."""
+    effect, torque = rms(cause, runs)
+    return effect / torque
+
+
+def rms(cause: Cause, runs: Sequence[Recorded]) -> tuple[float, float]:
+    """Return rms of what is hidden and of the torque, N·m, away from reversals, over the runs where the cause acts."""
     j = HIP if cause.joint is None else cause.joint
-    acting = [r for r in runs if cause.acts_in(r.run.kind)]
-    effect = np.concatenate([blocks(r.effect)[moving(r)[:, j], j] for r in acting])
-    torque = np.concatenate([blocks(r.clean_torque)[moving(r)[:, j], j] for r in acting])
-    return float(np.sqrt(np.mean(effect**2) / np.mean(torque**2)))
+    acting = [(r, moving(r)[:, j]) for r in runs if cause.acts_in(r.run.kind)]
+    hidden = np.concatenate([blocks(r.effect)[rows, j] for r, rows in acting])
+    torque = np.concatenate([blocks(r.clean_torque)[rows, j] for r, rows in acting])
+    if not len(hidden):
+        raise FloatingPointError("the simulated leg is stuck")
+    return float(np.sqrt(np.mean(hidden**2))), float(np.sqrt(np.mean(torque**2)))
 
 
 def size_for(cause: Cause, wanted: float, pilot: Callable[[float], Sequence[Recorded]]) -> float:
@@ -27,14 +37,19 @@ def size_for(cause: Cause, wanted: float, pilot: Callable[[float], Sequence[Reco
 
     The sizes that make a working leg win over the wish.
     """
-    size = cause.start
+    size, low, high = cause.start, cause.smallest, cause.largest
     for _ in range(PASSES):
-        found = magnitude(cause, pilot(size))
+        try:
+            found = magnitude(cause, pilot(size))
+        except FloatingPointError:  # unstable or stuck: far too large
+            found = np.inf
         if abs(found / wanted - 1.0) < CLOSE:
             break
-        # Not more than a factor of six at once: from afar the leg may behave otherwise.
-        new = float(np.clip(size * np.clip(wanted / found, 1 / 6, 6), cause.smallest, cause.largest))
-        if new == size:
+        low, high = (size, high) if found < wanted else (low, size)
+        if high <= low * (1.0 + CLOSE):
             break
-        size = new
+        new = size * float(np.clip(wanted / found, 1 / FARTHEST, FARTHEST))
+        new = float(np.clip(new, cause.smallest, cause.largest))
+        # What is far from proportional is bisected.
+        size = new if low <= new <= high else float(np.sqrt(low * high))
     return size

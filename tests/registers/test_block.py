@@ -55,7 +55,9 @@ def test_a_value_too_large_saturates_as_in_a_device():
 
 
 def test_units_become_si():
-    block = Block({"time": Register(address=0, type="uint32", unit="us"), "f": Register(address=2, type="int16", unit="kN")})
+    block = Block(
+        {"time": Register(address=0, type="uint32", unit="us"), "f": Register(address=2, type="int16", unit="kN")}
+    )
     assert block.decode([0x000F, 0x4240, 2]) == {"time": pytest.approx(1.0), "f": 2000.0}
 
 

@@ -30,13 +30,14 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("gear_ratio = 100.0", "gear_rato = 100.0", "drive[0].gear_rato: unknown key; did you mean gear_ratio? (and 1 more)"),
+        ("gear_ratio = 100.0", "gear_rato = 100.0", "drive[0].gear_rato: unknown key; did you mean gear_ratio? "
+         "(and 1 more)"),
         ("unit = 2", "unit = 400", "drive[1].unit: found 400, expected less than or equal to 247"),
         ("unit = 2", "unit = 1", "unit: 127.0.0.1:502 unit 1 stands for two devices; correct one"),
         ('map = "servo"', 'map = "servos"', "drive[0].map: found 'servos', expected a table below [map.drive]: servo"),
         ('cuff = "thigh_back"', 'cuff = "thigh_front"', "sensor: found two sensors at thigh_front, expected one; "
          "correct their cuffs"),
-        ('type = "int32", scale = 1e-6, unit = "rad" }\nvelocity', 'type = "int32", scale = 1e-6, unit = "A" }\nvelocity',
+        ('scale = 1e-6, unit = "rad" }\nvelocity', 'scale = 1e-6, unit = "A" }\nvelocity',
          "map.drive.servo: read.angle.unit: found 'A', expected rad or mrad or deg; correct the unit"),
         ("address = 106", "address = 105", "map.drive.servo: read.velocity: register 105 is part of angle too; correct "
          "one address"),

@@ -1,0 +1,43 @@
+"""``exoid effects``: the physical effects that exoid knows."""
+
+from typing import Annotated
+
+import typer
+
+from exoid_cli.console import console
+
+LINE = "{effect:<24}{side:<11}{joints:<20}{typical}"
+"""Of the list; the equation stands below, for it needs the whole width."""
+
+
+def effects(
+    name: Annotated[str | None, typer.Argument(help="One effect, for its page; without it the list of all.")] = None,
+) -> None:
+    """List the effects a model can have, or say all about one: equation, parameters, how to confirm it."""
+    from pipelines.effects import EFFECTS
+    from pipelines.effects.reference import facts
+    from pipelines.model import effect_named
+
+    if name is not None:
+        _page(effect_named(name))
+        return
+    told = [facts(effect) for effect in EFFECTS]
+    console.emit(told)
+    console.say(LINE.format(effect="effect", side="side", joints="joints", typical="on exoskeletons"))
+    for one in told:
+        console.say(f"\n{LINE.format(**one)}\n    {one['equation']}")
+    console.say("\n`exoid effects NAME` says how one looks in a plot and how to make sure of it.")
+
+
+def _page(effect: type) -> None:
+    from pipelines.effects.reference import facts, typical_range
+
+    told = facts(effect)
+    console.emit(told)
+    console.say(f"{told['title']} ({told['effect']}), side: {told['side']}, joints: {told['joints']}\n")
+    console.say(f"{told['meaning']}\n\n    {told['equation']}\n")
+    headings = ("parameter", "symbol", "unit", "meaning", "on exoskeletons")
+    console.table(headings, [(p.name, p.symbol, p.unit, p.meaning, typical_range(p)) for p in effect().parameters])
+    for title, key in (("Runs", "runs"), ("Looks like", "looks_like"), ("To confirm", "confirm"), ("Source", "source")):
+        text = told[key] if isinstance(told[key], str) else ", ".join(told[key])
+        console.say(f"\n{title}: {text}")

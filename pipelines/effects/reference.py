@@ -1,0 +1,124 @@
+"""The pages of docs/effects, written from the effects themselves.
+
+``python -m pipelines.effects.reference docs/effects`` brings them up to date; a test says when they are not.
+"""
+
+import inspect
+import sys
+from pathlib import Path
+from typing import Any
+
+from pipelines.effects import EFFECTS, Effect, Parameter
+
+INTRODUCTION = """\
+# Effects
+
+Written by `make docs` from `pipelines/effects/`; change it there. A model is a tuple of these. The first two are
+the baseline of every fit; the others are the causes that `exoid diagnose` knows and a rig file may name.
+`exoid effects NAME` prints a page on the terminal.
+"""
+
+
+def facts(effect: type[Effect]) -> dict[str, Any]:
+    """Return all that an effect says of itself, for programs."""
+    return {
+        "effect": effect.name,
+        "title": effect.title,
+        "side": effect.side.value,
+        "joints": where(effect),
+        "runs": list(effect.acts_in),
+        "equation": effect.equation,
+        "meaning": inspect.cleandoc(effect.__doc__ or ""),
+        "typical": typical_size(effect),
+        "looks_like": effect.looks_like,
+        "confirm": effect.confirm,
+        "source": effect.source,
+        "parameters": [
+            {
+                "name": p.name,
+                "symbol": p.symbol,
+                "unit": p.unit,
+                "meaning": p.meaning,
+                "typical": list(p.typical),
+                "per_run": p.per_run,
+                "default": p.default,
+            }
+            for p in effect().parameters
+        ],
+    }
+
+
+def where(effect: type[Effect]) -> str:
+    """Say at which joints an effect can be."""
+    if effect.whole_leg:
+        return "whole leg"
+    if effect.joints is None:
+        return "each"
+    return " ".join([", ".join(effect.joints), *(f"({joint}: in {into})" for joint, into in effect.absorbed.items())])
+
+
+def typical_size(effect: type[Effect]) -> str:
+    """Say how large an effect is on an exoskeleton: the range of its first parameter."""
+    first = effect().parameters[0]
+    return f"{first.name} {typical_range(first)}"
+
+
+def typical_range(parameter: Parameter) -> str:
+    """Write the range of a parameter with its unit."""
+    low, high = parameter.typical
+    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+    return f"{low:.3g} to {high:.3g}{unit}"
+
+
+def page(effect: type[Effect]) -> str:
+    """Return an effect's page as Markdown."""
+    told = facts(effect)
+    rows = [_row(parameter) for parameter in effect().parameters]
+    return "\n".join(
+        [
+            f"# {told['title']}",
+            "",
+            f"`{told['effect']}`, side: {told['side']}, joints: {told['joints']}, runs: {', '.join(told['runs'])}",
+            "",
+            told["meaning"],
+            "",
+            f"    {told['equation']}",
+            "",
+            "| parameter | symbol | unit | meaning | on exoskeletons |",
+            "|---|---|---|---|---|",
+            *rows,
+            "",
+            f"**Looks like:** {told['looks_like']}.",
+            "",
+            f"**To confirm it on the rig:** {told['confirm']}.",
+            "",
+            f"**Source:** {told['source']}.",
+            "",
+        ]
+    )
+
+
+def _row(parameter: Parameter) -> str:
+    meaning = parameter.meaning
+    if parameter.per_run:
+        meaning += "; each run's own"
+    if parameter.default is not None:
+        meaning += f"; {parameter.default:g} where not said"
+    return f"| `{parameter.name}` | {parameter.symbol} | {parameter.unit} | {meaning} | {typical_range(parameter)} |"
+
+
+def pages() -> dict[str, str]:
+    """Return the pages of exoid's own effects by file name, and their index."""
+    ours = [effect for effect in EFFECTS if effect.__module__.startswith("pipelines.effects.")]
+    head = "| effect | side | joints | equation | on exoskeletons |\n|---|---|---|---|---|\n"
+    rows = (
+        f"| [{e.name}]({e.name}.md) | {e.side.value} | {where(e)} | {e.equation} | {typical_size(e)} |" for e in ours
+    )
+    return {"README.md": f"{INTRODUCTION}\n{head}" + "\n".join(rows) + "\n"} | {f"{e.name}.md": page(e) for e in ours}
+
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[1])
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in pages().items():
+        (folder / name).write_text(text, encoding="utf-8")

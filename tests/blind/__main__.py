@@ -1,0 +1,68 @@
+"""``python -m tests.blind``: hide effects, let ``exoid diagnose`` find them, count."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import track
+
+from tests.blind import report
+from tests.blind.cases import MIX, SINGLES, Case, case, full, mixed
+from tests.blind.examine import Folders, examine, prepare
+from tests.blind.plan import JOINTS
+
+
+class Seeds(StrEnum):
+    """Whose seeds: a program is tuned on some and judged on others."""
+
+    tuning = "tuning"
+    reporting = "reporting"
+
+
+BASE = {Seeds.tuning: 100_000, Seeds.reporting: 500_000}
+"""First seeds; the two never meet: see README.md."""
+
+
+def main(
+    cases: Annotated[int, typer.Option(min=1, help="How many cases.")] = 300,
+    seeds: Annotated[Seeds, typer.Option(help="Which range of seeds.")] = Seeds.tuning,
+    seed_base: Annotated[int | None, typer.Option(help="First seed, instead of the range's own.")] = None,
+    mix: Annotated[str, typer.Option(help="Shares of the categories.")] = ",".join(f"{k}={v}" for k, v in MIX.items()),
+    every: Annotated[bool, typer.Option("--full", help="300 with nothing hidden, 30 of each cause and joint.")] = False,
+    only: Annotated[str, typer.Option(help="Singles of this cause only, such as backlash@knee.")] = "",
+    out: Annotated[Path, typer.Option(help="Folder of sessions, answers and report.")] = Path("build/blind"),
+    workers: Annotated[int, typer.Option(min=1, help="Sessions at a time.")] = 2,
+    again: Annotated[bool, typer.Option(help="Diagnose anew, on the sessions that are there.")] = False,
+    simulate_only: Annotated[bool, typer.Option(help="Make the sessions and stop.")] = False,
+) -> None:
+    """Examine ``exoid diagnose`` on simulated sessions whose truth it cannot see."""
+    base = BASE[seeds] if seed_base is None else seed_base
+    planned = _planned(cases, base, mix, every, only)
+    console = Console()
+    if simulate_only:
+        for one in track(planned, "simulating", console=console):
+            prepare(one, Folders(out.resolve()))
+        return
+    progress = track(examine(planned, out, workers, again), "examining", total=len(planned), console=console)
+    scores = list(progress)
+    report.show(console, scores)
+    report.write(out, scores, f"seeds {base} to {base + len(planned) - 1} ({seeds.value})")
+
+
+def _planned(cases: int, base: int, mix: str, every: bool, only: str) -> list[Case]:
+    if every:
+        return full(base)
+    if only:
+        turns = [i for i, (effect, j) in enumerate(SINGLES) if only in (effect, f"{effect}@{JOINTS[j or 0]}")]
+        if not turns:
+            raise typer.BadParameter(f"there is no cause {only!r}; one is backlash@knee", param_hint="--only")
+        return [case(base + k, "single", turns[k % len(turns)]) for k in range(cases)]
+    shares = {name: float(share) for name, _, share in (part.partition("=") for part in mix.split(","))}
+    if unknown := set(shares) - set(MIX):
+        raise typer.BadParameter(f"unknown category {unknown.pop()!r}, known are {', '.join(MIX)}", param_hint="--mix")
+    return mixed(cases, base, shares)
+
+
+typer.run(main)

@@ -1,0 +1,19 @@
+"""What the recordings could have shown at all, as ``exoid detect`` says."""
+
+import json
+from pathlib import Path
+
+NAME = "detectability.json"
+
+
+def smallest_visible(folder: Path) -> dict[tuple[str, str | None], float] | None:
+    """Return the smallest size of each cause that would be seen, rms N·m at its joint; None where nobody says.
+
+    The file is a list under ``causes`` of ``effect``, ``joint`` (null for the whole leg) and ``smallest_rms_nm``:
+    rms of the effect's torque away from reversals, pooled over the runs in which it acts.
+    """
+    path = folder / NAME
+    if not path.exists():
+        return None
+    rows = json.loads(path.read_text())["causes"]
+    return {(row["effect"], row["joint"]): float(row["smallest_rms_nm"]) for row in rows}

@@ -1,0 +1,68 @@
+"""Another package can bring an effect, and a broken one is told apart from exoid."""
+
+import subprocess
+import sys
+from textwrap import dedent
+
+import pytest
+
+GOOD = '''
+from pipelines.effects import Effect, Parameter, Parity, Side
+from pipelines.effects.kernel import reaction
+
+class TendonSlack(Effect):
+    """A cable that pulls beyond an angle."""
+    name, title, side = "tendon_slack", "Tendon slack", Side.STRUCTURE
+    equation, source = "tau = k max(0, q - q0)", "its own paper"
+    looks_like, confirm = "a kink", "look at the cable"
+    linear = (Parameter("stiffness", "N·m/rad", "of the cable", "k", (1.0, 9.0)),)
+    shape = (Parameter("slack", "rad", "angle at which it is taut", "q0", (-1.0, 1.0)),)
+
+    @reaction
+    def reaction(at, state, values, geometry, joint, out):
+        out[joint] += values[0] * max(0.0, at.q[joint] - values[1])
+'''
+LISTED = "from pipelines.model import BY_NAME; print(list(BY_NAME)[-1], len(BY_NAME))"
+
+
+@pytest.fixture
+def python_with(tmp_path):
+    """Run Python with a package installed whose entry point is ``cables.tendon_slack:TendonSlack``."""
+
+    def run(module, *arguments):
+        (tmp_path / "cables").mkdir()
+        (tmp_path / "cables" / "tendon_slack.py").write_text(module, encoding="utf-8")
+        installed = tmp_path / "cables-1.0.dist-info"
+        installed.mkdir()
+        (installed / "METADATA").write_text("Metadata-Version: 2.1\nName: cables\nVersion: 1.0\n", encoding="utf-8")
+        entry = "[exoid.effects]\ntendon_slack = cables.tendon_slack:TendonSlack\n"
+        (installed / "entry_points.txt").write_text(entry, encoding="utf-8")
+        path = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); "
+        command = [sys.executable, "-c", path + dedent(arguments[0])]
+        return subprocess.run(command, capture_output=True, text=True, check=False)
+
+    return run
+
+
+def test_an_effect_of_another_package_is_one_of_exoids(python_with):
+    done = python_with(GOOD, LISTED)
+    assert done.stdout == "tendon_slack 27\n", done.stderr
+
+
+@pytest.mark.parametrize(
+    ("module", "message"),
+    [
+        ("import no_such_module", "loading it failed: ModuleNotFoundError: No module named 'no_such_module'; mend it"),
+        ("TendonSlack = 3", "it is 3, expected a subclass of pipelines.effects.Effect; mend it"),
+        (GOOD.replace("equation, source =", "unstated ="), "does not state equation, source"),
+        (GOOD.replace('"tendon_slack", "Ten', '"cogging", "Ten'), "its name cogging is already that of pipelines"),
+    ],
+    ids=["does not load", "no effect", "incomplete", "name taken"],
+)  # fmt: skip
+def test_a_broken_effect_is_one_line_that_names_its_package(python_with, module, message):
+    done = python_with(module, "from exoid_cli.app import run; sys.exit(run(['effects']))")
+    assert done.returncode == 2
+    assert done.stderr.startswith("exoid: effect tendon_slack (cables.tendon_slack:TendonSlack) of package cables")
+    assert message in done.stderr
+    assert "uninstall cables" in done.stderr
+    assert done.stderr.count("\n") == 1
