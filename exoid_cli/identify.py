@@ -1,5 +1,6 @@
 """``exoid identify``: friction from the empty exoskeleton, then inertia with the human."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -54,7 +55,7 @@ def identify(
     _report(found)
 
 
-def _named(row: dict[str, Any]) -> str:
+def _named(row: Mapping[Any, Any]) -> str:
     joint, run = (row[key] if isinstance(row[key], str) else "" for key in ("joint", "run"))
     return " ".join(filter(None, (joint, row["symbol"], run)))
 

@@ -1,6 +1,7 @@
 """How exoid's figures look, and how they are written."""
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
@@ -14,7 +15,7 @@ from pipelines.contracts.atomic import whole_file
 GREY, ORANGE, BLUE = "#7a869a", "#c2410c", "#1d4ed8"
 """What is wanted or measured; what a model gives; what is left between the two."""
 
-STYLE = {
+STYLE: dict[Any, Any] = {
     "font.size": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,

@@ -30,8 +30,8 @@ class Drives(NamedTuple):
     """(J,) N·m·s/rad."""
     limit: np.ndarray
     """(J,) N·m."""
-    count: np.ndarray
-    """(J,) rad per encoder count; 0 for an ideal encoder."""
+    rad_per_count: np.ndarray
+    """(J,) of the encoder; 0 for an ideal one."""
     speed_share: float
     """What a new speed adds to the low-passed one each control period, (0, 1]."""
     periods: int
@@ -57,7 +57,7 @@ def make_drives(
         kp=np.asarray(kp, float),
         kd=np.asarray(kd, float),
         limit=np.asarray(limit, float),
-        count=np.divide(2 * np.pi, counts, out=np.zeros_like(counts), where=counts > 0),
+        rad_per_count=np.divide(2 * np.pi, counts, out=np.zeros_like(counts), where=counts > 0),
         speed_share=float(1.0 - np.exp(-2 * np.pi * speed_cutoff_hz * period)),
         periods=periods,
         step_s=period / SUBSTEPS,
@@ -140,8 +140,8 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
         counted[:] = loop.state[THETA]
         read_encoders(a, counted)
         for j in range(j_count):
-            if d.count[j] > 0.0:
-                counted[j] = np.floor(counted[j] / d.count[j] + 0.5) * d.count[j]
+            if d.rad_per_count[j] > 0.0:
+                counted[j] = np.floor(counted[j] / d.rad_per_count[j] + 0.5) * d.rad_per_count[j]
             loop.speed[j] += d.speed_share * ((counted[j] - loop.angle[j]) / period - loop.speed[j])
             loop.angle[j] = counted[j]
             wanted = begin[j] + (reference[j] - begin[j]) * c / d.periods
@@ -153,8 +153,8 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
                 angle[:] = loop.state[THETA]
                 read_encoders(a, angle)
                 for j in range(j_count):
-                    if d.count[j] > 0.0:
-                        angle[j] = np.floor(angle[j] / d.count[j] + 0.5) * d.count[j]
+                    if d.rad_per_count[j] > 0.0:
+                        angle[j] = np.floor(angle[j] / d.rad_per_count[j] + 0.5) * d.rad_per_count[j]
                 speed[:] = loop.speed
                 before = loop.state.copy()
             step(a, w, s, t + done * d.step_s, d.step_s, loop.state, loop.memory, loop.load, loop.torque)

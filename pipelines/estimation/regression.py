@@ -38,7 +38,7 @@ class Regression:
     @property
     def scored(self) -> NDArray:
         """(m,) bool: usable at every joint, as the RMSE counts it."""
-        return self.usable.all(axis=1)
+        return np.asarray(self.usable.all(axis=1))
 
     def select(self, columns: NDArray) -> "Regression":
         """Return the regression on some of the parameters."""

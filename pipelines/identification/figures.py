@@ -2,31 +2,20 @@
 
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 import pandas as pd
-
-matplotlib.use("Agg")
-
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pipelines.contracts.atomic import whole_file
 from pipelines.contracts.joints import Joint
+from pipelines.plots import BLUE as LEFT
+from pipelines.plots import GREY as MEASURED
+from pipelines.plots import ORANGE as PREDICTED
+from pipelines.plots import STYLE, save
 
-MEASURED, PREDICTED, LEFT = "#7a869a", "#c2410c", "#1d4ed8"
 BINS, FEWEST = 25, 8
 """Of the running mean of a residual, and the samples a bin needs to have one."""
-STYLE = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.alpha": 0.25,
-    "legend.frameon": False,
-    "figure.dpi": 130,
-}
 
 
 def draw(residuals: pd.DataFrame, joints: tuple[Joint, ...], folder: Path) -> None:
@@ -37,16 +26,8 @@ def draw(residuals: pd.DataFrame, joints: tuple[Joint, ...], folder: Path) -> No
     with plt.rc_context(STYLE):
         for name, run in residuals[residuals["purpose"] == "validate"].groupby("file", sort=False):
             stem = Path(str(name)).stem
-            _save(_prediction(run, joints, stem), folder / f"torque-{stem}")
-            _save(_what_is_left(run, joints, stem), folder / f"residual-{stem}")
-
-
-def _save(figure: Figure, stem: Path) -> None:
-    stem.parent.mkdir(parents=True, exist_ok=True)
-    for kind in ("png", "pdf"):
-        with whole_file(stem.with_name(f"{stem.name}.{kind}")) as path:
-            figure.savefig(path, format=kind, bbox_inches="tight")
-    plt.close(figure)
+            save(_prediction(run, joints, stem), folder / f"torque-{stem}")
+            save(_what_is_left(run, joints, stem), folder / f"residual-{stem}")
 
 
 def _prediction(run: pd.DataFrame, joints: tuple[Joint, ...], title: str) -> Figure:

@@ -88,8 +88,8 @@ def regressor(q, dq, ddq, thigh_length, gravity):
 
 
 def _torque(q, dq, ddq, X, geometry: Geometry, gravity: float) -> NDArray:
-    as_vectors = [np.ascontiguousarray(v, dtype=float) for v in (q, dq, ddq)]
-    return np.array(regressor_at(*as_vectors, geometry.thigh_length_m, gravity)) @ np.asarray(X, dtype=float)
+    q, dq, ddq = (np.array(v, dtype=float)[np.newaxis] for v in (q, dq, ddq))
+    return regressor(q, dq, ddq, geometry.thigh_length_m, gravity)[0] @ np.asarray(X, dtype=float)
 
 
 def mass_matrix(q, X, geometry: Geometry) -> NDArray:

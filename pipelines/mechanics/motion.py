@@ -130,11 +130,11 @@ def motion_from_table(table: Table, default_geometry: Geometry | None = None) ->
     frame, metadata = table.frame, table.metadata
     joints = joints_of(metadata)
 
-    def per_joint(quantity: str) -> NDArray | None:
-        columns = [joint.column(quantity) for joint in joints]
-        if not set(columns) <= set(frame.columns):
-            return None
-        return np.array(frame[columns], dtype=float, order="C")
+    def per_joint(quantity: str) -> NDArray:
+        return np.array(frame[[joint.column(quantity) for joint in joints]], dtype=float, order="C")
+
+    def if_there(quantity: str) -> NDArray | None:
+        return per_joint(quantity) if {joint.column(quantity) for joint in joints} <= set(frame.columns) else None
 
     force_columns = [f"{cuff}_force_{axis}_n" for cuff in CUFFS for axis in "xyz"]
     has_forces = set(force_columns) <= set(frame.columns)
@@ -153,8 +153,8 @@ def motion_from_table(table: Table, default_geometry: Geometry | None = None) ->
         joints=tuple(joint.name for joint in joints),
         geometry=geometry_of(metadata, default_geometry),
         forces=frame[force_columns].to_numpy(float).reshape(-1, 4, 3) if has_forces else None,
-        reference=per_joint("reference"),
-        temperature=per_joint("temperature"),
+        reference=if_there("reference"),
+        temperature=if_there("temperature"),
         cutoff_hz=float(metadata["filter"]["cutoff_hz"]),
         file=Path(table.path).name if table.path else "",
         metadata=metadata,

@@ -4,13 +4,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from scipy.signal import welch
 
 WINDOW_S = 10.0
 NOISE_BAND = (0.6, 0.96)
 """Share of the Nyquist frequency where an angle holds nothing but noise."""
-HIGHEST_SHARE = 0.25
-"""Of the Nyquist frequency: above it the derivatives of noise outweigh what little signal is left."""
+HIGHEST_SHARE = 0.125
+"""Of the Nyquist frequency: above it there is only what sticking joints do at reversals, which no fit uses."""
+SLOW_SHARE = 0.9999
+"""Of the velocity's power: the motion itself, which the filter must leave alone."""
+QUIET_HZ = 3.0
+"""Width of noise after which no more signal is expected."""
 CLEAR = 3.0
 """A spectrum this many times its floor is signal."""
 
@@ -32,6 +37,8 @@ class Spectrum:
     """(f,) unit²/Hz."""
     floor: float
     meets_floor_hz: float
+    motion_hz: float
+    """Frequency below which nearly all of the velocity's power lies."""
 
 
 def spectrum(x: NDArray, rate_hz: float) -> Spectrum:
@@ -44,26 +51,31 @@ def spectrum(x: NDArray, rate_hz: float) -> Spectrum:
     nyquist = rate_hz / 2
     band = (frequency >= NOISE_BAND[0] * nyquist) & (frequency <= NOISE_BAND[1] * nyquist)
     floor = float(np.median(density[band]))
-    # Running medians: one noisy line is neither the end of the signal nor more of it.
-    width = max(1, len(frequency) // 100) | 1
-    padded = np.pad(density, width // 2, mode="edge")
-    smooth = np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1)
-    above = smooth > CLEAR * floor
-    meets = frequency[np.argmin(above)] if not above.all() else nyquist
-    return Spectrum(frequency, density, floor, float(meets))
+    above = uniform_filter1d(density, max(1, len(frequency) // 100), mode="nearest") > CLEAR * floor
+    # A periodic motion has gaps between its lines; its end is where nothing follows for a while.
+    ahead = max(1, int(QUIET_HZ / frequency[1]))
+    quiet = ~maximum_filter1d(above, ahead, origin=-(ahead // 2), mode="nearest")
+    meets = frequency[np.argmax(quiet)] if quiet.any() else nyquist
+    speed = np.cumsum(np.maximum(density - floor, 0.0) * frequency**2)
+    motion = frequency[np.searchsorted(speed, SLOW_SHARE * speed[-1])] if speed[-1] > 0 else 0.0
+    return Spectrum(frequency, density, floor, float(meets), float(min(motion, meets)))
 
 
 def choose_cutoff(x: NDArray, rate_hz: float, channels: tuple[str, ...]) -> Cutoff:
-    """Choose one cut-off for all channels of ``x`` (n, channels): the highest any of them needs."""
-    meets = [spectrum(column, rate_hz).meets_floor_hz for column in x.T]
-    widest = int(np.argmax(meets))
+    """Choose one cut-off for all channels of ``x`` (n, channels).
+
+    The noisiest channel decides, for the acceleration of one joint stands in the torque of both; but twice the
+    frequency of the fastest motion passes, whatever the noise.
+    """
+    found = [spectrum(column, rate_hz) for column in x.T]
     highest = HIGHEST_SHARE * rate_hz / 2
-    if meets[widest] > highest:
-        return Cutoff(
-            highest,
-            f"the {channels[widest]} angle's spectrum meets its noise floor at {meets[widest]:.1f} Hz; "
-            f"held to an eighth of the sample rate",
-        )
-    lowest = 2.0 / (len(x) / rate_hz)
-    reason = f"the {channels[widest]} angle's spectrum meets its noise floor there"
-    return Cutoff(max(meets[widest], lowest), reason)
+    noisiest = int(np.argmin([s.meets_floor_hz for s in found]))
+    meets = found[noisiest].meets_floor_hz
+    fastest = int(np.argmax([s.motion_hz for s in found]))
+    needed = min(2.0 * found[fastest].motion_hz, highest)
+    said = f"the {channels[noisiest]} angle's spectrum meets its noise floor at {meets:.1f} Hz"
+    if meets < needed:
+        return Cutoff(needed, f"{said}, but the {channels[fastest]} moves at up to {needed / 2:.1f} Hz")
+    if meets > highest:
+        return Cutoff(highest, f"{said}; above a sixteenth of the sample rate is only what reversals leave")
+    return Cutoff(max(meets, 2.0 * rate_hz / len(x)), said)

@@ -141,7 +141,7 @@ def _without_overlap(first: NDArray, length: int) -> NDArray:
 def closed_loop_frame(made: UnderReferences, motion: Motion, joints: tuple[Joint, ...]) -> pd.DataFrame:
     """Return a closed loop under recorded references as a ``simulation/1`` table, the measured beside it."""
     assert motion.reference is not None
-    columns = {"time_s": motion.time}
+    columns: dict[str, object] = {"time_s": motion.time}
     for j, joint in enumerate(joints):
         columns[joint.column("reference")] = motion.reference[:, j]
         columns[joint.column("angle")] = made.angle[:, j]

@@ -655,6 +655,8 @@ def hardening_limb(rng, joint):
 
 
 CAUSES = tuple(FORMS)
+SOFT = ("backlash", "joint_elasticity")
+"""Causes that part the motor from its link."""
 HUMAN_CAUSES = ("passive_joint_torque", "voluntary_torque", "spasticity", "cuff_compliance")
 
 

@@ -1,6 +1,6 @@
 """Random exoskeletons: links, friction, drives, encoders, and how well torque and forces are measured."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
@@ -10,6 +10,10 @@ from tests.blind.body import Leg, Segment
 
 SPEED_CUTOFF_HZ = 40.0
 DRIVE_RATE_HZ = 1000.0
+KNEE_ROTOR = 0.04
+"""kg·m², felt behind a soft transmission only; one that is felt elsewhere is an effect to be hidden."""
+SOFT_DAMPING = 150.0
+"""Most damping per motor inertia, 1/s, with which drives behind a soft transmission do not hunt."""
 CHATTER_NM = 0.8
 """Damping torque of one encoder count: a coarse encoder allows little damping."""
 
@@ -42,6 +46,17 @@ class Machine:
     carried: float
     """Share of the limb's weight that the cuffs carry along it."""
     preload: float
+
+    @property
+    def rotors(self) -> NDArray:
+        """Reflected inertia of the motors, (2,) kg·m²."""
+        return np.array([self.hip_rotor, KNEE_ROTOR])
+
+    def tuned_for_soft(self, joint: int) -> "Machine":
+        """Return the machine with the drive of a joint tuned as a lab would tune it behind a soft transmission."""
+        kd = self.kd.copy()
+        kd[joint] = min(kd[joint], SOFT_DAMPING * self.rotors[joint])
+        return replace(self, kd=kd)
 
 
 def random_machine(rng: Generator, thigh_length: float) -> Machine:

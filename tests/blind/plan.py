@@ -12,8 +12,6 @@ from tests.blind.smooth import MEMORIES
 
 HIP, KNEE = 0, 1
 JOINTS = ("hip", "knee")
-MOTOR_INERTIA = 0.04
-"""kg·m² behind a soft transmission."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +55,6 @@ class Plan:
         self.channel = Channel()
         self.added_mass = np.zeros((2, 2))
         self.transmission = np.full(2, RIGID)
-        self.motor_inertia = np.zeros(2)
         self.spring = np.zeros((2, 5))
         self.encoder_offset = np.zeros(2)
         self.wobble = np.zeros((2, 2))
@@ -79,7 +76,6 @@ class Plan:
     def soft(self, joint: int, kind: int, *spring: float) -> None:
         """Put a spring or a play between a motor and its link."""
         self.transmission[joint] = kind
-        self.motor_inertia[joint] = MOTOR_INERTIA
         self.spring[joint, : len(spring)] = spring
 
     def hidden(self) -> Hidden:

@@ -5,16 +5,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter, sosfiltfilt
 
 from tests.blind import loop
 from tests.blind.body import Body, Leg
 from tests.blind.excitation import PERIOD_S, Excitation
 from tests.blind.machine import DRIVE_RATE_HZ, SPEED_CUTOFF_HZ, Machine
 from tests.blind.people import Person
-from tests.blind.plan import Plan, Run
+from tests.blind.plan import HIP, Plan, Run
 
 REVERSAL_SPEED, REVERSAL_PADDING_S = 0.04, 0.08
+FOLLOWED = butter(2, 12.0, fs=1.0 / loop.SAMPLE_S, output="sos")
 
 
 @dataclass(frozen=True)
@@ -63,10 +64,7 @@ def record(rig: Rig, excitation: Excitation, plan: Plan, run: Run, noise: Genera
     log = move(rig, excitation, plan, run, n)
     t = (np.arange(n) + 0.5) * loop.SAMPLE_S
     clean = _reported(log.torque, plan)
-    # The faultless machine along the reported motion, encoder's errors and all.
-    needed = Body(rig.leg(run)).inverse(log.angle, log.speed, log.acceleration)
-    needed[:, 0] += machine.hip_rotor * log.acceleration[:, 0]
-    needed += machine.coulomb * np.sign(log.speed) + machine.viscous * log.speed
+    needed = _needed(rig, plan, run, log)
     forces = _cuff_forces(rig, plan, log, noise) if run.has_human else None
     return Recorded(
         run=run,
@@ -83,6 +81,19 @@ def record(rig: Rig, excitation: Excitation, plan: Plan, run: Run, noise: Genera
     )
 
 
+def _needed(rig: Rig, plan: Plan, run: Run, log: loop.Log) -> NDArray:
+    """Torque that the faultless machine needs for the reported motion, encoder's errors and all, (n, 2) N·m."""
+    machine = rig.machine
+    acceleration = log.acceleration.copy()
+    soft = plan.transmission != loop.RIGID
+    # A motor behind something soft trembles alone; the leg follows only what is slower.
+    acceleration[:, soft] = sosfiltfilt(FOLLOWED, acceleration[:, soft], axis=0)
+    needed = Body(rig.leg(run)).inverse(log.angle, log.speed, acceleration)
+    needed[:, HIP] += machine.hip_rotor * acceleration[:, HIP]
+    needed += machine.rotors * (log.acceleration - acceleration)
+    return needed + machine.coulomb * np.sign(log.speed) + machine.viscous * log.speed
+
+
 def move(rig: Rig, excitation: Excitation, plan: Plan, run: Run, samples: int) -> loop.Log:
     """Run the compiled loop."""
     machine = rig.machine
@@ -94,11 +105,12 @@ def move(rig: Rig, excitation: Excitation, plan: Plan, run: Run, samples: int) -
     elif run.has_human:
         wearer = rig.person.leg
     body = Body(leg, wearer, plan.payload)
-    mass = plan.added_mass + np.diag([machine.hip_rotor, 0.0])
+    # The hip's rotor turns with the thigh unless something soft is between them.
+    mass = plan.added_mass + np.diag([machine.hip_rotor if plan.transmission[HIP] == loop.RIGID else 0.0, 0.0])
     levers = np.array([*machine.cuff_distance, leg.length])
     cuffs = np.zeros((2, 3)) if plan.cuffs is None else plan.cuffs / levers[:2, np.newaxis] ** 2
     joints = loop.Joints(
-        machine.coulomb, machine.viscous, mass, plan.transmission, plan.motor_inertia, plan.spring, cuffs, levers
+        machine.coulomb, machine.viscous, mass, plan.transmission, machine.rotors, plan.spring, cuffs, levers
     )
     world = loop.World(leg.gravity, plan.tilt, np.array([body.payload, *plan.load], dtype=float))
     drives = loop.Drives(

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import shutil
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from numpy.random import Generator
 
 from tests.blind import outside
 from tests.blind.cases import Case
-from tests.blind.causes import Cause, log_uniform, random_cause
+from tests.blind.causes import SOFT, Cause, log_uniform, random_cause
 from tests.blind.excitation import PERIOD_S, random_excitation
 from tests.blind.faults import IN_EVERY_RUN, fault_named
 from tests.blind.floor import left_by_the_baseline, moving, noise_floor, ripple_floor
@@ -81,7 +81,11 @@ class _Draw:
         return np.random.default_rng([*self.stream, *part])
 
     def session(self) -> Session:
-        hidden = [(cause, self._size(cause, wanted), wanted) for cause, wanted in self._wanted()]
+        wanted_causes = self._wanted()
+        for cause, _ in wanted_causes:
+            if cause.effect in SOFT:
+                self.rig = replace(self.rig, machine=self.rig.machine.tuned_for_soft(cause.joint))
+        hidden = [(cause, self._size(cause, wanted), wanted) for cause, wanted in wanted_causes]
         runs = [(kind, purpose) for kind in self.case.kinds for purpose in PURPOSES]
         causes = [(cause, size) for cause, size, _ in hidden]
         recorded = [self._record(causes, kind, purpose, self.duration) for kind, purpose in runs]

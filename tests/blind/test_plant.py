@@ -99,14 +99,14 @@ def test_a_joint_that_reverses_sticks_for_a_while(rig, excitation):
 
 
 def test_a_transmission_winds_up_by_torque_over_stiffness(rig, excitation):
+    rig = Rig(rig.machine.tuned_for_soft(HIP), rig.person)
     plan = Plan()
     plan.soft(HIP, loop.ELASTIC, 800.0, 0.5)
     log = move(rig, excitation, plan, run_of("with_human"), 2000)
     wound = log.angle[:, HIP] - log.link[:, HIP]
     needed = Body(rig.leg(run_of("with_human"))).inverse(*(log.link[:, 2 * i : 2 * i + 2] for i in range(3)))
-    needed = needed[:, HIP] + rig.machine.hip_rotor * log.link[:, 4 + HIP]
-    assert np.corrcoef(wound, needed)[0, 1] > 0.98
-    assert np.polyfit(needed, wound, 1)[0] == pytest.approx(1 / 800.0, rel=0.05)
+    assert np.corrcoef(wound, needed[:, HIP])[0, 1] > 0.98
+    assert np.polyfit(needed[:, HIP], wound, 1)[0] == pytest.approx(1 / 800.0, rel=0.05)
 
 
 @pytest.mark.parametrize("cuffs", [None, np.array([[15000.0, 60.0, 0.0]] * 2)], ids=["one leg", "two legs"])

@@ -143,12 +143,12 @@ def test_unrealizable_results_are_said(noiseless_motions):
 
 
 def test_without_an_empty_run_friction_cannot_be_fitted(noiseless_motions):
-    with pytest.raises(InputError, match="found no exo_alone run to train on among: with_human_train.parquet"):
+    with pytest.raises(InputError, match=r"found no exo_alone run to train on among: with_human_train\.parquet"):
         identify([m for m in noiseless_motions if m.run == "with_human"])
 
 
 def test_one_run_cannot_be_validated(noiseless_motions):
-    with pytest.raises(InputError, match="found no run to validate on among: exo_alone_train.parquet"):
+    with pytest.raises(InputError, match=r"found no run to validate on among: exo_alone_train\.parquet"):
         identify(noiseless_motions[:1])
 
 

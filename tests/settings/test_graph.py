@@ -75,7 +75,7 @@ def test_only_what_depends_on_a_change_runs_again(make):
     assert make() == []
     make.change("feedback_gain_nm_s_rad = 300.0", "feedback_gain_nm_s_rad = 400.0")
     assert make() == ["simulate"]
-    make.change("confidence = 0.95", "confidence = 0.9")
+    make.change("[identify]\nfigures = true", "[identify]\nfigures = false")
     assert make() == FIT
     make.change("order = 4", "order = 2")
     assert sorted(make()) == sorted(["filter"] * 4 + FIT)
