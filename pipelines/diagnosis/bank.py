@@ -44,7 +44,9 @@ def weights_under(gram: Gram) -> NDArray:
     return weights
 
 
-def fill(runs: Sequence[Run], baseline: Baseline, report: Callable[[float, str], None] = lambda share, what: None) -> Bank:
+def fill(
+    runs: Sequence[Run], baseline: Baseline, report: Callable[[float, str], None] = lambda share, what: None
+) -> Bank:
     """Compute every candidate's columns; ``report`` is told the share done and the effect at hand."""
     untouched = [run.average(baseline.columns(run.motion, run.motion, run.motion)) for run in runs]
     plain = gram_of_runs(runs, untouched)

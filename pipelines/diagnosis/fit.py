@@ -45,7 +45,9 @@ def fit(causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline, we
     """Fit baseline and causes at the shapes they have."""
     gram = gram_of_runs(runs, *zip(*stacked_columns(causes, runs, baseline), strict=True))
     values = solve(gram, weights)
-    return Fit(tuple(sorted(causes, key=_last_sensors)), values, *_errors(gram, values), tuple(r.motion.run for r in runs))
+    return Fit(
+        tuple(sorted(causes, key=_last_sensors)), values, *_errors(gram, values), tuple(r.motion.run for r in runs)
+    )
 
 
 def _last_sensors(cause: Candidate) -> bool:
@@ -66,9 +68,7 @@ def stacked_columns(
         width = len(cause.effect.linear)
         parts.append(expanded([columns[:, :, at : at + width] for columns, _ in made], cause, runs))
         at += width
-    return [
-        (np.concatenate([part[r] for part in parts], axis=2), measured) for r, (_, measured) in enumerate(made)
-    ]
+    return [(np.concatenate([part[r] for part in parts], axis=2), measured) for r, (_, measured) in enumerate(made)]
 
 
 def _errors(gram: Gram, values: NDArray) -> tuple[NDArray, NDArray, float]:
@@ -119,7 +119,9 @@ def _along(
         tried.append(fit(causes, runs, baseline, weights))
         return tried[-1].cost
 
-    minimize_scalar(cost, bounds=(low, high), method="bounded", options={"maxiter": EVALUATIONS, "xatol": 0.02 * (high - low)})
+    minimize_scalar(
+        cost, bounds=(low, high), method="bounded", options={"maxiter": EVALUATIONS, "xatol": 0.02 * (high - low)}
+    )
     return min(tried, key=lambda f: f.cost)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates import Candidate, bends_motion, expanded_columns
-from pipelines.diagnosis.observations import Baseline, Run
+from pipelines.diagnosis.observations import Run
 from pipelines.effects import Effect, Parameter
 from pipelines.mechanics.motion import Motion
 

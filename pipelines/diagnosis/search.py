@@ -60,7 +60,6 @@ class Scorer:
         shapes = sum(len(self.bank.candidates[i].effect.shape) for i in chosen)
         return Scored(tuple(chosen), gain - SHAPE_COST * shapes, rms)
 
-
     def _possible(self, gram: Gram, chosen: Sequence[int]) -> bool:
         """Tell whether no cause comes out with a sign that physics forbids it."""
         values = solve(gram, self.bank.weights)[self.bank.baseline.size :]
@@ -105,9 +104,7 @@ def search(scorer: Scorer, most: int = MOST) -> list[dict[tuple[str, ...], Score
         tried = []
         for base in beam:
             labels = {bank.candidates[i].label for i in base.chosen}
-            tried += [
-                scorer((*base.chosen, i)) for i in contenders if bank.candidates[i].label not in labels
-            ]
+            tried += [scorer((*base.chosen, i)) for i in contenders if bank.candidates[i].label not in labels]
         levels.append(best_of_each_label(bank, tried))
     return levels
 

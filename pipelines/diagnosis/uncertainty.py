@@ -37,9 +37,7 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> Uncertaint
         slopes.append([((c @ fit.values - y) - (d @ fit.values - z)) / step
                        for (c, y), (d, z) in zip(ahead, plain, strict=True)])  # fmt: skip
         places.append((cause, i, run))
-    wide = [
-        np.concatenate([c, *(s[r][:, :, np.newaxis] for s in slopes)], axis=2) for r, c in enumerate(columns)
-    ]
+    wide = [np.concatenate([c, *(s[r][:, :, np.newaxis] for s in slopes)], axis=2) for r, c in enumerate(columns)]
     weights = fit.weights
     gram = sum(np.einsum("mo,o,moi,moj->ij", run.usable, weights, a, a) for run, a in zip(runs, wide, strict=True))
     scores = [
