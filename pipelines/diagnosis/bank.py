@@ -1,0 +1,70 @@
+"""Every candidate's columns at every shape, multiplied out once."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.candidates import Candidate, expanded, gram_of_runs, proposals, signatures
+from pipelines.diagnosis.gram import Gram, error, solve
+from pipelines.diagnosis.observations import Baseline, Run, with_load
+from pipelines.diagnosis.scan import Scan, worth_a_look
+
+PASSES = 3
+
+
+@dataclass(frozen=True)
+class Bank:
+    """Products of the baseline's and all candidates' columns over the training runs."""
+
+    runs: tuple[Run, ...]
+    baseline: Baseline
+    candidates: tuple[Candidate, ...]
+    where: tuple[slice, ...]
+    """Each candidate's columns in ``gram``; the baseline's come first."""
+    gram: Gram
+    weights: NDArray
+    """(O,) inverse variance of each output under the baseline."""
+
+    def columns_of(self, chosen: Sequence[int]) -> NDArray:
+        """Return the columns of the baseline and some candidates."""
+        parts = [np.arange(self.baseline.size)]
+        parts += [np.arange(self.where[i].start, self.where[i].stop) for i in chosen]
+        return np.concatenate(parts)
+
+
+def weights_under(gram: Gram) -> NDArray:
+    """Return each output's inverse variance under the fit to all columns, iterated."""
+    counts = gram.count.sum(axis=0)
+    weights = np.where(counts > 0, 1.0, 0.0)
+    for _ in range(PASSES):
+        squares = error(gram, solve(gram, weights))
+        weights = np.where(counts > 0, counts / np.maximum(squares, 1e-9 * np.maximum(counts, 1)), 0.0)
+    return weights
+
+
+def fill(
+    runs: Sequence[Run], baseline: Baseline, report: Callable[[float, str], None] = lambda share, what: None
+) -> Bank:
+    """Compute every candidate's columns; ``report`` is told the share done and the effect at hand."""
+    untouched = [run.average(baseline.columns(run.motion, run.motion, run.motion)) for run in runs]
+    plain = gram_of_runs(runs, untouched)
+    weights = weights_under(plain)
+    runs = [with_load(run, baseline, solve(plain, weights)) for run in runs]
+    scan = Scan.of(runs, untouched, weights)
+    candidates: list[Candidate] = []
+    where: list[slice] = []
+    columns = [untouched]
+    at = baseline.size
+    effects = list(proposals(baseline.joints, baseline.kinds))
+    for number, effect in enumerate(effects):
+        report(number / len(effects), effect.label)
+        for candidate in worth_a_look(effect, scan):
+            made = expanded(signatures(candidate, runs, baseline, untouched, weights), candidate, runs)
+            candidates.append(candidate)
+            where.append(slice(at, at + made[0].shape[2]))
+            columns.append(made)
+            at += made[0].shape[2]
+    stacked = [np.concatenate([column[r] for column in columns], axis=2) for r in range(len(runs))]
+    return Bank(tuple(runs), baseline, tuple(candidates), tuple(where), gram_of_runs(runs, stacked), weights)

@@ -1,0 +1,157 @@
+"""Candidates: an effect at a joint with a shape, and what it would add to each measured torque.
+
+Every candidate becomes columns beside the baseline's. Torque effects give their own columns. Effects
+that change kinematics or readings are not linear: the baseline is rebuilt as they would have it and
+refitted there, and its difference from the untouched baseline under the same parameters is the column.
+Linearised at biased parameters, elasticity would pass for an encoder offset.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.gram import Gram, gram_of, solve
+from pipelines.diagnosis.observations import FOLDS, Baseline, Run
+from pipelines.effects import EFFECTS, Effect, Side
+from pipelines.model import Model, Term
+
+WORN = ("mass_off_axis", "payload_change")
+"""Effects of the structure that the person may carry instead: then in their runs only, and felt by the cuffs."""
+BASELINE = ("rigid_body", "friction")
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect and its shape in each run."""
+
+    effect: Effect
+    shapes: tuple[tuple[float, ...], ...]
+    """One for each run; they differ in parameters that each run has for itself."""
+
+    @property
+    def label(self) -> str:
+        """``effect@joint``."""
+        return self.effect.label
+
+    def term(self, run: int) -> Term:
+        """Return the candidate as a term of a run's model, its amplitudes nought."""
+        return Term(self.effect, np.append(np.zeros(len(self.effect.linear)), self.shapes[run]))
+
+    @property
+    def bends(self) -> bool:
+        """Whether the effect changes kinematics or readings rather than adding torque of its own."""
+        return bends_motion(self.effect)
+
+
+def bends_motion(effect: Effect) -> bool:
+    """Tell whether an effect changes kinematics or readings rather than adding torque of its own."""
+    return type(effect).corrected is not Effect.corrected or bool(effect.torque_reading is not None and effect.shape)
+
+
+def proposals(joints: Sequence[str], kinds: Sequence[str]) -> Iterator[Effect]:
+    """Yield every effect at every place it can be in the kinds of run at hand."""
+    for effect in EFFECTS:
+        if effect.name in BASELINE or not set(effect.acts_in) & set(kinds):
+            continue
+        if effect.whole_leg:
+            yield effect()
+            continue
+        for joint in effect.joints or joints:
+            if joint in effect.absorbed:
+                continue
+            yield effect(joint=joint)
+            if effect.name in WORN and "with_human" in kinds:
+                yield effect(joint=joint, run="with_human")
+
+
+def columns_under(terms: Sequence[Term], run: Run, baseline: Baseline) -> tuple[NDArray, NDArray]:
+    """Return the columns of the baseline and of some terms in one run, and what was measured.
+
+    Terms bend the motion that everything is computed at, add their own torque, and stand between torque and reading.
+    The cuffs' forces make another torque where the limb stands at another angle.
+
+    Returns
+    -------
+    (m, O, size + linear parameters) columns and (m, O) measured torques, N·m.
+    """
+    motion = run.motion
+    model = Model(tuple(terms))
+    motor, link, limb = model.sensed(motion), model.corrected(motion), model.on_limb(motion)
+    joints = len(baseline.joints)
+    parts = [baseline.columns(motor, link, limb)]
+    for term in sorted(terms, key=lambda t: t.effect.side is Side.SENSOR):
+        effect = term.effect
+        for part in parts:
+            part[:, :joints] = effect.observed(part[:, :joints], motion, term.shape)
+        at = limb if effect.on_limb else motor if effect.side is Side.DRIVE else link
+        own = effect.columns(at, term.shape)
+        parts.append(np.concatenate([own, own if effect.on_limb else np.zeros_like(own)], axis=1))
+    return run.average(np.concatenate(parts, axis=2)), run.measured_at(limb)
+
+
+def gram_of_runs(runs: Sequence[Run], columns: Sequence[NDArray], measured: Sequence[NDArray] | None = None) -> Gram:
+    """Multiply out all runs; ``measured`` (m, O) each where it is not the runs' own."""
+    measured = measured or [run.measured for run in runs]
+    grams = [gram_of(c, y, r.usable, r.fold, FOLDS) for r, c, y in zip(runs, columns, measured, strict=True)]
+    total = grams[0]
+    for gram in grams[1:]:
+        total = total + gram
+    return total
+
+
+def signatures(
+    candidate: Candidate, runs: Sequence[Run], baseline: Baseline, untouched: Sequence[NDArray], weights: NDArray
+) -> list[NDArray]:
+    """Return the candidate's columns in each run, (m, O, k).
+
+    Parameters
+    ----------
+    untouched : the baseline's columns in each run
+    weights : (O,) inverse variances, for the refit of effects that bend the motion
+    """
+    if not candidate.bends:
+        return [torque_columns(candidate, r, run) for r, run in enumerate(runs)]
+    under = [columns_under([candidate.term(r)], run, baseline) for r, run in enumerate(runs)]
+    values = solve(gram_of_runs(runs, *zip(*under, strict=True)), weights)
+    size = baseline.size
+    return [
+        (columns @ values - plain @ values[:size] - (measured - run.measured))[:, :, np.newaxis]
+        for (columns, measured), plain, run in zip(under, untouched, runs, strict=True)
+    ]
+
+
+def torque_columns(candidate: Candidate, number: int, run: Run) -> NDArray:
+    """Return a torque effect's columns in one run, (m, O, k): in the drives, and in the cuffs where a person makes it."""
+    effect = candidate.effect
+    own = run.average(effect.columns(run.motion, candidate.shapes[number]))
+    return np.concatenate([own, own if effect.on_limb else np.zeros_like(own)], axis=1)
+
+
+def expanded(columns: Sequence[NDArray], candidate: Candidate, runs: Sequence[Run]) -> list[NDArray]:
+    """Give linear parameters that each run has for itself a column for each run the effect acts in, (m, O, k')."""
+    effect = candidate.effect
+    apart = [] if candidate.bends else [p.per_run for p in effect.linear]
+    if not any(apart):
+        return list(columns)
+    acting = [r for r, run in enumerate(runs) if effect.explains(run.motion)]
+    wide = iter(expanded_columns([columns[r].reshape(-1, len(apart)) for r in acting], apart))
+    width = apart.count(False) + apart.count(True) * len(acting)
+    shapes = [c.shape[:2] for c in columns]
+    return [
+        next(wide).reshape(*shapes[r], width) if r in acting else np.zeros((*shapes[r], width))
+        for r in range(len(runs))
+    ]
+
+
+def expanded_columns(parts: Sequence[NDArray], apart: Sequence[bool]) -> list[NDArray]:
+    """Give those columns of each part (rows, k) that are ``apart`` a place of their own, nought in all other parts."""
+    if not any(apart):
+        return list(parts)
+    shared, own = [i for i, a in enumerate(apart) if not a], [i for i, a in enumerate(apart) if a]
+    wide = []
+    for number, part in enumerate(parts):
+        blocks = [part[:, own] if k == number else np.zeros((len(part), len(own))) for k in range(len(parts))]
+        wide.append(np.hstack([part[:, shared], *blocks]))
+    return wide

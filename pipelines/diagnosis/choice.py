@@ -1,0 +1,121 @@
+"""Which set of causes is named, how likely each is, and what cannot be told from it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.bank import Bank
+from pipelines.diagnosis.fit import Fit, fit, refined
+from pipelines.diagnosis.floor import Floor
+from pipelines.diagnosis.search import SHAPE_COST, Scored, Scorer, search
+
+MOST_INDEPENDENT = 1 / 6
+"""Of 25 ms blocks: what a model leaves of a leg is never white (DESIGN section 5)."""
+NEEDED = 6.0
+"""Log likelihood that one more cause must gain."""
+MATERIAL = 0.03
+"""Share of a joint's error that one more cause must take away."""
+FINALISTS = 4
+"""Sets of each size whose shapes are refined before they are compared."""
+BEHIND = 30.0
+"""Log likelihood behind the best at which a set is no finalist."""
+SOFTENING = 0.25
+"""What a log likelihood is worth: the true effect never has exactly our form (docs/diagnosis.md)."""
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A set of causes with its shapes refined."""
+
+    fit: Fit
+    score: float
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The causes, sorted."""
+        return tuple(sorted(c.label for c in self.fit.causes))
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What the search decided."""
+
+    named: Ranked
+    levels: list[dict[tuple[str, ...], Scored]]
+    refined: list[dict[tuple[str, ...], Ranked]]
+    """By size of the set, the empty one first."""
+    independent: NDArray
+
+
+def choose(bank: Bank, floor: Floor) -> Choice:
+    """Search, refine the finalists, and stop at the smallest set that nothing improves enough."""
+    count = bank.gram.count.sum(axis=0)
+    independent = count * np.minimum(floor.independent_share, MOST_INDEPENDENT)
+    scorer = Scorer(bank, independent)
+    levels = search(scorer)
+    empty = fit((), bank.runs, bank.baseline, bank.weights)
+    ranked = [{(): Ranked(empty, 0.0)}]
+    named = ranked[0][()]
+    for level in levels:
+        finalists = [_rank(bank, s, empty, independent) for s in _finalists(level)]
+        ranked.append({r.labels: r for r in finalists})
+        if not finalists:
+            break
+        best = max(finalists, key=lambda r: r.score)
+        if not _worth_it(best, named, len(bank.baseline.joints)):
+            break
+        named = best
+    return Choice(named, levels, ranked, independent)
+
+
+def _finalists(level: dict[tuple[str, ...], Scored]) -> list[Scored]:
+    ordered = sorted(level.values(), key=lambda s: -s.score)
+    return [s for s in ordered[:FINALISTS] if s.score > ordered[0].score - BEHIND]
+
+
+def _rank(bank: Bank, scored: Scored, empty: Fit, independent: NDArray) -> Ranked:
+    """Refine a set's shapes and score it on what it was fitted to, less a price for every parameter."""
+    best = refined([bank.candidates[i] for i in scored.chosen], bank.runs, bank.baseline, bank.weights)
+    there = independent > 0
+    gain = float(np.sum(independent[there] * np.log(empty.rms[there] / best.rms[there])))
+    linear = len(best.values) - len(empty.values)
+    shapes = sum(len(c.effect.shape) for c in best.causes)
+    return Ranked(best, gain - SHAPE_COST * shapes - 0.5 * linear)
+
+
+def _worth_it(best: Ranked, before: Ranked, joints: int) -> bool:
+    drop = 1.0 - best.fit.rms[:joints] / before.fit.rms[:joints]
+    return best.score - before.score > NEEDED and bool(np.max(drop) > MATERIAL)
+
+
+def rivals(choice: Choice, bank: Bank, cause: str) -> dict[str, float]:
+    """Return every effect that could stand in a named cause's place, and its log likelihood behind the named set.
+
+    The others of the set stay; nought is the named cause itself.
+    """
+    others = tuple(sorted(set(choice.named.labels) - {cause}))
+    size = len(choice.named.labels)
+    behind: dict[str, float] = {}
+    fine = choice.refined[size]
+    best_coarse = choice.levels[size - 1][choice.named.labels].score
+    for labels, scored in choice.levels[size - 1].items():
+        if set(others) <= set(labels) and len(labels) == len(others) + 1:
+            rival = next(iter(set(labels) - set(others)))
+            gap = choice.named.score - fine[labels].score if labels in fine else best_coarse - scored.score
+            behind[rival] = max(gap, 0.0) if rival != cause else 0.0
+    return behind
+
+
+def probabilities(behind: dict[str, float]) -> dict[str, float]:
+    """Turn log likelihoods behind the best into probabilities, softened for misspecification."""
+    odds = {label: float(np.exp(-SOFTENING * gap)) for label, gap in behind.items()}
+    total = sum(odds.values())
+    return {label: odd / total for label, odd in odds.items()}
+
+
+def without(named: Ranked, cause: str, bank: Bank) -> Fit:
+    """Return the named set less one cause, fitted anew: what that cause alone is worth."""
+    rest: Sequence = [c for c in named.fit.causes if c.label != cause]
+    return fit(rest, bank.runs, bank.baseline, bank.weights)

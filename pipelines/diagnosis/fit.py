@@ -1,0 +1,135 @@
+"""The extended model: baseline and causes fitted together, shapes refined, uncertainty honest."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from pipelines.diagnosis.candidates import Candidate, columns_under, expanded, gram_of_runs
+from pipelines.diagnosis.gram import Gram, error, solve
+from pipelines.diagnosis.observations import Baseline, Run
+from pipelines.effects import Parameter, Side
+
+SWEEPS = 2
+EVALUATIONS = 14
+"""Of the fit along one shape parameter and sweep."""
+REACH = 1.6
+"""How far a sweep looks from where a shape parameter stands, as a factor or a share of its range."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A set of causes fitted to some runs."""
+
+    causes: tuple[Candidate, ...]
+    values: NDArray
+    """(size + linear parameters of the causes,)."""
+    weights: NDArray
+    """(O,) inverse variances under this fit."""
+    rms: NDArray
+    """(O,) N·m on what was fitted."""
+    cost: float
+    """Sum over outputs of samples times log rms: what refinement lowers."""
+    kinds: tuple[str, ...]
+    """The kind of each run fitted."""
+
+    def acting(self, cause: Candidate) -> int:
+        """Return in how many of the runs a cause acts."""
+        effect = cause.effect
+        return sum(kind in effect.acts_in and effect.run in (None, kind) for kind in self.kinds)
+
+
+def fit(causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline, weights: NDArray) -> Fit:
+    """Fit baseline and causes at the shapes they have."""
+    gram = gram_of_runs(runs, *zip(*stacked_columns(causes, runs, baseline), strict=True))
+    values = solve(gram, weights)
+    return Fit(
+        tuple(sorted(causes, key=_last_sensors)), values, *_errors(gram, values), tuple(r.motion.run for r in runs)
+    )
+
+
+def _last_sensors(cause: Candidate) -> bool:
+    return cause.effect.side is Side.SENSOR
+
+
+def stacked_columns(
+    causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline
+) -> list[tuple[NDArray, NDArray]]:
+    """Return columns (m, O, c) and measured torque (m, O) of each run, run-wise parameters in places of their own."""
+    made = [columns_under([c.term(r) for c in causes], run, baseline) for r, run in enumerate(runs)]
+    if not any(p.per_run for c in causes for p in c.effect.linear):
+        return made
+    at = baseline.size
+    parts = [[columns[:, :, :at] for columns, _ in made]]
+    # ``columns_under`` puts sensors' columns last.
+    for cause in sorted(causes, key=_last_sensors):
+        width = len(cause.effect.linear)
+        parts.append(expanded([columns[:, :, at : at + width] for columns, _ in made], cause, runs))
+        at += width
+    return [(np.concatenate([part[r] for part in parts], axis=2), measured) for r, (_, measured) in enumerate(made)]
+
+
+def _errors(gram: Gram, values: NDArray) -> tuple[NDArray, NDArray, float]:
+    count = gram.count.sum(axis=0)
+    there = count > 0
+    squares = error(gram, values)
+    rms = np.sqrt(squares / np.maximum(count, 1))
+    weights = np.where(there, 1.0 / np.maximum(rms, 1e-6) ** 2, 0.0)
+    return weights, rms, float(np.sum(count[there] * np.log(rms[there])))
+
+
+def refined(causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline, weights: NDArray) -> Fit:
+    """Fit with every shape parameter at its best, one after the other."""
+    best = fit(causes, runs, baseline, weights)
+    for _ in range(SWEEPS):
+        before = best.cost
+        for number, cause in enumerate(best.causes):
+            for i, parameter in enumerate(cause.effect.shape):
+                if parameter.forms or parameter.default is not None:
+                    continue
+                for which in _together(parameter, len(runs)):
+                    best = _along(best, number, i, which, runs, baseline, weights)
+        if before - best.cost < 0.1:
+            break
+    return best
+
+
+def _together(parameter: Parameter, runs: int) -> list[list[int]]:
+    """Return the runs that share a value of the parameter."""
+    return [[r] for r in range(runs)] if parameter.per_run else [list(range(runs))]
+
+
+def _along(
+    best: Fit, number: int, i: int, which: list[int], runs: Sequence[Run], baseline: Baseline, weights: NDArray
+) -> Fit:
+    """Improve one shape parameter of one cause in some runs."""
+    cause = best.causes[number]
+    now = cause.shapes[which[0]][i]
+    to_value, low, high = _scale(cause.effect.shape[i], now)
+    tried: list[Fit] = [best]
+
+    def cost(x: float) -> float:
+        shapes = tuple(
+            tuple(to_value(x) if r in which and k == i else v for k, v in enumerate(shape))
+            for r, shape in enumerate(cause.shapes)
+        )
+        causes = [replace(c, shapes=shapes) if k == number else c for k, c in enumerate(best.causes)]
+        tried.append(fit(causes, runs, baseline, weights))
+        return tried[-1].cost
+
+    minimize_scalar(
+        cost, bounds=(low, high), method="bounded", options={"maxiter": EVALUATIONS, "xatol": 0.02 * (high - low)}
+    )
+    return min(tried, key=lambda f: f.cost)
+
+
+def _scale(parameter: Parameter, now: float) -> tuple[Callable[[float], float], float, float]:
+    """Return how a search coordinate becomes a value, and the coordinate's range."""
+    low, high = parameter.typical
+    if low > 0 and high / low > 4:
+        reach = np.log(REACH) * 2
+        return lambda x: float(np.exp(x)), np.log(now) - reach, np.log(now) + reach
+    reach = 0.25 * (high - low)
+    return float, now - reach, now + reach

@@ -1,0 +1,187 @@
+"""All runs as one linear regression: outputs, baseline columns, masks and folds.
+
+An *output* is one measured torque: each drive's and, where there are cuff forces, the torque about each
+joint that they exert on the person. The second pair is a second measurement of the human's share, and
+what separates causes in the drive or the structure from causes in the person.
+
+Baseline parameters, in the order of the columns: X1..X4 of the empty exoskeleton, X1..X4 of the person,
+Coulomb and viscous friction of each joint, the force sensors' zeros. With one kind of run and no cuff
+forces one rigid body takes the place of the two.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.effects.friction import Friction
+from pipelines.estimation.regression import away_from_reversals, block_average
+from pipelines.mechanics.leg import cuff_torque, regressor
+from pipelines.mechanics.motion import CUFFS, Motion
+from pipelines.signals.blocks import BlockAverage
+
+FOLD_S = 10.0
+"""Length of a fold where the excitation does not repeat."""
+FOLDS = 4
+BODY = 4
+"""Parameters of a rigid body."""
+ZEROS = 3
+"""Force zeros that show in the cuffs' torque: shank along, shank across, thigh across."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One motion behind the regression filter, m blocks, O outputs (drives, then cuffs)."""
+
+    motion: Motion
+    block: BlockAverage
+    starts: NDArray
+    time: NDArray
+    """(m,) s."""
+    state: tuple[NDArray, NDArray, NDArray]
+    """q, dq, ddq (m, J)."""
+    measured: NDArray
+    """(m, O) N·m; NaN where there is no such output."""
+    usable: NDArray
+    """(m, O) bool."""
+    valid: NDArray
+    """(m,) bool."""
+    fold: NDArray
+    """(m,) number of the fold: whole periods, dealt out in turn."""
+    period: NDArray
+    """(m,) number of the excitation's period, -1 where it does not repeat."""
+
+    def average(self, full_rate: NDArray) -> NDArray:
+        """Put (n, ...) at full rate behind the regression filter: (m, ...)."""
+        return self.block.mean(full_rate, self.starts)
+
+    def measured_at(self, limb: Motion) -> NDArray:
+        """Return what was measured where the limb moves otherwise than the encoders say, (m, O) N·m."""
+        if limb.q is self.motion.q or not self.has_cuffs:
+            return self.measured
+        cuffs = cuff_torque_of(self.motion, limb.q)
+        joints = len(self.motion.joints)
+        return np.hstack([self.measured[:, :joints], np.nan_to_num(self.average(cuffs))])
+
+    @property
+    def has_cuffs(self) -> bool:
+        """Whether the person's share was measured."""
+        return self.measured.shape[1] > len(self.motion.joints) and bool(self.usable[:, -1].any())
+
+
+def cuff_torque_of(motion: Motion, q: NDArray) -> NDArray | None:
+    """Torque that the cuffs exert on a limb at angles ``q``, (n, 2) N·m; None where it was not measured."""
+    g = motion.geometry
+    if motion.forces is None or motion.run != "with_human":
+        return None
+    if g.thigh_cuff_distance_m is None or g.shank_cuff_distance_m is None:
+        return None
+    thigh, shank = (motion.forces[:, [i for i, c in enumerate(CUFFS) if c.startswith(s)]].sum(axis=1)
+                    for s in ("thigh", "shank"))  # fmt: skip
+    return cuff_torque(thigh, shank, q, g)
+
+
+def observe(motion: Motion) -> Run:
+    """Put one motion behind the regression filter."""
+    block = block_average(motion)
+    starts = block.starts(motion.segment)
+    time = block.mean(motion.time, starts)
+    valid = block.all(motion.valid, starts)
+    usable = valid[:, np.newaxis] & block.all(away_from_reversals(motion), starts)
+    measured = block.mean(motion.torque, starts)
+    cuffs = cuff_torque_of(motion, motion.q)
+    if cuffs is None:
+        measured = np.hstack([measured, np.full_like(measured, np.nan)])
+        usable = np.hstack([usable, np.zeros_like(usable)])
+    else:
+        felt = block.mean(cuffs, starts)
+        known = np.isfinite(felt)
+        measured = np.hstack([measured, np.where(known, felt, 0.0)])
+        usable = np.hstack([usable, valid[:, np.newaxis] & known])
+    length = motion.period_s or FOLD_S
+    number = np.floor(time / length + 1e-9).astype(int)
+    return Run(
+        motion=motion,
+        block=block,
+        starts=starts,
+        time=time,
+        state=(block.mean(motion.q, starts), block.mean(motion.dq, starts), block.mean(motion.ddq, starts)),
+        measured=np.nan_to_num(measured),
+        usable=usable,
+        valid=valid,
+        fold=number % FOLDS,
+        period=number if motion.period_s else np.full(len(time), -1),
+    )
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """Names and sizes of the baseline's columns for the kinds of run at hand."""
+
+    kinds: tuple[str, ...]
+    joints: tuple[str, ...]
+    cuffs: bool
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Whose rigid bodies are fitted: the exoskeleton's and the person's, or the one there is."""
+        return ("exo_alone", "human") if len(self.kinds) == 2 or self.cuffs else self.kinds
+
+    @property
+    def size(self) -> int:
+        """Number of columns."""
+        return BODY * len(self.bodies) + 2 * len(self.joints) + ZEROS * self.cuffs
+
+    def columns(self, motor: Motion, link: Motion, human: Motion | None = None) -> NDArray:
+        """Baseline columns at full rate, (n, O, size).
+
+        Parameters
+        ----------
+        motor : Motion
+            As the motors move: what friction acts on.
+        link : Motion
+            As the exoskeleton's links move.
+        human : Motion, optional
+            As the person's limbs move, where not with the links.
+        """
+        n, J = motor.q.shape
+        out = np.zeros((n, 2 * J, self.size))
+        g = link.geometry
+        body = regressor(link.q, link.dq, link.ddq, g.thigh_length_m, g.gravity_m_s2)
+        out[:, :J, :BODY] = body
+        if len(self.bodies) == 2 and motor.run == "with_human":
+            limb = human or link
+            person = regressor(limb.q, limb.dq, limb.ddq, g.thigh_length_m, g.gravity_m_s2)
+            out[:, :J, BODY : 2 * BODY] = person
+            out[:, J:, BODY : 2 * BODY] = person
+        at = BODY * len(self.bodies)
+        for joint in self.joints:
+            out[:, :J, at : at + 2] = Friction(joint).columns(motor)
+            at += 2
+        if self.cuffs and motor.run == "with_human":
+            L1, cos_knee, sin_knee = g.thigh_length_m, np.cos(link.q[:, 1]), np.sin(link.q[:, 1])
+            d_thigh, d_shank = g.thigh_cuff_distance_m or 0.0, g.shank_cuff_distance_m or 0.0
+            out[:, J, at] = L1 * sin_knee
+            out[:, J, at + 1] = d_shank + L1 * cos_knee
+            out[:, J + 1, at + 1] = d_shank
+            out[:, J, at + 2] = d_thigh
+        return out
+
+
+def baseline_of(runs: Sequence[Run]) -> Baseline:
+    """Return the baseline that the kinds of run at hand allow."""
+    kinds = tuple(k for k in ("exo_alone", "with_human") if any(run.motion.run == k for run in runs))
+    return Baseline(kinds, runs[0].motion.joints, any(run.has_cuffs for run in runs))
+
+
+def with_load(run: Run, baseline: Baseline, values: NDArray) -> Run:
+    """Return the run with the loads of links and limb estimated from the baseline's rigid bodies.
+
+    The measured torques would not do: their noise would stand on both sides of the regression.
+    """
+    columns = baseline.columns(run.motion, run.motion)
+    J, bodies = len(baseline.joints), BODY * len(baseline.bodies)
+    load = columns[:, :J, :bodies] @ values[:bodies]
+    limb = columns[:, :J, BODY:bodies] @ values[BODY:bodies] if bodies > BODY else load
+    return replace(run, motion=replace(run.motion, load=load, limb_load=limb))

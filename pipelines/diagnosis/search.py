@@ -1,0 +1,119 @@
+"""The search for the causes: which set of candidates earns its place on data held out from its fit.
+
+Sets are scored by the logarithm of their held-out error in each output, on as many samples as are
+independent. A beam of the best sets is extended by every candidate in turn, so that two causes which
+only together explain the residual are found even where neither comes first alone.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.bank import Bank
+from pipelines.diagnosis.candidates import Candidate
+from pipelines.diagnosis.gram import Gram, held_out_error, solve
+
+BEAM = 10
+"""Sets carried from one size to the next."""
+MOST = 3
+"""Causes in a set."""
+SHAPE_COST = 2.0
+"""What a shape parameter must gain, in units of log likelihood, for having been searched."""
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A set of candidates and what it leaves."""
+
+    chosen: tuple[int, ...]
+    score: float
+    """Log likelihood over the baseline's, on held-out data, less the cost of shapes."""
+    error: NDArray
+    """(O,) root mean square held-out error, N·m."""
+
+
+class Scorer:
+    """Scores sets of candidates against the baseline."""
+
+    def __init__(self, bank: Bank, independent: NDArray) -> None:
+        """Prepare; ``independent`` (O,) is how many of each output's samples are independent."""
+        self.bank, self.independent = bank, independent
+        self.count = bank.gram.count.sum(axis=0)
+        self.active = self.count > 0
+        self._plain = np.zeros(len(self.count))
+        self.baseline = self(())
+        self._plain = self.baseline.error
+
+    def __call__(self, chosen: Sequence[int]) -> Scored:
+        """Score a set."""
+        gram = self.bank.gram.select(self.bank.columns_of(chosen))
+        if not self._possible(gram, chosen):
+            return Scored(tuple(chosen), -np.inf, np.full(len(self.count), np.nan))
+        squares = held_out_error(gram, self.bank.weights)
+        rms = np.sqrt(squares / np.maximum(self.count, 1))
+        gain = 0.0
+        if np.any(self._plain):
+            a = self.active
+            gain = float(np.sum(self.independent[a] * np.log(self._plain[a] / rms[a])))
+        shapes = sum(len(self.bank.candidates[i].effect.shape) for i in chosen)
+        return Scored(tuple(chosen), gain - SHAPE_COST * shapes, rms)
+
+    def _possible(self, gram: Gram, chosen: Sequence[int]) -> bool:
+        """Tell whether no cause comes out with a sign that physics forbids it."""
+        values = solve(gram, self.bank.weights)[self.bank.baseline.size :]
+        at = 0
+        for i in chosen:
+            candidate, width = self.bank.candidates[i], self.bank.where[i].stop - self.bank.where[i].start
+            if np.any(values[at : at + width][one_way(candidate, width)] < 0):
+                return False
+            at += width
+        return True
+
+
+def one_way(candidate: Candidate, width: int) -> NDArray:
+    """Tell which of a candidate's columns may only have a positive amplitude, (width,) bool."""
+    effect = candidate.effect
+    if candidate.bends:
+        # Its one column is the effect at a shape: turned over, it would be a spring that pushes.
+        return np.array([all(p.typical[0] > 0 and p.unit != "1" for p in effect.shape if p.default is None)])
+    positive = [p.typical[0] >= 0 for p in effect.linear]
+    return np.array(positive) if len(positive) == width else np.zeros(width, dtype=bool)
+
+
+def best_of_each_label(bank: Bank, scored: Sequence[Scored]) -> dict[tuple[str, ...], Scored]:
+    """Keep, of all sets with the same effects at the same joints, the best shapes."""
+    best: dict[tuple[str, ...], Scored] = {}
+    for s in scored:
+        key = tuple(sorted(bank.candidates[i].label for i in s.chosen))
+        if key not in best or s.score > best[key].score:
+            best[key] = s
+    return best
+
+
+def search(scorer: Scorer, most: int = MOST) -> list[dict[tuple[str, ...], Scored]]:
+    """Return, for each size of set from one up, the sets tried with their best shapes."""
+    bank = scorer.bank
+    singles = best_of_each_label(bank, [scorer((i,)) for i in range(len(bank.candidates))])
+    levels = [singles]
+    # Beside another cause a candidate may want another shape: its best few stay in the race.
+    contenders = _contenders(scorer)
+    for _ in range(1, most):
+        beam = sorted(levels[-1].values(), key=lambda s: -s.score)[:BEAM]
+        tried = []
+        for base in beam:
+            labels = {bank.candidates[i].label for i in base.chosen}
+            tried += [scorer((*base.chosen, i)) for i in contenders if bank.candidates[i].label not in labels]
+        levels.append(best_of_each_label(bank, tried))
+    return levels
+
+
+SHAPES = 3
+
+
+def _contenders(scorer: Scorer) -> list[int]:
+    by_label: dict[str, list[tuple[float, int]]] = {}
+    for i, candidate in enumerate(scorer.bank.candidates):
+        by_label.setdefault(candidate.label, []).append((-scorer((i,)).score, i))
+    return [i for entries in by_label.values() for _, i in sorted(entries)[:SHAPES]]

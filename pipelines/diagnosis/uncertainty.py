@@ -1,0 +1,70 @@
+"""Intervals of an extended model's parameters, shapes included, that survive autocorrelated residuals."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.candidates import Candidate
+from pipelines.diagnosis.fit import Fit, stacked_columns
+from pipelines.diagnosis.observations import Baseline, Run
+from pipelines.estimation.least_squares import long_run_covariance
+
+STEP = 0.01
+"""Of a difference along a shape parameter, as a share of its typical range."""
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Joint covariance of the linear values and the free shapes."""
+
+    covariance: NDArray
+    critical: float
+    shapes: tuple[tuple[int, int, int], ...]
+    """(cause, shape parameter, run) behind each shape's place after the linear values; run -1 where shared."""
+
+
+def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> Uncertainty:
+    """Linearise about a fit: its columns, and what a step in each free shape does to the prediction."""
+    plain = stacked_columns(fit.causes, runs, baseline)
+    columns = [c for c, _ in plain]
+    left = [y - c @ fit.values for c, y in plain]
+    places, slopes = [], []
+    for cause, i, run in _free_shapes(fit.causes, len(runs)):
+        moved, step = _moved(fit.causes, cause, i, run)
+        ahead = stacked_columns(moved, runs, baseline)
+        slopes.append([((c @ fit.values - y) - (d @ fit.values - z)) / step
+                       for (c, y), (d, z) in zip(ahead, plain, strict=True)])  # fmt: skip
+        places.append((cause, i, run))
+    wide = [np.concatenate([c, *(s[r][:, :, np.newaxis] for s in slopes)], axis=2) for r, c in enumerate(columns)]
+    weights = fit.weights
+    gram = sum(np.einsum("mo,o,moi,moj->ij", run.usable, weights, a, a) for run, a in zip(runs, wide, strict=True))
+    scores = [
+        np.einsum("mo,o,mo,moi->mi", run.usable, weights, e, a) for run, e, a in zip(runs, left, wide, strict=True)
+    ]
+    filling, critical = long_run_covariance([[s] for s in scores], gram.shape[0])
+    inverse = np.linalg.pinv(gram, rcond=1e-13, hermitian=True)
+    return Uncertainty(inverse @ filling @ inverse, critical, tuple(places))
+
+
+def _free_shapes(causes: Sequence[Candidate], runs: int) -> list[tuple[int, int, int]]:
+    return [
+        (number, i, run)
+        for number, cause in enumerate(causes)
+        for i, parameter in enumerate(cause.effect.shape)
+        if parameter.default is None and not parameter.forms
+        for run in (range(runs) if parameter.per_run else (-1,))
+    ]
+
+
+def _moved(causes: Sequence[Candidate], number: int, i: int, run: int) -> tuple[list[Candidate], float]:
+    cause = causes[number]
+    low, high = cause.effect.shape[i].typical
+    now = cause.shapes[max(run, 0)][i]
+    step = STEP * (abs(now) if low > 0 and high / low > 4 else high - low)
+    shapes = tuple(
+        tuple(v + step if k == i and run in (-1, r) else v for k, v in enumerate(shape))
+        for r, shape in enumerate(cause.shapes)
+    )
+    return [replace(c, shapes=shapes) if k == number else c for k, c in enumerate(causes)], step
