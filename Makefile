@@ -52,7 +52,7 @@ docs: $(INSTALLED) ## bring the generated pages up to date
 lock: ## pin the newest versions that fit pyproject.toml, in requirements.lock
 	rm -rf build/lock
 	$(PYTHON) -m venv build/lock
-	build/lock/bin/pip install --quiet ".[dev]" hatchling editables
+	build/lock/bin/pip install --quiet ".[dev,bench]" hatchling editables
 	build/lock/bin/pip freeze --exclude exoid > requirements.lock
 
 install: $(INSTALLED) ## make the environment in .venv

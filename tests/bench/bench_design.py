@@ -1,18 +1,15 @@
 """Speed of ``exoid design``: its fitness against NumPy's SVD, its search against pyswarms.
 
-Run with ``python -m tests.bench.bench_design``. pyswarms is no dependency of exoid: ``pip install pyswarms``
-lets the comparison run. Times are processor time, so that a busy machine does not decide.
+Run with ``python -m tests.bench.bench_design``. pyswarms comes with the extra ``bench``. Times are processor time,
+so that a busy machine does not decide.
 """
 
 import contextlib
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from pipelines.design.excitation import design
 from pipelines.design.fitness import cost, costs, expand, problem, workspace
@@ -22,6 +19,7 @@ from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.leg import Geometry
 from pipelines.mechanics.limits import bounds_array
 from pipelines.settings.design import DesignSettings, JointBounds
+from tests.bench.report import Row, show
 
 OMEGA, SAMPLES = 0.2 * np.pi, 1000
 HARMONICS = 5
@@ -36,15 +34,6 @@ OF = problem(
     basis=basis_of(HARMONICS, rest_to_rest=False), samples=SAMPLES,
 )  # fmt: skip
 SPREAD = spread_of(OF)
-
-
-@dataclass(frozen=True)
-class Row:
-    """One line of the table."""
-
-    name: str
-    value: str
-    ratio: float | None = None
 
 
 def numpy_cost(candidate: np.ndarray) -> float:
@@ -87,7 +76,7 @@ def fitness_rows() -> Iterator[Row]:
     ours = fastest(lambda: costs(many, OF)) / len(many)
     theirs = fastest(lambda: [numpy_cost(candidate) for _ in range(50)]) / 50
     yield Row("fitness by NumPy's SVD, N = 1000", f"{1e6 * theirs:.0f} us")
-    yield Row("fitness of exoid, N = 1000", f"{1e6 * ours:.1f} us", theirs / ours)
+    yield Row("fitness of exoid, N = 1000", f"{1e6 * ours:.1f} us", theirs / ours, "20")
 
 
 def search_rows() -> Iterator[Row]:
@@ -106,11 +95,8 @@ def search_rows() -> Iterator[Row]:
 
 def pyswarms_rows(swarm_s: float, search_s: float) -> Iterator[Row]:
     """Give pyswarms the same number of evaluations, then time until it is as good."""
-    try:
-        import pyswarms
-    except ImportError:
-        yield Row("pyswarms", "not installed; pip install pyswarms")
-        return
+    import pyswarms
+
     budget = f"{PARTICLES} x {ITERATIONS}"
     objectives = {"NumPy's fitness": lambda x: np.array([numpy_cost(one) for one in x]), "exoid's fitness": our_costs}
     for name, objective in objectives.items():
@@ -119,7 +105,7 @@ def pyswarms_rows(swarm_s: float, search_s: float) -> Iterator[Row]:
         yield Row(f"pyswarms, {name}, {budget} evaluations", f"{theirs:.2f} s, reaches {value:.1f}", theirs / swarm_s)
     theirs, value = timed(lambda: until_goal(pyswarms_swarm(pyswarms, 128)))
     outcome = f"reaches {value:.2f}" if value <= GOAL else f"gives up at {value:.2f}"
-    yield Row(f"pyswarms, exoid's fitness, until {GOAL}", f"{theirs:.2f} s, {outcome}", theirs / search_s)
+    yield Row(f"pyswarms, exoid's fitness, until {GOAL}", f"{theirs:.2f} s, {outcome}", theirs / search_s, "over 1")
 
 
 def exoid_swarm() -> float:
@@ -167,15 +153,5 @@ def timed(work: Callable[[], float]) -> tuple[float, float]:
     return time.process_time() - start, value
 
 
-def main() -> None:
-    """Print the table."""
-    table = Table(box=None, pad_edge=False)
-    for heading in ("exoid design", "measured", "ratio"):
-        table.add_column(heading, justify="right" if heading == "ratio" else "left")
-    for row in rows():
-        table.add_row(row.name, row.value, f"{row.ratio:.1f}" if row.ratio else "")
-    Console(width=120).print(table)
-
-
 if __name__ == "__main__":
-    main()
+    show("exoid design", rows())

@@ -1,18 +1,15 @@
 """Speed of ``exoid simulate``: the compiled adaptive loop against scipy's solve_ivp and against the clock.
 
-Run with ``python -m tests.bench.bench_simulate``. Times are processor time of one thread, so that a busy machine does not decide.
-solve_ivp integrates the same loop (reference case, Table 3) with the loosest tolerance that is as accurate.
+Run with ``python -m tests.bench.bench_simulate``. Times are processor time of one thread,
+so that a busy machine does not decide. solve_ivp integrates the same loop (reference case, Table 3) with the loosest tolerance that is as accurate.
 """
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from math import copysign, cos, exp, pi, sin
 
 import numpy as np
 from numba import njit
-from rich.console import Console
-from rich.table import Table
 from scipy.integrate import solve_ivp
 
 from pipelines.contracts import HIP_AND_KNEE
@@ -28,20 +25,12 @@ from pipelines.signals.low_pass import derivative, low_pass
 from pipelines.simulation.closed_loop import track
 from pipelines.simulation.gait import gait
 from pipelines.simulation.plant import Plant, make_plant
+from tests.bench.report import Row, show
 
 SECONDS = 10.0
 X = (10.3016, 3.0157, 2.2664, 5.5354)
 COULOMB, VISCOUS = (2.6596, 4.7197), (4.14895, 7.3602)
 TOLERANCES = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 1e-7, 1e-8)
-
-
-@dataclass(frozen=True)
-class Row:
-    """One line of the table."""
-
-    name: str
-    value: str
-    ratio: float | None = None
 
 
 def rates(t, y):
@@ -109,11 +98,11 @@ def loop_rows() -> Iterator[Row]:
     error = np.abs(found.run.angle - truth).max()
     ours = fastest(lambda: track(leg, settings, gait()), 15)
     yield Row("adaptive loop, 10 s at 1 kHz", f"{1e3 * ours:.1f} ms, error {1e6 * error:.0f} µrad")
-    yield Row("  times real time", f"{SECONDS / ours:.0f} x", SECONDS / ours)
+    yield Row("  times real time", f"{SECONDS / ours:.0f} x", SECONDS / ours, "300")
     compiled = njit(rates)
     tolerance, reached = tolerance_for(compiled, error, truth)
     theirs = fastest(lambda: integrate(rates, tolerance), 2)
-    yield Row(f"solve_ivp, rtol {tolerance:g}", f"{theirs:.2f} s, error {1e6 * reached:.0f} µrad", theirs / ours)
+    yield Row(f"solve_ivp, rtol {tolerance:g}", f"{theirs:.2f} s, error {1e6 * reached:.0f} µrad", theirs / ours, "50")
     helped = fastest(lambda: integrate(compiled, tolerance), 2)
     yield Row("solve_ivp, its equations compiled too", f"{helped:.2f} s", helped / ours)
 
@@ -161,15 +150,5 @@ def fastest(work: Callable[[], object], rounds: int) -> float:
     return min(times)
 
 
-def main() -> None:
-    """Print the table."""
-    table = Table(box=None, pad_edge=False)
-    for heading in ("exoid simulate", "measured", "ratio"):
-        table.add_column(heading, justify="right" if heading == "ratio" else "left")
-    for row in rows():
-        table.add_row(row.name, row.value, f"{row.ratio:.1f}" if row.ratio else "")
-    Console(width=120).print(table)
-
-
 if __name__ == "__main__":
-    main()
+    show("exoid simulate", rows())
