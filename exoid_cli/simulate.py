@@ -60,8 +60,8 @@ def _track(table: "Table", run: str, reference: Path | None, settings: "Experime
     loop = track(plant, chosen, wanted)
     if loop.ran_away:
         raise InputError(
-            f"{loop.ran_away}: the loop is unstable; lower simulate.feedback_gain_nm_s_rad or "
-            "simulate.adaptation_gain, or shorten simulate.step_s"
+            f"{loop.ran_away}: the loop is unstable, or the disturbance stronger than the drives; lower "
+            "simulate.adaptation_gain or simulate.disturbance_nm, or shorten simulate.step_s"
         )
     gains = sweep(plant, chosen, wanted, chosen.sweep_nm_s_rad)
     frame = loop.frame()

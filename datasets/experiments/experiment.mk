@@ -43,7 +43,7 @@ $(OUT)/simulated/rbf.parquet: $(OUT)/identified/parameters.parquet $(SETTINGS)/s
 	$(EXOID) simulate $< --config $(CONFIG) -o $(@D)/
 
 $(OUT)/simulated/replay-%.parquet: $(OUT)/identified/parameters.parquet $(OUT)/recordings/%.parquet
-	$(EXOID) simulate $< --replay $(OUT)/recordings/$*.parquet -o $@
+	$(EXOID) simulate $< --replay $(OUT)/recordings/$*.parquet --config $(CONFIG) -o $@
 
 # Kept: a recording and a motion are results, not steps on the way.
 .SECONDARY:

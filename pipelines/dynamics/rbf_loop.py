@@ -70,8 +70,8 @@ class Encoder(NamedTuple):
 
     noise: np.ndarray
     """(n, J) rad, added at each reading; (0, J) for an ideal encoder, which tells the speed too."""
-    count: float
-    """rad per encoder count; 0 for none."""
+    rad_per_count: float
+    """0 for an encoder that does not count."""
     speed_share: float
     """What a new difference of angles adds to the low-passed speed at each reading, (0, 1]."""
 
@@ -231,8 +231,8 @@ def _look(a, encoder, seen, state, k, period):
         angle = seen.reading[j]
         if encoder.noise.shape[0] > 0:
             angle += encoder.noise[k, j]
-            if encoder.count > 0.0:
-                angle = np.floor(angle / encoder.count + 0.5) * encoder.count
+            if encoder.rad_per_count > 0.0:
+                angle = np.floor(angle / encoder.rad_per_count + 0.5) * encoder.rad_per_count
             if k > 0:
                 seen.speed[j] += encoder.speed_share * ((angle - seen.angle[j]) / period - seen.speed[j])
             seen.speed_error[j] = seen.speed[j] - state[DTHETA, j]

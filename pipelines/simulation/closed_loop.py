@@ -125,7 +125,7 @@ def _encoder(settings: SimulateSettings, samples: int, joints: int) -> Encoder:
     draw = np.random.default_rng(settings.seed)
     return Encoder(
         noise=np.zeros((0, joints)) if ideal else noise * draw.standard_normal((samples, joints)),
-        count=2.0 * np.pi / counts if counts else 0.0,
+        rad_per_count=2.0 * np.pi / counts if counts else 0.0,
         speed_share=float(1.0 - np.exp(-2.0 * np.pi * settings.speed_cutoff_hz * settings.step_s)),
     )
 

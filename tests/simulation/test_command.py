@@ -137,13 +137,13 @@ def test_parameters_of_no_real_leg_are_refused_with_the_reason(exoid, parameters
 
 
 def test_a_loop_that_runs_away_is_told_with_its_time_and_writes_nothing(exoid, parameters_file, quick, tmp_path):
-    wild = quick("adaptation_gain = 1e7")
+    wild = quick("disturbance_nm = 400.0", "disturbance_rad_s = 1.0")
     code, _, err = exoid("simulate", parameters_file(), "--config", wild, "-o", tmp_path / "out")
     assert code == 2
-    assert err.startswith("exoid: the simulated hip ran past one full turn at t = ")
+    assert err.startswith("exoid: the simulated knee ran past one full turn at t = ")
     assert err.endswith(
-        "s: the loop is unstable; lower simulate.feedback_gain_nm_s_rad or simulate.adaptation_gain, "
-        "or shorten simulate.step_s"
+        "s: the loop is unstable, or the disturbance stronger than the drives; lower simulate.adaptation_gain "
+        "or simulate.disturbance_nm, or shorten simulate.step_s"
     )
     assert not (tmp_path / "out").exists()
 
