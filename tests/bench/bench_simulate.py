@@ -1,7 +1,8 @@
 """Speed of ``exoid simulate``: the compiled adaptive loop against scipy's solve_ivp and against the clock.
 
 Run with ``python -m tests.bench.bench_simulate``. Times are processor time of one thread,
-so that a busy machine does not decide. solve_ivp integrates the same loop (reference case, Table 3) with the loosest tolerance that is as accurate.
+so that a busy machine does not decide. solve_ivp integrates the same loop (reference case, Table 3) with the
+loosest tolerance that is as accurate.
 """
 
 import time
