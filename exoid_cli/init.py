@@ -1,5 +1,6 @@
 """``exoid init``: a new experiment to edit and run."""
 
+import shlex
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -14,5 +15,6 @@ def init(folder: Annotated[Path, typer.Argument(help="Where the experiment shall
     from pipelines.settings.template import create
 
     command = Path(sys.argv[0])
-    create(folder, exoid=str(command.resolve()) if command.name == "exoid" else f"{sys.executable} -m exoid_cli.app")
+    words = [str(command.resolve())] if command.name == "exoid" else [sys.executable, "-m", "exoid_cli.app"]
+    create(folder, exoid=shlex.join(words))
     console.say(f"{folder}: new experiment; edit {folder / 'exoid.toml'}, then run `make -C {folder}`")
