@@ -19,6 +19,7 @@ from typer.exceptions import TyperException
 from exoid_cli.acquire import acquire
 from exoid_cli.console import console
 from exoid_cli.design import design
+from exoid_cli.detect import detect
 from exoid_cli.effects import effects
 from exoid_cli.filter import filter_
 from exoid_cli.identify import identify
@@ -48,6 +49,7 @@ app.command("identify", short_help="Fit the leg's parameters; judge them on othe
 app.command("simulate", short_help="Simulate the identified leg, or replay a recording.")(simulate)
 app.command("show", short_help="Say what a file is, and what is in it.")(show)
 app.command("effects", short_help="List the effects a model can have, or explain one.")(effects)
+app.command("detect", short_help="Say which causes a motion would reveal.")(detect)
 app.command("rig", short_help="Serve a virtual rig over Modbus TCP.")(rig)
 app.add_typer(settings, name="settings", short_help="Work with an experiment's settings.")
 
