@@ -13,6 +13,7 @@ import numpy as np
 from pipelines.diagnosis.faults.body import averages
 from pipelines.diagnosis.faults.channels import channel_faults
 from pipelines.diagnosis.faults.fault import Fault
+from pipelines.diagnosis.faults.sampling import sampling_faults
 from pipelines.diagnosis.faults.timing import timing_faults
 from pipelines.diagnosis.faults.units import angle_unit_faults, torque_unit_faults
 from pipelines.diagnosis.faults.wiring import angle_faults, cuff_faults, wiring_faults
@@ -32,6 +33,7 @@ def find_faults(motions: Sequence[Motion]) -> list[Fault]:
     found = [fault for motion in motions for fault in (*timing_faults(motion), *channel_faults(motion))]
     rightly_wired = []
     for motion in excluding(motions, found):
+        found += sampling_faults(motion)
         wrong = [*angle_faults(motion), *angle_unit_faults(motion)]
         run = averages(motion)
         if run is not None and not wrong:

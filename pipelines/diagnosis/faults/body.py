@@ -82,11 +82,13 @@ def fit(columns: NDArray, torque: NDArray, free: NDArray | None = None) -> tuple
     if free is not None:
         basis = np.linalg.qr(free)[0]
         columns, torque = columns - basis @ (basis.T @ columns), torque - basis @ (basis.T @ torque)
-    # The triangular factor has the same inner products as the columns, and a hundredth of their rows.
-    triangle = np.linalg.qr(np.column_stack([columns, torque]), mode="r")
-    scale = np.maximum(np.linalg.norm(triangle[:, :-1], axis=0), 1e-12)
-    multiples, left = nnls(triangle[:, :-1] / scale, triangle[:, -1])
-    return left**2 / max(float(torque @ torque), 1e-12), multiples / scale
+    # A root of the Gram matrix has the same inner products as the columns, and a hundredth of their rows.
+    everything = np.column_stack([columns, torque])
+    scale = np.maximum(np.sqrt(np.einsum("ij,ij->j", everything, everything)), 1e-12)
+    power, direction = np.linalg.eigh((everything / scale).T @ (everything / scale))
+    root = np.sqrt(np.maximum(power, 0.0))[:, np.newaxis] * direction.T
+    multiples, left = nnls(root[:, :-1], root[:, -1])
+    return left**2, multiples * scale[-1] / scale[:-1]
 
 
 def cuff_misfit(run: Averages, cuffs: NDArray) -> float:

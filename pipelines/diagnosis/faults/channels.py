@@ -14,7 +14,9 @@ from pipelines.diagnosis.faults.fault import (
     stretches,
     when,
 )
+from pipelines.mechanics.kinematics import EDGE_PERIODS
 from pipelines.mechanics.motion import CUFFS, Motion
+from pipelines.signals.blocks import dilate
 
 STALE = 3
 """Rows that repeat the last one while the joint moves, before it is more than an accident."""
@@ -88,18 +90,21 @@ def _stuck_angle(motion: Motion, joint: int) -> Iterator[Fault]:
     found = still[[_impossible(motion, joint, angle, s, np.delete(lasting, i)) for i, s in enumerate(still)]]
     if len(found):
         samples = mask_of(found, len(angle))
+        # The filter carries the standstill on into its neighbourhood.
+        reach = int(np.ceil(EDGE_PERIODS * motion.sample_rate_hz / motion.cutoff_hz))
         yield Fault(
             motion.file,
             column(motion, joint, "angle"),
             f"the {motion.joints[joint]}'s angle is stuck: constant for {samples.sum() / motion.sample_rate_hz:.2f} s, "
             f"{when(motion, found)}, while the leg moved on; check the encoder's cable and the drive's status",
-            samples,
+            dilate(samples, reach),
         )
 
 
 def _impossible(motion: Motion, joint: int, angle: NDArray, stretch: NDArray, others: NDArray) -> bool:
     start, stop = stretch
-    steps = np.abs(np.diff(angle))
+    # Steps across a gap are larger, but not faster.
+    steps = np.abs(np.diff(angle)) / np.maximum(np.diff(motion.time) * motion.sample_rate_hz, 1.0)
     outside = np.delete(steps, np.arange(max(start - 1, 0), min(stop, len(steps))))
     usual = np.quantile(outside, 0.999) if len(outside) else 0.0
     edges = steps[[k for k in (start - 1, stop - 1) if 0 <= k < len(steps)]]

@@ -11,7 +11,7 @@ from pipelines.mechanics.motion import Motion
 WHOLE_ROW = "all channels"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fault:
     """One finding about a recording that is not physics."""
 

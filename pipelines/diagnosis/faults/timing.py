@@ -1,4 +1,4 @@
-"""Time: samples that are missing, stamps that jitter, clocks that run at another rate, counters that jump."""
+"""Time as stamped: samples that are missing, stamps that jitter, clocks at another rate, counters that jump."""
 
 from collections.abc import Iterator
 
@@ -16,10 +16,6 @@ SINGLE = 3
 JITTER = 0.04
 """Of a sample period, rms: steps that stray more are irregular. Moving at 1 rad/s, 4 % of 5 ms is 0.2 mrad, an
 encoder count."""
-SAMPLED_UNEVENLY = 0.05
-"""Of a sample period, rms, of instants that stray though their stamps do not."""
-SURE = 6.0
-"""Standard errors."""
 RATE = 0.01
 """Relative error of a clock that is worth a sentence: velocity is off by as much, acceleration by twice."""
 
@@ -34,8 +30,6 @@ def timing_faults(motion: Motion) -> Iterator[Fault]:
     jitter = float(np.std(np.diff(on_grid))) / np.sqrt(2.0)
     if jitter > JITTER:
         yield _irregular(motion, on_grid, jitter)
-    else:
-        yield from _sampled_unevenly(motion)
     yield from _rate(motion, on_grid)
 
 
@@ -128,33 +122,6 @@ def _smoother_on_the_grid(motion: Motion, on_grid: NDArray) -> bool:
     rough = np.diff(motion.measured_angle, 3, axis=0)
     stray = np.diff(on_grid / motion.sample_rate_hz, 3)[:, np.newaxis] * motion.dq[2:-1]
     return bool(np.abs(np.sum(rough * stray)) < 0.5 * np.sum(stray**2))
-
-
-def _sampled_unevenly(motion: Motion) -> Iterator[Fault]:
-    """Report samples taken at uneven instants under even stamps.
-
-    An instant that is off by d shifts every angle by its speed times d: the third differences of two joints then
-    correlate as their speeds do, which no vibration, count or friction of one joint does.
-    """
-    if motion.measured_angle is None or motion.q.shape[1] < 2:
-        return
-    rough = np.diff(motion.measured_angle[:, :2], 3, axis=0)
-    even = np.ptp(motion.segment[np.arange(4) + np.arange(len(rough))[:, np.newaxis]], axis=1) == 0
-    speeds = np.prod(motion.dq[2:-1, :2], axis=1)[even]
-    alike = np.prod(rough, axis=1)[even] * speeds
-    # Of independent instants, the third difference has 1 + 9 + 9 + 1 = 20 times the variance.
-    variance = alike.sum() / (20.0 * max(float(speeds @ speeds), 1e-12))
-    blocks = alike[: len(alike) // 100 * 100].reshape(-1, 100).sum(axis=1)
-    sure = blocks.sum() > SURE * np.sqrt(max(len(blocks), 1)) * blocks.std()
-    jitter = np.sqrt(max(variance, 0.0)) * motion.sample_rate_hz
-    if jitter > SAMPLED_UNEVENLY and sure:
-        yield Fault(
-            motion.file,
-            "time_s",
-            f"clock jitter: the stamps are even, but all angles jump together as if taken {100 * jitter:.2g} % of a "
-            f"sample period rms ({1e3 * jitter / motion.sample_rate_hz:.2g} ms) off; store the instants of the "
-            "samples, not the planned ones",
-        )
 
 
 def _rate(motion: Motion, on_grid: NDArray) -> Iterator[Fault]:

@@ -22,6 +22,8 @@ SHANK_KG_M = {"exo_alone": 0.5, "with_human": 1.6}
 50-100 kg of person at 0.25 m (Winter, Biomechanics and Motor Control of Human Movement, table 4.1)."""
 IMPOSSIBLE = 30.0
 """Times that mass moment, or a part of it: no leg."""
+EXPLAINED = 0.7
+"""Of the torque's power by rigid body and friction: below, a joint is no witness of anything's size."""
 LAW_HOLDS = 0.8
 """Of the torque's power that a position loop must explain before its gain is compared."""
 LARGEST_ANGLE_RAD = np.pi
@@ -67,18 +69,26 @@ def _times_set_point(motion: Motion, joint: int) -> float | None:
 
 def torque_unit_faults(runs: Sequence[Averages]) -> Iterator[Fault]:
     """Yield torques in another unit than N·m, run by run, and runs at another scale than their like."""
-    known = []
+    without_witness = []
     for run in runs:
-        laws = [drive_law(run.motion, j) for j in range(2)]
-        wrong = {j: (law, f"the {name}'s position loop") for j, (name, law) in enumerate(zip(
-            run.motion.joints, laws, strict=True)) if law and not 1 / WRONG < law < WRONG}  # fmt: skip
-        if not wrong and None in laws:
+        wrong = _against_the_drives(run)
+        if wrong is None:
             wrong = _against_the_other_joint(run)
+            without_witness += [] if wrong else [run]
         for j, (factor, witness) in wrong.items():
             yield _torque_fault(run, j, factor, witness)
-        if not wrong and None in laws:
-            known.append(run)
-    yield from _between_runs(known)
+    yield from _between_runs(without_witness)
+
+
+def _against_the_drives(run: Averages) -> dict[int, tuple[float, str]] | None:
+    """Return the joints whose torque is not what their position loops ask for; None where not both loops are known."""
+    laws = [drive_law(run.motion, j) for j in range(2)]
+    wrong = {
+        j: (law, f"the {name}'s position loop")
+        for j, (name, law) in enumerate(zip(run.motion.joints, laws, strict=True))
+        if law and not 1 / WRONG < law < WRONG
+    }
+    return None if None in laws and not wrong else wrong
 
 
 def drive_law(motion: Motion, joint: int) -> float | None:
@@ -97,7 +107,7 @@ def drive_law(motion: Motion, joint: int) -> float | None:
         return None
     columns = np.column_stack([reference - angle, speed, motion.dq[:, joint]])[good]
     torque = motion.torque[good, joint]
-    multiples = np.linalg.lstsq(columns, torque)[0]
+    multiples = np.linalg.lstsq(columns.T @ columns, columns.T @ torque)[0]
     left = np.sum((torque - columns @ multiples) ** 2)
     holds = left < (1.0 - LAW_HOLDS) * np.sum(torque**2)
     return float(abs(multiples[0])) / stiffness if holds else None
@@ -107,7 +117,7 @@ def _against_the_other_joint(run: Averages) -> dict[int, tuple[float, str]]:
     """Return the joints whose torque is in another unit, judged by the shank, which both drives carry."""
     moment, scale = shank(run)
     typical = SHANK_KG_M[run.motion.run]
-    if moment <= 0.0:
+    if moment <= 0.0 or any(fit(run.joint_columns(j), run.torque[:, j])[0] > 1.0 - EXPLAINED for j in range(2)):
         return {}
     by_knee, by_hip = moment / typical, scale * moment / typical
     if 1 / WRONG_BETWEEN_JOINTS < scale < WRONG_BETWEEN_JOINTS:
@@ -134,16 +144,13 @@ def _between_runs(runs: Sequence[Averages]) -> Iterator[Fault]:
         if first.motion.run != second.motion.run:
             continue
         for j in range(2):
-            factor = _times_predicted(second, _multiples(first, j), j)
-            if 1 / WRONG < factor < WRONG:
+            left, multiples = fit(first.joint_columns(j), first.torque[:, j])
+            factor = _times_predicted(second, multiples, j)
+            if left > 1.0 - EXPLAINED or 1 / WRONG < factor < WRONG:
                 continue
             odd, like = (second, first) if _less_plausible(second, first) else (first, second)
             times = factor if odd is second else 1 / max(factor, 1e-6)
             yield _torque_fault(odd, j, times, f"{like.motion.file}, another run of the same leg")
-
-
-def _multiples(run: Averages, joint: int) -> NDArray:
-    return fit(run.joint_columns(joint), run.torque[:, joint])[1]
 
 
 def _times_predicted(run: Averages, multiples: NDArray, joint: int) -> float:
