@@ -56,7 +56,7 @@ def choose(bank: Bank, floor: Floor) -> Choice:
     scorer = Scorer(bank, independent)
     levels = search(scorer)
     empty = fit((), bank.runs, bank.baseline, bank.weights)
-    ranked = [{(): Ranked(empty, 0.0)}]
+    ranked: list[dict[tuple[str, ...], Ranked]] = [{(): Ranked(empty, 0.0)}]
     named = ranked[0][()]
     for level in levels:
         finalists = [_rank(bank, s, empty, independent) for s in _finalists(level)]

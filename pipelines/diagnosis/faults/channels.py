@@ -49,7 +49,7 @@ def _repeated(motion: Motion) -> Iterator[Fault]:
     """Report drives that hand out old values: angle and torque are the last sample's while the joint moves."""
     if motion.measured_angle is None:
         return
-    same = np.zeros(motion.torque.shape, dtype=bool)
+    same: NDArray = np.zeros(motion.torque.shape, dtype=bool)
     same[1:] = (np.diff(motion.measured_angle, axis=0) == 0) & (np.diff(motion.torque, axis=0) == 0)
     for j, torque in enumerate(motion.torque.T):
         # A torque that stands for longer is stuck, whatever the angle does.

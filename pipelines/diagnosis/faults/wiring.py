@@ -49,7 +49,7 @@ WIRINGS: tuple[Wiring, ...] = (
     (KNEE_REVERSED, STRAIGHT, (-1.0, -1.0), ((HIP, "angle"),), SIGN),
     (KNEE_REVERSED, STRAIGHT, (1.0, -1.0), ((KNEE, "angle"), (KNEE, "torque")), SIGN),
 )
-MIRROR_IMAGES = {
+MIRROR_IMAGES: dict[tuple[tuple[int, str], ...], str] = {
     BOTH_TORQUES: "both angles",
     ((KNEE, "angle"), (KNEE, "torque")): "the hip's angle and torque",
 }
