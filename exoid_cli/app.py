@@ -19,6 +19,7 @@ from typer.exceptions import TyperException
 from exoid_cli.acquire import acquire
 from exoid_cli.console import console
 from exoid_cli.design import design
+from exoid_cli.diagnose import diagnose
 from exoid_cli.effects import effects
 from exoid_cli.filter import filter_
 from exoid_cli.identify import identify
@@ -39,6 +40,7 @@ app = typer.Typer(
 )
 app.command("init")(init)
 app.command("acquire")(acquire)
+app.command("diagnose")(diagnose)
 app.command("filter")(filter_)
 app.command("identify")(identify)
 app.command("rig")(rig)

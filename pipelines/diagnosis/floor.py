@@ -19,6 +19,8 @@ class Floor:
     """N·m."""
     independent_share: NDArray
     """Independent samples per sample: noise resembles itself from block to block."""
+    slow_share: NDArray
+    """Power density of the scatter below 1 Hz over that between 2 and 6 Hz."""
     from_periods: bool
 
 
@@ -34,7 +36,7 @@ def noise_floor(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Floor:
     else:
         from_periods = True
     outputs = residuals[0].shape[1]
-    rms, share = np.full(outputs, np.nan), np.ones(outputs)
+    rms, share, slow = np.full(outputs, np.nan), np.ones(outputs), np.ones(outputs)
     for o in range(outputs):
         d = [p[:, o] for p in pairs if len(p)]
         known = np.concatenate(d)
@@ -42,7 +44,9 @@ def noise_floor(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Floor:
         if len(known) > 20:
             rms[o] = np.sqrt(np.mean(known**2))
             share[o] = 1.0 / _correlation_time(d)
-    return Floor(rms, share, from_periods)
+            rate = runs[0].motion.sample_rate_hz / runs[0].block.decimation
+            slow[o] = _slow_share(d, rate) if from_periods else 1.0
+    return Floor(rms, share, slow, from_periods)
 
 
 def _differences(run: Run, residual: NDArray) -> NDArray:
@@ -86,3 +90,20 @@ def _correlation_time(series: Sequence[NDArray]) -> float:
             break
         total += 2 * rho
     return float(total)
+
+
+def _slow_share(series: Sequence[NDArray], rate_hz: float) -> float:
+    """Compare slow with fast scatter: noise of a sensor is flat there, a person or a drift is not.
+
+    Samples that are not usable count as nought, which leaves the ratio as it is.
+    """
+    slow, fast = 0.0, 0.0
+    for s in series:
+        filled = np.nan_to_num(s)
+        if len(filled) < 64:
+            continue
+        frequency = np.fft.rfftfreq(len(filled), 1.0 / rate_hz)
+        power = np.abs(np.fft.rfft(filled * np.hanning(len(filled)))) ** 2
+        slow += float(power[(frequency > 0.05) & (frequency < 1.0)].mean())
+        fast += float(power[(frequency > 2.0) & (frequency < 6.0)].mean())
+    return slow / fast if fast > 0 else 1.0

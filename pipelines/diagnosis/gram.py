@@ -52,10 +52,11 @@ def gram_of(columns: NDArray, measured: NDArray, usable: NDArray, fold: NDArray,
     usable : (m, O) array of bool
     fold : (m,) array of int
     """
-    _, O, c = columns.shape
-    out = Gram(np.zeros((folds, O, c, c)), np.zeros((folds, O, c)), np.zeros((folds, O)), np.zeros((folds, O)))
+    _, outputs, c = columns.shape
+    by_output = np.zeros((2, folds, outputs))
+    out = Gram(np.zeros((folds, outputs, c, c)), np.zeros((folds, outputs, c)), *by_output)
     for f in range(folds):
-        for o in range(O):
+        for o in range(outputs):
             rows = (fold == f) & usable[:, o]
             if not rows.any():
                 continue
