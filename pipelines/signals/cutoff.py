@@ -12,7 +12,7 @@ NOISE_BAND = (0.6, 0.96)
 """Share of the Nyquist frequency where an angle holds nothing but noise."""
 HIGHEST_SHARE = 0.125
 """Of the Nyquist frequency: above it there is only what sticking joints do at reversals, which no fit uses."""
-SLOW_SHARE = 0.9999
+SLOW_SHARE = 0.999
 """Of the velocity's power: the motion itself, which the filter must leave alone."""
 QUIET_HZ = 3.0
 """Width of noise after which no more signal is expected."""

@@ -55,6 +55,8 @@ def test_the_truth_lies_in_the_intervals_95_times_in_100_under_coloured_noise(no
             inside.append((table["ci95_low"] <= truth) & (truth <= table["ci95_high"]))
             bias.append((table["value"] - truth) / table["std_error"])
     covered = np.mean(inside)
+    each = np.mean(np.reshape(inside, (len(COLOURS), -1)), axis=1)
+    print(f"\ncovered {covered:.3f}; {dict(zip(COLOURS, each.round(3).tolist(), strict=True))}")
     # 200 sessions of 16 parameters, strongly dependent within a session.
     assert 0.92 <= covered <= 0.98, f"covered {covered:.3f}; each parameter {np.mean(inside, axis=0).round(2)}"
     assert np.all(np.abs(np.mean(bias, axis=0)) < 0.4), np.mean(bias, axis=0).round(2)
@@ -66,6 +68,7 @@ def test_the_formula_for_independent_samples_covers_far_less(noiseless_motions, 
     for seed in range(30):
         motions = with_noise(noiseless_motions, "0.2 s", (0.6, 0.4), seed)
         inside.append(covers_as_if_independent(motions, truth[:8]))
+    print(f"\ncovered as if independent {np.mean(inside):.3f}")
     assert np.mean(inside) < 0.7
 
 
