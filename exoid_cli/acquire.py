@@ -28,7 +28,13 @@ def acquire(
     trajectory: Annotated[Path, typer.Option(help="The excitation, Parquet or TOML.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="The recording to write.")],
 ) -> None:
-    """Move the leg along an excitation and record every sample."""
+    """Move the leg along an excitation and record every sample.
+
+    \b
+    Example:
+      exoid acquire --config exoid.toml --run with_human_train \\
+        --trajectory trajectory.parquet -o recordings/with_human_train.parquet
+    """
     from pipelines.acquisition.acquire import acquire as record
     from pipelines.settings import Experiment
     from pipelines.settings.rig import load_rig

@@ -19,6 +19,7 @@ from typer.exceptions import TyperException
 from exoid_cli.acquire import acquire
 from exoid_cli.console import console
 from exoid_cli.design import design
+from exoid_cli.detect import detect
 from exoid_cli.diagnose import diagnose
 from exoid_cli.effects import effects
 from exoid_cli.filter import filter_
@@ -33,22 +34,26 @@ from pipelines.errors import ExoidError
 
 app = typer.Typer(
     name="exoid",
-    help="Identification experiments on an exoskeleton leg: what the model gets wrong, and why.",
-    no_args_is_help=True,
+    help="Identification experiments on an exoskeleton leg: what the model gets wrong, and why.\n\n"
+    "\b\nExample:\n  exoid init my_experiment\n  make -C my_experiment",
+    # Plain text: brackets of [design] are no markup, and examples can be copied.
+    rich_markup_mode=None,
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-app.command("init")(init)
-app.command("acquire")(acquire)
-app.command("diagnose")(diagnose)
-app.command("filter")(filter_)
-app.command("identify")(identify)
-app.command("rig")(rig)
-app.command("simulate")(simulate)
-app.command("show")(show)
-app.command("design")(design)
-app.command("effects")(effects)
-app.add_typer(settings, name="settings")
+# In the order of an experiment. The short help fits on the one line that the list of commands has for it.
+app.command("init", short_help="Start a new experiment.")(init)
+app.command("design", short_help="Search an excitation, or judge a given one.")(design)
+app.command("acquire", short_help="Move the leg along an excitation; record every sample.")(acquire)
+app.command("filter", short_help="Filter a recording's angles and differentiate them.")(filter_)
+app.command("identify", short_help="Fit the leg's parameters; judge them on other runs.")(identify)
+app.command("diagnose", short_help="Name what the model gets wrong, and measure the gain.")(diagnose)
+app.command("simulate", short_help="Simulate the identified leg, or replay a recording.")(simulate)
+app.command("show", short_help="Say what a file is, and what is in it.")(show)
+app.command("effects", short_help="List the effects a model can have, or explain one.")(effects)
+app.command("detect", short_help="Say which causes a motion would reveal.")(detect)
+app.command("rig", short_help="Serve a virtual rig over Modbus TCP.")(rig)
+app.add_typer(settings, name="settings", short_help="Work with an experiment's settings.")
 
 
 def _print_version(wanted: bool) -> None:
@@ -80,7 +85,10 @@ def run(arguments: Sequence[str]) -> int:
     try:
         command = typer.main.get_command(app)
         # Not standalone: typer would print a box of several lines for a mistyped option.
-        return command.main(args=_global_options_first(arguments), prog_name="exoid", standalone_mode=False) or 0
+        return (
+            command.main(args=_global_options_first(arguments or ["--help"]), prog_name="exoid", standalone_mode=False)
+            or 0
+        )
     except ExoidError as error:
         console.fail(str(error))
         return error.exit_code
@@ -106,9 +114,8 @@ def _global_options_first(arguments: Sequence[str]) -> list[str]:
 def _usage_error(error: TyperException) -> int:
     context = getattr(error, "ctx", None)
     message = error.format_message() if hasattr(error, "format_message") else str(error)
-    if message:  # without a command typer has printed the help, and has nothing to add
-        hint = f"; see `{context.command_path} --help`" if context else ""
-        console.fail(message.rstrip(".") + hint)
+    hint = f"; see `{context.command_path} --help`" if context else ""
+    console.fail(message.rstrip(".") + hint)
     return getattr(error, "exit_code", 2)
 
 

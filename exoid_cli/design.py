@@ -25,8 +25,10 @@ def design(
 ) -> None:
     """Search the excitation that tells the parameters apart best, or judge a given one.
 
-    Examples: exoid design --config exoid.toml -o trajectory.parquet,
-    exoid design --evaluate trajectory.toml
+    \b
+    Examples:
+      exoid design --config exoid.toml -o trajectory.parquet
+      exoid design --evaluate trajectory.toml
     """
     from pipelines.errors import InputError
     from pipelines.mechanics.leg import Geometry

@@ -13,7 +13,13 @@ LINE = "{effect:<24}{side:<11}{joints:<20}{typical}"
 def effects(
     name: Annotated[str | None, typer.Argument(help="One effect, for its page; without it the list of all.")] = None,
 ) -> None:
-    """List the effects a model can have, or say all about one: equation, parameters, how to confirm it."""
+    """List the effects a model can have, or say all about one: equation, parameters, how to confirm it.
+
+    \b
+    Examples:
+      exoid effects
+      exoid effects stribeck_friction
+    """
     from pipelines.effects import EFFECTS
     from pipelines.effects.reference import facts
     from pipelines.model import effect_named

@@ -18,7 +18,9 @@ def filter_(
 ) -> None:
     """Filter a recording's angles without delay and differentiate them; torque stays as measured.
 
-    Example: exoid filter recordings/with_human_train.parquet -o motions/with_human_train.parquet
+    \b
+    Example:
+      exoid filter recordings/run.parquet -o motions/run.parquet
     """
     from pipelines.contracts import MOTION, RECORDING, describe
     from pipelines.filtering import filter_recording

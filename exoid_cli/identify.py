@@ -19,7 +19,9 @@ def identify(
 ) -> None:
     """Fit the leg's parameters to training runs and measure the torque error on validation runs.
 
-    Example: exoid identify motions/*.parquet -o identified/
+    \b
+    Example:
+      exoid identify motions/*.parquet -o identified/
     """
     from pipelines.contracts import PARAMETERS, RESIDUALS, describe, joints_of
     from pipelines.identification import identify as fit

@@ -11,7 +11,13 @@ from exoid_cli.console import console
 
 
 def init(folder: Annotated[Path, typer.Argument(help="Where the experiment shall live; made if need be.")]) -> None:
-    """Start a new experiment: a commented exoid.toml, the rig's description, and a Makefile."""
+    """Start a new experiment: a commented exoid.toml, the rig's description, and a Makefile.
+
+    \b
+    Example:
+      exoid init my_experiment
+      make -C my_experiment
+    """
     from pipelines.settings.template import create
 
     command = Path(sys.argv[0])

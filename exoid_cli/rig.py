@@ -20,7 +20,12 @@ def rig(
     sample_rate_hz: Annotated[float | None, typer.Option(min=1.0, help="Samples a second; else the plant's.")] = None,
     until_input_ends: Annotated[bool, typer.Option(hidden=True, help="Stop when standard input is closed.")] = False,
 ) -> None:
-    """Serve the drives and force sensors of a virtual rig over Modbus TCP, until Ctrl-C."""
+    """Serve the drives and force sensors of a virtual rig over Modbus TCP, until Ctrl-C.
+
+    \b
+    Example:
+      exoid rig rigs/real_time.toml --run exo_alone --port 5020
+    """
     from pipelines.rig.server import serve_file
 
     def announce(host: str, port: int) -> None:

@@ -7,12 +7,17 @@ import typer
 
 from exoid_cli.console import console
 
-settings = typer.Typer(help="Work with an experiment's settings.", no_args_is_help=True)
+settings = typer.Typer(help="Work with an experiment's settings.", rich_markup_mode=None)
 
 
-@settings.command("check")
+@settings.command("check", short_help="Say whether an experiment's file can be used.")
 def check(config: Annotated[Path, typer.Argument(help="The experiment's exoid.toml.")]) -> None:
-    """Say whether an experiment's file can be used; print it complete with --json."""
+    """Say whether an experiment's file can be used; print it complete with --json.
+
+    \b
+    Example:
+      exoid settings check exoid.toml
+    """
     from pipelines.settings import Experiment
 
     experiment = Experiment.load(config)
@@ -20,12 +25,17 @@ def check(config: Annotated[Path, typer.Argument(help="The experiment's exoid.to
     console.say(f"{config}: {len(experiment.run)} runs, all settings are valid")
 
 
-@settings.command("split")
+@settings.command("split", short_help="Write one file a section, for make.")
 def split(
     config: Annotated[Path, typer.Argument(help="The experiment's exoid.toml.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for one file a section, written if changed.")],
 ) -> None:
-    """Write one file a section, so that make re-runs only what a change touches."""
+    """Write one file a section, so that make re-runs only what a change touches.
+
+    \b
+    Example:
+      exoid settings split exoid.toml --out .settings
+    """
     from pipelines.settings import Experiment
     from pipelines.settings.split import split as split_settings
 

@@ -11,7 +11,12 @@ from exoid_cli.console import console
 def show(
     file: Annotated[Path, typer.Argument(help="A Parquet file of exoid's, verdict.json, or a trajectory as TOML.")],
 ) -> None:
-    """Say what an exoid file is, where it came from, and its columns with units and ranges."""
+    """Say what an exoid file is, where it came from, and its columns with units and ranges.
+
+    \b
+    Example:
+      exoid show recordings/with_human_train.parquet
+    """
     from pipelines.contracts.inspection import inspect
 
     found = inspect(file)

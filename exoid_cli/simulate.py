@@ -28,7 +28,11 @@ def simulate(
 ) -> None:
     """Simulate the leg under adaptive RBF control, or replay a recording on the model.
 
-    Example: exoid simulate identified/parameters.parquet -o simulated/
+    \b
+    Examples:
+      exoid simulate identified/parameters.parquet -o simulated/
+      exoid simulate identified/parameters.parquet -o simulated/replay.parquet \\
+        --replay recordings/with_human_validate.parquet
     """
     from pipelines.contracts import PARAMETERS
     from pipelines.errors import SettingsError

@@ -14,7 +14,7 @@ MOST_INDEPENDENT = 1 / 6
 """Of 25 ms blocks: what a model leaves of a leg is never white (DESIGN section 5)."""
 NEEDED = 6.0
 """Log likelihood that one more cause must gain."""
-MATERIAL = 0.03
+MATERIAL = 0.02
 """Share of a joint's error that one more cause must take away."""
 FINALISTS = 3
 """Sets of each size whose shapes are refined before they are compared."""

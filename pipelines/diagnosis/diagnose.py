@@ -179,8 +179,9 @@ def _strayed(frame: pd.DataFrame, made: Fit, validate: Sequence[Run], baseline: 
         try:
             model = _with_own(model_from_parameters(frame, run.motion.run), made, run, baseline)
             result = replay(model, run.motion)
-        except ExoidError:
-            # A set of causes that the forward dynamics cannot hold together still has a torque error.
+        except (ExoidError, ZeroDivisionError):
+            # Causes that the forward dynamics cannot hold together, or a mass matrix that no leg has: the torque
+            # error stands all the same.
             return None
         squares = squares + np.sum(result.error**2, axis=(0, 1))
         count += result.error.shape[0] * result.error.shape[1]

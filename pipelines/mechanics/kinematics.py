@@ -16,7 +16,10 @@ from pipelines.signals.cutoff import Cutoff, choose_cutoff
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 
 GAP = 1.5
-"""Sample periods between two samples that make a gap."""
+"""Sample periods between two samples that make a gap, unless it is bridged."""
+BRIDGED_S = 0.022
+"""A shorter hole is interpolated: no leg does anything in it, and a bus that loses a sample here and there, or a
+clock that stamps one late, would otherwise leave no stretch long enough to be filtered."""
 JITTER = 0.02
 """Share of a sample period a sample may stray from the uniform grid before it is interpolated."""
 EDGE_PERIODS = 1.5
@@ -95,7 +98,7 @@ def differentiate(
             f"metadata sample_rate_hz is {rate_hz:g}, but time_s advances by {1 / actual_hz:g} s "
             f"({actual_hz:g} Hz); correct the one that is wrong"
         )
-    segment = np.concatenate([[0], np.cumsum(steps > GAP / rate_hz)]).astype(np.int64)
+    segment = np.concatenate([[0], np.cumsum(steps > max(GAP / rate_hz, BRIDGED_S))]).astype(np.int64)
     stretches = [np.flatnonzero(segment == s) for s in range(segment[-1] + 1)]
     longest = max(stretches, key=len)
     cutoff = _cutoff(time[longest], angle[longest], rate_hz, settings, names)

@@ -44,6 +44,10 @@ class Motion:
     """(n, 4, 3) N, cuffs in the order of ``CUFFS``; None where they were not read."""
     reference: NDArray | None = None
     """(n, J) commanded angle."""
+    measured_angle: NDArray | None = None
+    """(n, J) as the encoders gave it, before any filter."""
+    sequence: NDArray | None = None
+    """(n,) the device's sample counter."""
     temperature: NDArray | None = None
     """(n, J) deg C."""
     cutoff_hz: float = 12.0
@@ -154,6 +158,8 @@ def motion_from_table(table: Table, default_geometry: Geometry | None = None) ->
         geometry=geometry_of(metadata, default_geometry),
         forces=frame[force_columns].to_numpy(float).reshape(-1, 4, 3) if has_forces else None,
         reference=if_there("reference"),
+        measured_angle=if_there("angle_measured"),
+        sequence=np.array(frame["sequence"], dtype=np.int64) if "sequence" in frame else None,
         temperature=if_there("temperature"),
         cutoff_hz=float(metadata["filter"]["cutoff_hz"]),
         file=Path(table.path).name if table.path else "",

@@ -1,6 +1,6 @@
 """The regression filter: averages over short blocks, applied to torque and every regressor column alike.
 
-Filtering the torque alone would leave a faultless fit with 2.65 times the noise; both sides alike, and
+Filtering the torque alone would leave a faultless fit with up to four times the noise; both sides alike, and
 kept away from reversals by short blocks, leave the noise itself (docs/identification.md).
 """
 

@@ -12,8 +12,10 @@ NOISE_BAND = (0.6, 0.96)
 """Share of the Nyquist frequency where an angle holds nothing but noise."""
 HIGHEST_SHARE = 0.125
 """Of the Nyquist frequency: above it there is only what sticking joints do at reversals, which no fit uses."""
-SLOW_SHARE = 0.999
-"""Of the velocity's power: the motion itself, which the filter must leave alone."""
+SLOW_SHARE = 0.9999
+"""Of the signal's power: the motion itself, which the filter must leave alone."""
+BEFORE_NOISE = 0.7
+"""Cut-off over the frequency where signal and noise meet: in acceleration the noise outweighs the signal well before."""
 QUIET_HZ = 3.0
 """Width of noise after which no more signal is expected."""
 CLEAR = 3.0
@@ -38,7 +40,7 @@ class Spectrum:
     floor: float
     meets_floor_hz: float
     motion_hz: float
-    """Frequency below which nearly all of the velocity's power lies."""
+    """Frequency below which nearly all of the signal's power lies."""
 
 
 def spectrum(x: NDArray, rate_hz: float) -> Spectrum:
@@ -56,8 +58,8 @@ def spectrum(x: NDArray, rate_hz: float) -> Spectrum:
     ahead = max(1, int(QUIET_HZ / frequency[1]))
     quiet = ~maximum_filter1d(above, ahead, origin=-(ahead // 2), mode="nearest")
     meets = frequency[np.argmax(quiet)] if quiet.any() else nyquist
-    speed = np.cumsum(np.maximum(density - floor, 0.0) * frequency**2)
-    motion = frequency[np.searchsorted(speed, SLOW_SHARE * speed[-1])] if speed[-1] > 0 else 0.0
+    power = np.cumsum(np.maximum(density - floor, 0.0))
+    motion = frequency[np.searchsorted(power, SLOW_SHARE * power[-1])] if power[-1] > 0 else 0.0
     return Spectrum(frequency, density, floor, float(meets), float(min(motion, meets)))
 
 
@@ -74,8 +76,9 @@ def choose_cutoff(x: NDArray, rate_hz: float, channels: tuple[str, ...]) -> Cuto
     fastest = int(np.argmax([s.motion_hz for s in found]))
     needed = min(2.0 * found[fastest].motion_hz, highest)
     said = f"the {channels[noisiest]} angle's spectrum meets its noise floor at {meets:.1f} Hz"
-    if meets < needed:
+    chosen = BEFORE_NOISE * meets
+    if chosen < needed:
         return Cutoff(needed, f"{said}, but the {channels[fastest]} moves at up to {needed / 2:.1f} Hz")
-    if meets > highest:
+    if chosen > highest:
         return Cutoff(highest, f"{said}; above a sixteenth of the sample rate is only what reversals leave")
-    return Cutoff(max(meets, 2.0 * rate_hz / len(x)), said)
+    return Cutoff(max(chosen, 2.0 * rate_hz / len(x)), f"{said}; in acceleration noise outweighs signal before that")

@@ -17,6 +17,12 @@ def test_every_command_has_help(exoid, command):
     outcome = exoid(command, "--help")
     assert outcome.code == 0
     assert command in outcome.out
+    assert "Example" in outcome.out or "Commands" in outcome.out
+    assert max(map(len, outcome.out.splitlines())) <= 80
+
+
+def test_the_list_of_commands_tells_each_whole(exoid):
+    assert "..." not in exoid("--help").out.partition("Commands:")[2]
 
 
 def test_help_loads_nothing_heavy():
@@ -77,6 +83,7 @@ def test_a_fault_of_exoid_keeps_its_traceback_in_a_file(exoid, monkeypatch, tmp_
     ("arguments", "line"),
     [
         (["shw"], "exoid: No such command 'shw'. Did you mean 'show'?; see `exoid --help`\n"),
+        (["settings"], "exoid: Missing command; see `exoid settings --help`\n"),
         (["show"], "exoid: Missing argument 'file'; see `exoid show --help`\n"),
         (["show", "a", "--fast"], "exoid: No such option: --fast; see `exoid show --help`\n"),
     ],

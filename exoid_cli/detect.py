@@ -1,0 +1,118 @@
+"""``exoid detect``: which causes a motion would reveal, from which size on, and which it cannot tell apart."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from exoid_cli.console import console
+
+if TYPE_CHECKING:
+    from pipelines.diagnosis.detect import Detectable
+
+
+def detect(
+    files: Annotated[
+        list[Path], typer.Argument(help="One excitation (TOML or trajectory/1), or recordings or motions of one rig.")
+    ],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Folder for detectability.json and the figure.")
+    ] = None,
+    config: Annotated[
+        Path | None, typer.Option("--config", help="exoid.toml; [design.noise], [filter], [mechanism].")
+    ] = None,
+    rig: Annotated[
+        Path | None, typer.Option("--rig", help="A virtual rig's file: the leg that an excitation would move.")
+    ] = None,
+    runs: Annotated[
+        Literal["exo_alone", "with_human", "both"], typer.Option(help="Runs that an excitation is planned for.")
+    ] = "both",
+    power: Annotated[float, typer.Option(min=0.5, max=0.999, help="Chance to find an effect of that size.")] = 0.9,
+) -> None:
+    """Say how large each cause must be to be seen with this motion and noise, and which causes look alike.
+
+    Examples: exoid detect trajectory.parquet -o detectable/,
+    exoid detect recordings/*.parquet --power 0.95
+    """
+    from pipelines.diagnosis.detect import as_json
+    from pipelines.settings import Experiment
+
+    experiment = Experiment.load(config) if config else Experiment()
+    with console.progress("Looking", total=1.0) as report:
+        if _is_trajectory(files):
+            found = _planned(files, experiment, rig, runs, power, report)
+        else:
+            found = _recorded(files, experiment, power, report)
+    told = {"files": [str(file) for file in files], "power": power, **as_json(found)}
+    if output:
+        from pipelines.contracts.atomic import write_text
+        from pipelines.diagnosis.detect_figure import draw
+
+        write_text(output / "detectability.json", json.dumps(told, ensure_ascii=False, indent=1))
+        draw(found, output / "detectability", f"What {', '.join(file.name for file in files)} would reveal")
+    console.emit(told)
+    _show(found)
+
+
+def _is_trajectory(files: Sequence[Path]) -> bool:
+    from pipelines.contracts import TRAJECTORY, contract_of
+    from pipelines.errors import InputError
+
+    kinds = [file.suffix == ".toml" or contract_of(file) is TRAJECTORY for file in files]
+    if any(kinds) and len(files) > 1:
+        raise InputError(
+            f"{files[kinds.index(True)]}: an excitation among {len(files)} files; give one excitation, "
+            "or recordings and motions only"
+        )
+    return kinds[0]
+
+
+def _planned(files: Sequence[Path], experiment: Any, rig: Path | None, runs: str, power: float, report: Any) -> list:
+    from pipelines.diagnosis.detect import detectability
+    from pipelines.diagnosis.observations import baseline_of, observe
+    from pipelines.diagnosis.planned import planned_motions, planned_noise
+    from pipelines.errors import InputError
+    from pipelines.mechanics.trajectory import read_trajectory
+    from pipelines.settings.plant import PlantSettings
+    from pipelines.settings.rig import load_rig
+
+    plant = load_rig(rig).plant if rig else PlantSettings(**experiment.mechanism.model_dump())
+    if plant is None:
+        raise InputError(
+            f"{rig}: has no [plant], expected the file of a virtual rig; name one that has, or leave it out"
+        )
+    design = experiment.design
+    kinds = ("exo_alone", "with_human") if runs == "both" else (runs,)
+    motions = planned_motions(read_trajectory(files[0]), plant, design.noise, kinds, design.sample_rate_hz)
+    observed = [observe(motion) for motion in motions]
+    noise = planned_noise(design.noise, design.sample_rate_hz, observed[0].block)
+    return detectability(observed, baseline_of(observed), noise, power, report)
+
+
+def _recorded(files: Sequence[Path], experiment: Any, power: float, report: Any) -> list:
+    from pipelines.diagnosis.detect import detectability_of_recorded
+    from pipelines.mechanics.read import geometry_from, read_motions
+
+    motions = read_motions(files, experiment.filter, geometry_from(experiment.mechanism))
+    return detectability_of_recorded(motions, power, report)
+
+
+def _show(found: Sequence["Detectable"]) -> None:
+    headings = ("cause", "joint", "seen from", "rms N·m", "of torque")
+    console.table(headings, [_row(one) for one in found], numbers="seen from, rms N·m, of torque")
+    console.say("")
+    tied = [(one.effect.label, ", ".join(one.tied_with)) for one in found if one.tied_with]
+    console.table(("at that size", "could also be"), tied)
+    never = sorted({tuple(sorted((one.effect.label, *one.never_apart))) for one in found if one.never_apart})
+    for labels in never:
+        console.say(f"Of no size to be told apart with this motion: {', '.join(labels)}.")
+
+
+def _row(one: "Detectable") -> tuple[str, ...]:
+    name = (one.effect.name, one.effect.joint or "whole leg")
+    share = one.smallest_rms_nm / one.torque_rms_nm
+    if share >= 1.0:
+        return (*name, "not to be seen", "", "")
+    return (*name, one.size_in_words(), f"{one.smallest_rms_nm:.2f}", f"{100 * share:.1f} %")

@@ -1,0 +1,54 @@
+"""Data faults: what went wrong between a sound leg and its file, found before any physics is blamed.
+
+Time first, then single channels, then how channels are wired, then their units; each looks only at samples that
+those before it left. Slow or small changes that physics can make (a drift, a gain of a few tens of percent, an
+offset) are no faults.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipelines.diagnosis.faults.body import averages
+from pipelines.diagnosis.faults.channels import channel_faults
+from pipelines.diagnosis.faults.fault import Fault
+from pipelines.diagnosis.faults.sampling import sampling_faults
+from pipelines.diagnosis.faults.timing import timing_faults
+from pipelines.diagnosis.faults.units import angle_unit_faults, torque_unit_faults
+from pipelines.diagnosis.faults.wiring import angle_faults, cuff_faults, wiring_faults
+from pipelines.mechanics.motion import Motion
+
+__all__ = ["Fault", "excluding", "find_faults"]
+
+
+def find_faults(motions: Sequence[Motion]) -> list[Fault]:
+    """Return the faults of acquisition in a session's runs, in the order of the runs.
+
+    Parameters
+    ----------
+    motions : sequence of Motion
+        All runs of one leg, made from recordings, so that the measured angles are there.
+    """
+    found = [fault for motion in motions for fault in (*timing_faults(motion), *channel_faults(motion))]
+    rightly_wired = []
+    for motion in excluding(motions, found):
+        found += sampling_faults(motion)
+        wrong = [*angle_faults(motion), *angle_unit_faults(motion)]
+        run = averages(motion)
+        if run is not None and not wrong:
+            wrong = [*wiring_faults(run), *cuff_faults(run)]
+            rightly_wired += [] if wrong else [run]
+        found += wrong
+    found += torque_unit_faults(rightly_wired)
+    files = [motion.file for motion in motions]
+    return sorted(found, key=lambda fault: files.index(fault.file))
+
+
+def excluding(motions: Sequence[Motion], faults: Iterable[Fault]) -> list[Motion]:
+    """Return the motions with the faults' samples marked as not valid."""
+    bad: dict[str, np.ndarray] = {}
+    for fault in faults:
+        if fault.samples is not None:
+            bad[fault.file] = bad.get(fault.file, False) | fault.samples
+    return [replace(m, valid=m.valid & ~bad[m.file]) if m.file in bad else m for m in motions]

@@ -1,0 +1,107 @@
+"""What a leg can do: torque against its rigid body and friction, each parameter with the sign that nature gives it.
+
+Inertia, weight that hangs below its joint, and friction are never negative. A leg whose channels are exchanged
+or reversed needs negative ones, so a fit that forbids them tells how channels are wired. Each joint is fitted by
+itself, so that its unit does not matter.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+
+from pipelines.mechanics.leg import cuff_torque, regressor
+from pipelines.mechanics.motion import Motion
+from pipelines.signals.blocks import BlockAverage
+
+BLOCK_S = 0.05
+LEAST_BLOCKS = 100
+"""Five seconds of motion: with fewer, gravity and inertia are not told apart."""
+FROM_POSITIVE = np.array([[1.0, 0, 0, 0], [1, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+"""X1..X4 from (X1 - X2, X2, X3, X4), none of which is negative: M(q) > 0 needs X1 > X2 > 0."""
+AS_RECORDED, KNEE_REVERSED, EXCHANGED = ((0, 1), (1.0, 1.0)), ((0, 1), (1.0, -1.0)), ((1, 0), (1.0, 1.0))
+Reading = tuple[tuple[int, int], tuple[float, float]]
+"""Which columns are hip and knee, and the sign of each."""
+
+
+@dataclass(frozen=True)
+class Averages:
+    """Usable blocks of one run, m of them."""
+
+    motion: Motion
+    q: NDArray
+    dq: NDArray
+    ddq: NDArray
+    direction: NDArray
+    """(m, 2) mean of sgn dq."""
+    torque: NDArray
+    cuffs: NDArray | None
+    """(m, 2, 3) N, sums of front and back at thigh and shank; None where they were not read."""
+
+    def body(self, reading: Reading = AS_RECORDED) -> NDArray:
+        """Torque per unit of (X1 - X2, X2, X3, X4) with the angles read otherwise, (m, 2, 4)."""
+        order, sign = reading
+        state = (np.ascontiguousarray(x[:, list(order)] * sign) for x in (self.q, self.dq, self.ddq))
+        g = self.motion.geometry
+        return regressor(*state, g.thigh_length_m, g.gravity_m_s2) @ FROM_POSITIVE
+
+    def joint_columns(self, joint: int, reading: Reading = AS_RECORDED) -> NDArray:
+        """Columns of one joint: its share of the rigid body, Coulomb, viscous, and an offset of either sign."""
+        order, sign = reading
+        body = self.body(reading)[:, joint, slice(1, 3) if joint else slice(None)]
+        friction = np.column_stack([self.direction[:, order[joint]], self.dq[:, order[joint]]]) * sign[joint]
+        one = np.ones((len(body), 1))
+        return np.hstack([body, friction, one, -one])
+
+
+def averages(motion: Motion) -> Averages | None:
+    """Average over blocks that can be trusted; None where the machine is no hip and knee, or too few are left."""
+    if motion.joints != ("hip", "knee"):
+        return None
+    block = BlockAverage.lasting(BLOCK_S, motion.sample_rate_hz)
+    starts = block.starts(motion.segment)
+    starts = starts[block.all(motion.valid, starts)]
+    if len(starts) < LEAST_BLOCKS:
+        return None
+    q, dq, ddq, direction, torque = (
+        block.mean(x, starts) for x in (motion.q, motion.dq, motion.ddq, np.sign(motion.dq), motion.torque)
+    )
+    cuffs = None
+    if motion.forces is not None and motion.geometry.shank_cuff_distance_m and motion.geometry.thigh_cuff_distance_m:
+        cuffs = block.mean(np.stack([motion.forces[:, :2].sum(axis=1), motion.forces[:, 2:].sum(axis=1)], 1), starts)
+    return Averages(motion, q, dq, ddq, direction, torque, cuffs)
+
+
+def fit(columns: NDArray, torque: NDArray, free: NDArray | None = None) -> tuple[float, NDArray]:
+    """Fit torque (m,) by nonnegative multiples of columns (m, p).
+
+    Returns the share of the torque's power that is left, and the multiples (p,). ``free`` are further columns (m, f)
+    whose multiples may have any sign.
+    """
+    if free is not None:
+        basis = np.linalg.qr(free)[0]
+        columns, torque = columns - basis @ (basis.T @ columns), torque - basis @ (basis.T @ torque)
+    # A root of the Gram matrix has the same inner products as the columns, and a hundredth of their rows.
+    everything = np.column_stack([columns, torque])
+    scale = np.maximum(np.sqrt(np.einsum("ij,ij->j", everything, everything)), 1e-12)
+    power, direction = np.linalg.eigh((everything / scale).T @ (everything / scale))
+    root = np.sqrt(np.maximum(power, 0.0))[:, np.newaxis] * direction.T
+    multiples, left = nnls(root[:, :-1], root[:, -1])
+    return left**2, multiples * scale[-1] / scale[:-1]
+
+
+def cuff_misfit(run: Averages, cuffs: NDArray) -> float:
+    """Return the share of the cuffs' torque, (m, 2, 3) N, that no limb explains; the sensors' zeros are free."""
+    g = run.motion.geometry
+    felt = cuff_torque(cuffs[:, 0], cuffs[:, 1], run.q, g)
+    zeros = np.stack(
+        [cuff_torque(*np.broadcast_to(unit, (len(felt), 2, 3)).transpose(1, 0, 2), run.q, g) for unit in ZEROS], -1
+    )
+    weight = 1.0 / np.maximum(felt.std(axis=0), 1e-12)
+    stacked = [np.concatenate([x[:, j] * weight[j] for j in range(2)]) for x in (run.body(), felt, zeros)]
+    return fit(stacked[0], stacked[1], stacked[2])[0]
+
+
+ZEROS = np.array([[[0, 0, 0], [1, 0, 0]], [[0, 0, 0], [0, 1, 0]], [[0, 1, 0], [0, 0, 0]]], dtype=float)
+"""Zeros of the sensors that show in the torque: shank along, shank across, thigh across."""

@@ -1,0 +1,59 @@
+"""A fault of acquisition: which samples of which channel do not say what the leg did."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.contracts.joints import joints_of
+from pipelines.mechanics.motion import Motion
+
+WHOLE_ROW = "all channels"
+
+
+@dataclass(frozen=True, eq=False)
+class Fault:
+    """One finding about a recording that is not physics."""
+
+    file: str
+    channel: str
+    """The column's name in the file, or ``WHOLE_ROW``."""
+    what: str
+    """One sentence: what, how much, where in time, what to do."""
+    samples: NDArray | None = None
+    """(n,) bool, the samples that must not be used; None where masking would not help."""
+
+
+def column(motion: Motion, joint: int, quantity: str) -> str:
+    """Return the name in the file of a quantity of joint number ``joint``."""
+    return joints_of(motion.metadata)[joint].column(quantity)
+
+
+def stretches(marked: NDArray) -> NDArray:
+    """Return first and one past the last sample of each run of true samples in (n,) bool, (runs, 2)."""
+    edges = np.diff(np.concatenate([[False], marked, [False]]).astype(np.int8))
+    return np.column_stack([np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)])
+
+
+def constant_stretches(x: NDArray, least: int) -> NDArray:
+    """Return first and one past the last of each run of at least ``least`` equal values in (n,), (runs, 2)."""
+    found = stretches(x[1:] == x[:-1])
+    found[:, 1] += 1
+    return found[found[:, 1] - found[:, 0] >= least]
+
+
+def mask_of(found: NDArray, n: int) -> NDArray:
+    """Return the samples of stretches (runs, 2) as (n,) bool."""
+    marked = np.zeros(n, dtype=bool)
+    for start, stop in found:
+        marked[start:stop] = True
+    return marked
+
+
+def when(motion: Motion, found: NDArray) -> str:
+    """Say where in time stretches (runs, 2) lie."""
+    if len(found) == 1:
+        start, stop = found[0]
+        return f"from {motion.time[start]:.2f} s to {motion.time[stop - 1]:.2f} s"
+    first, last = motion.time[found[0, 0]], motion.time[found[-1, 1] - 1]
+    return f"{len(found)} times between {first:.2f} s and {last:.2f} s"
