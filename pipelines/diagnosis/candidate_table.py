@@ -107,7 +107,10 @@ def _judged(d: Diagnosis, labels: tuple[str, ...], score: float) -> tuple[str, s
     if len(labels) > len(best.labels) and set(best.labels) <= set(labels):
         extra = ", ".join(sorted(set(labels) - set(best.labels)))
         return "rejected", f"{extra} adds too little beside what is named"
-    return "rejected", f"it explains less than {' and '.join(best.labels)} (log likelihood {best.score - score:.1f} behind)"
+    return (
+        "rejected",
+        f"it explains less than {' and '.join(best.labels)} (log likelihood {best.score - score:.1f} behind)",
+    )
 
 
 def _absorbed(d: Diagnosis, name: str, joint: str, into: str) -> dict[str, Any]:

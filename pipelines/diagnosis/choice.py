@@ -48,6 +48,12 @@ class Choice:
     independent: NDArray
 
 
+def nothing_chosen(empty: Fit) -> Choice:
+    """Return the choice of no cause."""
+    nothing = Ranked(empty, 0.0)
+    return Choice(nothing, [], [{(): nothing}], np.zeros(len(empty.rms)))
+
+
 def choose(bank: Bank, floor: Floor) -> Choice:
     """Search, refine the finalists, and stop at the smallest set that nothing improves enough."""
     count = bank.gram.count.sum(axis=0)

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis import tables
 from pipelines.diagnosis.bank import Bank, fill, silent
-from pipelines.diagnosis.choice import Choice, Ranked, choose, probabilities, rivals
+from pipelines.diagnosis.choice import Choice, Ranked, choose, nothing_chosen, probabilities, rivals
 from pipelines.diagnosis.evaluate import evaluate, settled
+from pipelines.diagnosis.faults import Fault, excluding, find_faults
 from pipelines.diagnosis.fit import Fit, fit, stacked_columns
 from pipelines.diagnosis.floor import Floor, noise_floor
 from pipelines.diagnosis.gain import Errors, errors_of
@@ -59,6 +60,7 @@ class Diagnosis:
     residuals: pd.DataFrame
     train: tuple[Run, ...]
     validate: tuple[Run, ...]
+    faults: tuple[Fault, ...]
     strayed: dict[str, NDArray | None]
     """(J,) rad: the 1 s simulation error of the baseline and of the extended model."""
 
@@ -99,26 +101,29 @@ def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = s
     InputError
         Where there is no run to train or none to validate on.
     """
-    train, validate = _dealt(motions)
+    faults = tuple(find_faults(motions))
+    train, validate = _dealt(excluding(motions, faults))
     baseline = baseline_of(train)
     bank = fill(train, baseline, lambda share, what: report(SEARCH_SHARE * share, what))
     empty = fit((), bank.runs, baseline, bank.weights)
     validate = tuple(with_load(run, baseline, empty.values) for run in validate)
     report(SEARCH_SHARE, "combinations")
     left = [y - c @ empty.values for c, y in stacked_columns((), bank.runs, baseline)]
-    choice = choose(bank, noise_floor(bank.runs, left))
+    # Where masking does not help, physics would be blamed for what acquisition did.
+    spoilt = any(fault.samples is None for fault in faults)
+    choice = nothing_chosen(empty) if spoilt else choose(bank, noise_floor(bank.runs, left))
     before = _extended(empty, validate, baseline)
     after = _extended(choice.named.fit, validate, baseline)
     floor = noise_floor(validate, after.residuals)
     standing = _standing(before, after, floor, validate)
     if choice.named.fit.causes and not standing.held_up:
         # What the training runs promised does not hold on others: nothing is named.
-        choice = replace(choice, named=Ranked(empty, 0.0))
+        choice = replace(choice, named=nothing_chosen(empty).named)
         after, floor = before, noise_floor(validate, before.residuals)
         standing = _standing(before, before, floor, validate)
     report(0.95, "intervals")
     named = choice.named.labels
-    status = status_of(standing, bool(named), wanders(floor, len(baseline.joints)))
+    status = "unknown_cause" if spoilt else status_of(standing, bool(named), wanders(floor, len(baseline.joints)))
     sure = uncertainty(choice.named.fit, bank.runs, baseline)
     frame, covariance = tables.parameters(choice.named.fit, baseline, sure)
     plain, _ = tables.parameters(empty, baseline, uncertainty(empty, bank.runs, baseline))
@@ -128,7 +133,7 @@ def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = s
         likely={label: probabilities(rivals(choice, bank, label)) for label in named},
         standing=standing, floor=floor, sure=sure, parameters=frame, covariance=covariance,
         residuals=tables.residual_table(validate, {"baseline": before.residuals, "extended": after.residuals}),
-        train=bank.runs, validate=validate,
+        train=bank.runs, validate=validate, faults=faults,
         strayed={"baseline": _strayed(plain, empty, validate, baseline),
                  "extended": _strayed(frame, choice.named.fit, validate, baseline)},
     )  # fmt: skip

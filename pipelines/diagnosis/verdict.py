@@ -30,7 +30,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         },
         **summary_numbers(d),
         "causes": causes,
-        "data_faults": [],
+        "data_faults": [{"file": f.file, "channel": f.channel, "what": f.what} for f in d.faults],
         "runs": sorted({run.motion.run for run in d.validate}),
         "noise_floor_from": "periods" if d.floor.from_periods else "the band above the motion",
     }
@@ -98,15 +98,15 @@ def _tie(effect: Effect, other: str, probability: float, d: Diagnosis) -> dict[s
     }
 
 
-def _evidence(
-    d: Diagnosis, label: str, effect: Effect, worth: float, joint: str, alike: dict[str, float]
-) -> list[str]:
+def _evidence(d: Diagnosis, label: str, effect: Effect, worth: float, joint: str, alike: dict[str, float]) -> list[str]:
     before = d.without[label].errors.rms[d.baseline.joints.index(joint)]
     sentences = [f"it takes {worth:.2f} of {before:.2f} N·m of torque error at the {joint} on runs no fit has seen"]
     others = {k: p for k, p in d.likely[label].items() if k not in alike}
     if others:
         rival = max(others, key=lambda k: others[k])
-        sentences.append(f"the next explanation, {rival}, is {d.likely[label][label] / others[rival]:.3g} times less likely")
+        sentences.append(
+            f"the next explanation, {rival}, is {d.likely[label][label] / others[rival]:.3g} times less likely"
+        )
     sentences.append(f"it looks like {effect.looks_like}")
     sentences.append(f"to make sure: {effect.confirm}")
     return sentences
@@ -118,6 +118,10 @@ def _summary(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
     worst = int((error / floor).argmax())
     joint = d.baseline.joints[worst]
     size = f"{error[worst]:.2f} N·m at the {joint}, {error[worst] / floor[worst]:.2f} times the noise floor"
+    spoilt = [fault for fault in d.faults if fault.samples is None]
+    if spoilt:
+        more = f" (and {len(spoilt) - 1} more)" if len(spoilt) > 1 else ""
+        return f"Acquisition, not physics: {spoilt[0].file}, {spoilt[0].channel}: {spoilt[0].what}{more}."
     if d.status == "nothing_missing":
         return f"Nothing is missing that these data could show: the torque error is {size}."
     if d.status == "unknown_cause":
@@ -128,9 +132,7 @@ def _summary(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
     said = " and ".join(_in_words(cause) for cause in causes)
     after = d.after.errors.rms[worst]
     left = "which explains it" if d.status == "explained" else "and more is left that they do not explain"
-    return (
-        f"The simulation misses {said}. With it the torque error falls from {size}, to {after:.2f} N·m, {left}."
-    )
+    return f"The simulation misses {said}. With it the torque error falls from {size}, to {after:.2f} N·m, {left}."
 
 
 def _in_words(cause: dict[str, Any]) -> str:
