@@ -11,7 +11,7 @@ from exoid_cli.console import console
 
 def diagnose(
     files: Annotated[
-        list[Path], typer.Argument(help="recording/1 or motion/1 files, some to train, some to validate.")
+        list[Path], typer.Argument(help="recording/1 or motion/1 files, some to train and some to validate.")
     ],
     output: Annotated[Path, typer.Option("-o", "--out", "--output", help="Folder for verdict, tables and figures.")],
     config: Annotated[Path | None, typer.Option("--config", help="exoid.toml: geometry and [filter].")] = None,

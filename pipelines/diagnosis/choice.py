@@ -51,7 +51,7 @@ class Choice:
 def nothing_chosen(empty: Fit) -> Choice:
     """Return the choice of no cause."""
     nothing = Ranked(empty, 0.0)
-    return Choice(nothing, [], [{(): nothing}], np.zeros(len(empty.rms)))
+    return Choice(nothing, [], [{nothing.labels: nothing}], np.zeros(len(empty.rms)))
 
 
 def choose(bank: Bank, floor: Floor) -> Choice:
@@ -61,8 +61,8 @@ def choose(bank: Bank, floor: Floor) -> Choice:
     scorer = Scorer(bank, independent)
     levels = search(scorer)
     empty = fit((), bank.runs, bank.baseline, bank.weights)
-    ranked = [{(): Ranked(empty, 0.0)}]
-    named = ranked[0][()]
+    named = Ranked(empty, 0.0)
+    ranked = [{named.labels: named}]
     for level in levels:
         finalists = [_rank(bank, s, empty, independent) for s in _finalists(level)]
         ranked.append({r.labels: r for r in finalists})

@@ -32,7 +32,7 @@ class Errors:
 
 def scored(run: Run) -> NDArray:
     """Tell which samples the RMSE counts: every drive's output usable, (m,) bool."""
-    return run.usable[:, : len(run.motion.joints)].all(axis=1)
+    return np.asarray(run.usable[:, : len(run.motion.joints)].all(axis=1))
 
 
 def errors_of(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Errors:

@@ -22,7 +22,7 @@ MOST = 3
 SHAPE_COST = 2.0
 """What a shape parameter must gain, in units of log likelihood, for having been searched."""
 IMPERFECTION = (0.008, 0.02)
-"""Share of a drive's and of a cuff's torque that even a good model of a good machine leaves (DESIGN section 5, point 5)."""
+"""Share of a drive's and of a cuff's torque that even a good model of a good machine leaves."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,9 @@ class Scorer:
         self.bank, self.independent = bank, independent
         self.count = bank.gram.count.sum(axis=0)
         self.imperfect = imperfection(bank)
-        self.plain = self._held_out(())
+        plain = self._held_out(())
+        assert plain is not None, "the baseline has no sign that could be impossible"
+        self.plain = plain
 
     def __call__(self, chosen: Sequence[int]) -> Scored:
         """Score a set."""

@@ -77,9 +77,9 @@ def _add_causes(fit: Fit, baseline: Baseline, sure: Uncertainty, add) -> None:
         for k, i in enumerate(own):
             places[i] = at + len(shared) + k
         at += len(shared) + len(own) * fit.acting(cause)
-        for place, (which, i, run) in enumerate(sure.shapes):
+        for order, (which, i, run) in enumerate(sure.shapes):
             if which == number and run in (-1, 0):
-                places[len(effect.linear) + i] = len(fit.values) + place
+                places[len(effect.linear) + i] = len(fit.values) + order
         linear = [fit.values[p] if p is not None else 0.0 for p in places[: len(effect.linear)]]
         fitted = np.append(linear, cause.shapes[0])
         jacobian, physical = effect.jacobian(fitted), effect.physical(fitted)

@@ -81,7 +81,7 @@ def _of_a_run(effect: Effect, name: str) -> bool:
 def _rows(frame: pd.DataFrame, name: str, joint: str | None) -> list[dict[str, Any]]:
     here = frame["joint"].isna() if joint is None else frame["joint"] == joint
     return [
-        {k: (float(v) if k in ("value", "ci95_low", "ci95_high") else v) for k, v in row.items()}
+        {str(k): (float(v) if k in ("value", "ci95_low", "ci95_high") else v) for k, v in row.items()}
         for row in frame[(frame["effect"] == name) & here].to_dict("records")
     ]
 

@@ -42,9 +42,9 @@ class Averages:
     def body(self, reading: Reading = AS_RECORDED) -> NDArray:
         """Torque per unit of (X1 - X2, X2, X3, X4) with the angles read otherwise, (m, 2, 4)."""
         order, sign = reading
-        state = (np.ascontiguousarray(x[:, list(order)] * sign) for x in (self.q, self.dq, self.ddq))
+        q, dq, ddq = (np.ascontiguousarray(x[:, list(order)] * sign) for x in (self.q, self.dq, self.ddq))
         g = self.motion.geometry
-        return regressor(*state, g.thigh_length_m, g.gravity_m_s2) @ FROM_POSITIVE
+        return regressor(q, dq, ddq, g.thigh_length_m, g.gravity_m_s2) @ FROM_POSITIVE
 
     def joint_columns(self, joint: int, reading: Reading = AS_RECORDED) -> NDArray:
         """Columns of one joint: its share of the rigid body, Coulomb, viscous, and an offset of either sign."""
@@ -95,9 +95,8 @@ def cuff_misfit(run: Averages, cuffs: NDArray) -> float:
     """Return the share of the cuffs' torque, (m, 2, 3) N, that no limb explains; the sensors' zeros are free."""
     g = run.motion.geometry
     felt = cuff_torque(cuffs[:, 0], cuffs[:, 1], run.q, g)
-    zeros = np.stack(
-        [cuff_torque(*np.broadcast_to(unit, (len(felt), 2, 3)).transpose(1, 0, 2), run.q, g) for unit in ZEROS], -1
-    )
+    wide = [np.broadcast_to(unit, (len(felt), 2, 3)) for unit in ZEROS]
+    zeros = np.stack([cuff_torque(unit[:, 0], unit[:, 1], run.q, g) for unit in wide], -1)
     weight = 1.0 / np.maximum(felt.std(axis=0), 1e-12)
     stacked = [np.concatenate([x[:, j] * weight[j] for j in range(2)]) for x in (run.body(), felt, zeros)]
     return fit(stacked[0], stacked[1], stacked[2])[0]

@@ -51,4 +51,4 @@ def _undisturbed(motion: Motion) -> NDArray:
     """Tell which third differences lie on even stamps and samples not known to be bad, (n - 3,) bool."""
     even = np.abs(np.diff(motion.time) * motion.sample_rate_hz - 1.0) < EVEN
     good = motion.valid[1:] & motion.valid[:-1] & even
-    return np.lib.stride_tricks.sliding_window_view(good, WINDOW - 1).all(axis=1)
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(good, WINDOW - 1).all(axis=1))
