@@ -126,6 +126,8 @@ _REMEDIES = {
     errno.EDQUOT: "free some space and run the command again",
     errno.EROFS: "choose a folder that can be written to",
     errno.ENOENT: "check the name",
+    errno.EEXIST: "a file stands where a folder should; choose another name",
+    errno.ENOTDIR: "a file stands where a folder should; choose another name",
 }
 
 

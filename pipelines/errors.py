@@ -4,6 +4,10 @@ The text of each says what was found, where, what was expected, and what to do.
 Only ``exoid_cli.app`` turns them into a line on the terminal and an exit code.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
 
 class ExoidError(Exception):
     """Root of the family; on its own, a fault of exoid itself."""
@@ -33,3 +37,12 @@ class DeviceError(ExoidError):
     """A drive, a sensor, the line to it, or a safety limit stopped the work."""
 
     exit_code = 3
+
+
+@contextmanager
+def about(file: Path | str | None) -> Iterator[None]:
+    """Put before every complaint of the block which file it is about; nothing where there is none."""
+    try:
+        yield
+    except ExoidError as error:
+        raise type(error)(f"{file}: {error}" if file else str(error)) from error

@@ -20,7 +20,7 @@ from pipelines.acquisition.pace import urgent
 from pipelines.acquisition.plan import check_start, check_trajectory, make_plan
 from pipelines.contracts import RECORDING
 from pipelines.contracts.provenance import describe
-from pipelines.errors import DeviceError
+from pipelines.errors import DeviceError, about
 from pipelines.mechanics.trajectory import Trajectory, read_trajectory
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.mechanism import MechanismSettings
@@ -65,7 +65,9 @@ def acquire(
     """
     rig = load_rig(rig_path)
     trajectory = read_trajectory(trajectory_path)
-    check_trajectory(rig, trajectory, run.duration_s, sample_rate_hz)
+    with about(trajectory_path):
+        check_trajectory(rig, trajectory, run.duration_s, sample_rate_hz)
+    RECORDING.refuse_place(output)
     journal = journal_of(output)
     refuse_leftover(journal)
     metadata = _metadata(rig, run, trajectory, sample_rate_hz, mechanism or MechanismSettings())

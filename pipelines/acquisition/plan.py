@@ -116,7 +116,7 @@ def _refuse_outside(rig: RigSettings, run: NDArray, time: NDArray, rate: float) 
         if outside.any():
             k = int(np.argmax(outside))
             raise InputError(
-                f"trajectory: the {drive.joint} would be at {run[k, j]:.3f} rad at {time[k]:.3f} s, but the rig allows "
+                f"the {drive.joint} would be at {run[k, j]:.3f} rad at {time[k]:.3f} s, but the rig allows "
                 f"{low:g} to {high:g} rad (its limits less angle_margin_rad); make the excitation smaller, or design "
                 "it within the rig's limits"
             )
@@ -124,7 +124,7 @@ def _refuse_outside(rig: RigSettings, run: NDArray, time: NDArray, rate: float) 
         if fast.any():
             k = int(np.argmax(fast))
             raise InputError(
-                f"trajectory: the {drive.joint} would move at {speed[k, j]:.3f} rad/s at {time[k]:.3f} s, but the rig "
+                f"the {drive.joint} would move at {speed[k, j]:.3f} rad/s at {time[k]:.3f} s, but the rig "
                 f"allows {drive.speed_rad_s:g} rad/s; make the excitation slower or smaller"
             )
         reference = Block(registers_of(rig.map.drive[drive.map].write))

@@ -12,6 +12,7 @@ from pipelines.contracts.atomic import whole_file
 from pipelines.errors import ContractError
 
 KEY = b"exoid"
+MAGIC = b"PAR1"
 
 
 def load(path: Path) -> tuple[pa.Table, dict[str, Any]]:
@@ -22,16 +23,32 @@ def load(path: Path) -> tuple[pa.Table, dict[str, Any]]:
         table = pq.ParquetFile(path).read()
     except (pa.ArrowException, UnicodeDecodeError) as error:
         raise ContractError(f"{path}: {_what_is_wrong_with_the_bytes(path)}") from error
-    return table, _metadata(table, path)
+    return table, _metadata(table.schema, path)
 
 
 def save(path: Path, table: pa.Table, metadata: Mapping[str, Any]) -> None:
     """Write a table and its metadata under ``path``, atomically."""
-    if path.is_dir():
-        raise ContractError(f"{path}: is a folder, expected the name of a Parquet file to write")
+    refuse_place(path, metadata["contract"])
     text = to_json(metadata, str(path))
     with whole_file(path) as temporary:
+        temporary.touch()  # else Arrow would complain of the temporary name, in its own words
         pq.write_table(table.replace_schema_metadata({KEY: text.encode()}), temporary, compression="zstd")
+
+
+def refuse_place(path: Path, contract: str) -> None:
+    """Refuse to write where a folder is, or what is no older version of the same: a recording cannot be made again."""
+    if path.is_dir():
+        raise ContractError(f"{path}: is a folder, expected the name of a Parquet file to write")
+    if not path.exists() or path.stat().st_size == 0:
+        return
+    try:
+        found = _metadata(pq.ParquetFile(path).schema_arrow, path)["contract"]
+    except (pa.ArrowException, UnicodeDecodeError):
+        if _start(path) == MAGIC:
+            return  # what is left of one
+        found = "something else"
+    if found.partition("/")[0] != contract.partition("/")[0]:
+        raise ContractError(f"{path}: holds {found}, not overwritten with {contract}; choose another name or remove it")
 
 
 def to_json(metadata: Mapping[str, Any], source: str) -> str:
@@ -62,15 +79,18 @@ def _refuse_what_is_no_file(path: Path) -> None:
 
 
 def _what_is_wrong_with_the_bytes(path: Path) -> str:
+    if (start := _start(path)) != MAGIC:
+        return f"is not a Parquet file (it starts with {start!r}, expected {MAGIC!r}); name a file that exoid wrote"
+    return "is a damaged or truncated Parquet file; copy or make it again"
+
+
+def _start(path: Path) -> bytes:
     with open(path, "rb") as file:
-        start = file.read(4)
-    if start == b"PAR1":
-        return "is a damaged or truncated Parquet file; copy or make it again"
-    return f"is not a Parquet file (it starts with {start!r}, expected b'PAR1'); name a file that exoid wrote"
+        return file.read(len(MAGIC))
 
 
-def _metadata(table: pa.Table, path: Path) -> dict[str, Any]:
-    text = (table.schema.metadata or {}).get(KEY)
+def _metadata(schema: pa.Schema, path: Path) -> dict[str, Any]:
+    text = (schema.metadata or {}).get(KEY)
     if text is None:
         raise ContractError(
             f"{path}: has no `exoid` entry in its schema metadata; add one with at least "

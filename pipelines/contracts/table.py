@@ -109,6 +109,10 @@ class Contract:
         metadata = {**metadata, "contract": self.label}
         parquet.save(path, self._conform(self._to_arrow(frame, str(path)), metadata, str(path)), metadata)
 
+    def refuse_place(self, path: Path) -> None:
+        """Raise a ContractError where this table could not be written: before the work, not after it."""
+        parquet.refuse_place(path, self.label)
+
     def check(self, frame: pd.DataFrame, metadata: Mapping[str, Any], source: str = "table") -> None:
         """Raise a ContractError unless frame and metadata keep this contract; ``source`` starts its message."""
         self._conform(self._to_arrow(frame, source), {**metadata, "contract": self.label}, source)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from pipelines.contracts.table import Table
-from pipelines.errors import InputError
+from pipelines.errors import InputError, about
 from pipelines.settings.filter import FilterSettings
 from pipelines.signals.blocks import BlockAverage
 from pipelines.signals.cutoff import Cutoff, choose_cutoff
@@ -46,7 +46,8 @@ def motion_table(recording: Table, settings: FilterSettings) -> Table:
     frame, metadata = recording.frame, recording.metadata
     rate_hz = float(metadata["sample_rate_hz"])
     names = tuple(joint.name for joint in recording.joints)
-    made = differentiate(frame["time_s"].to_numpy(float), recording.stacked("angle"), rate_hz, settings, names)
+    with about(recording.path):
+        made = differentiate(frame["time_s"].to_numpy(float), recording.stacked("angle"), rate_hz, settings, names)
     columns: dict[str, Any] = {"time_s": frame["time_s"]}
     for j, joint in enumerate(recording.joints):
         columns[joint.column("angle")] = made.q[:, j]

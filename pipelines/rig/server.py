@@ -22,7 +22,7 @@ from pymodbus.constants import ExcCodes
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from pipelines.errors import DeviceError, SettingsError
+from pipelines.errors import DeviceError, SettingsError, about
 from pipelines.mechanics.motion import CUFFS
 from pipelines.registers import Block
 from pipelines.rig.plant import JOINTS, Plant, Samples
@@ -50,7 +50,8 @@ def build_plant(rig: RigSettings, path: Path, run: str, seed: int = 0, sample_ra
     if rig.plant is None:
         raise SettingsError(f"{path}: plant: missing, so there is no machine to play; add a [plant], see docs/rig.md")
     hidden = hidden_effects(path.parent / rig.plant.sealed) if rig.plant.sealed else ()
-    return Plant(rig.plant, run, seed, hidden, sample_rate_hz)
+    with about(path):
+        return Plant(rig.plant, run, seed, hidden, sample_rate_hz)
 
 
 class Device:

@@ -37,7 +37,7 @@ class Experiment(Settings):
     identify: IdentifySettings = Field(IdentifySettings(), description="Identification.")
     simulate: SimulateSettings = Field(SimulateSettings(), description="Simulation.")
 
-    _folder: Path = PrivateAttr(default=Path())
+    _path: Path = PrivateAttr(default=Path("exoid.toml"))
 
     @field_validator("run")
     @classmethod
@@ -54,16 +54,18 @@ class Experiment(Settings):
     def load(cls, path: Path | str) -> Self:
         """Return the experiment in a file; names of files in it are taken from that file's folder."""
         experiment = load_toml(path, cls)
-        experiment._folder = Path(path).parent
+        experiment._path = Path(path)
         return experiment
 
     def file(self, name: str) -> Path:
         """Return the path of a file that the settings name."""
-        return self._folder / name
+        return self._path.parent / name
 
     def run_named(self, name: str) -> RunSettings:
         """Return one run's settings by its name."""
         for run in self.run:
             if run.name == name:
                 return run
-        raise SettingsError(f"run {name}: no such [[run]]; {suggestion(name, [run.name for run in self.run])}")
+        raise SettingsError(
+            f"{self._path}: has no [[run]] named {name}; {suggestion(name, [run.name for run in self.run])}"
+        )

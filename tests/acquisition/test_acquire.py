@@ -80,4 +80,7 @@ def test_real_time_samples_come_on_the_devices_clock(record):
     assert len(frame) + missed == 100
     assert missed <= 5  # a computer that is busy with something else may miss some, and then says so
     assert_allclose(np.diff(frame["time_s"]), np.diff(frame["sequence"]) / 50, atol=2e-6)
-    assert frame.notna().all(axis=None)
+    # A sensor that is asked late finds the next sample, and has nothing new a cycle later.
+    is_force = frame.columns.str.contains("_force_")
+    assert frame.loc[:, ~is_force].notna().all(axis=None)
+    assert frame.loc[:, is_force].isna().any(axis=1).sum() <= 5

@@ -167,7 +167,7 @@ def test_a_trajectory_outside_the_limits_is_refused_before_anything_moves(record
     served = []
     with pytest.raises(InputError) as caught:
         record(served_as=served, replace={"angle_rad = [-0.35, 1.75]": "angle_rad = [-0.35, 0.6]"})
-    assert str(caught.value).startswith("trajectory: the hip would be at 0.58")
+    assert "excitation.toml: the hip would be at 0.58" in str(caught.value)
     assert "but the rig allows -0.33 to 0.58 rad (its limits less angle_margin_rad)" in str(caught.value)
     assert served[0].rig.sample.sequence[0] == 0
 

@@ -312,6 +312,22 @@ def test_the_covariance_has_a_row_for_each_parameter():
     )
 
 
+def test_nothing_but_an_older_version_of_itself_is_overwritten(tmp_path, swinging_leg, run_metadata):
+    path, notes, left_over = (tmp_path / name for name in ("a.parquet", "notes.txt", "cut.parquet"))
+    RECORDING.write(path, swinging_leg, run_metadata)
+    RECORDING.write(path, swinging_leg, run_metadata)
+    notes.write_text("a month of work")
+    left_over.write_bytes(path.read_bytes()[:-100])
+    RECORDING.write(left_over, swinging_leg, run_metadata)
+    assert refusal(MOTION.refuse_place, path) == (
+        f"{path}: holds recording/1, not overwritten with motion/1; choose another name or remove it"
+    )
+    assert refusal(RECORDING.write, notes, swinging_leg, run_metadata) == (
+        f"{notes}: holds something else, not overwritten with recording/1; choose another name or remove it"
+    )
+    assert notes.read_text() == "a month of work"
+
+
 @pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
 def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(
     tmp_path, swinging_leg, run_metadata, monkeypatch, error

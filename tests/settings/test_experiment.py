@@ -98,5 +98,5 @@ def test_what_is_no_toml_is_refused(tmp_path, content, told):
 
 
 def test_an_unknown_run_is_told_with_the_known_ones():
-    with pytest.raises(SettingsError, match="run with_human: no such"):
+    with pytest.raises(SettingsError, match=r"exoid\.toml: has no \[\[run\]\] named with_human; "):
         Experiment().run_named("with_human")
