@@ -14,10 +14,10 @@ from pipelines.diagnosis.choice import Choice, Ranked, choose, nothing_chosen, p
 from pipelines.diagnosis.evaluate import evaluate, settled
 from pipelines.diagnosis.faults import Fault, excluding, find_faults
 from pipelines.diagnosis.fit import Fit, fit, stacked_columns
-from pipelines.diagnosis.floor import Floor, noise_floor
+from pipelines.diagnosis.floor import Floor, noise_floor, slow_scatter
 from pipelines.diagnosis.gain import Errors, errors_of
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, observe, with_load
-from pipelines.diagnosis.status import Standing, status_of, wanders
+from pipelines.diagnosis.status import WANDERING, Standing, status_of
 from pipelines.diagnosis.uncertainty import Uncertainty, uncertainty
 from pipelines.dynamics.replay import replay
 from pipelines.errors import ExoidError, InputError
@@ -123,7 +123,9 @@ def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = s
         standing = _standing(before, before, floor, validate)
     report(0.95, "intervals")
     named = choice.named.labels
-    status = "unknown_cause" if spoilt else status_of(standing, bool(named), wanders(floor, len(baseline.joints)))
+    scatter = slow_scatter(validate, after.residuals)[: len(baseline.joints)]
+    wandering = bool(np.any(scatter > WANDERING))
+    status = "unknown_cause" if spoilt else status_of(standing, bool(named), wandering)
     sure = uncertainty(choice.named.fit, bank.runs, baseline)
     frame, covariance = tables.parameters(choice.named.fit, baseline, sure)
     plain, _ = tables.parameters(empty, baseline, uncertainty(empty, bank.runs, baseline))

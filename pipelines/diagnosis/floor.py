@@ -19,8 +19,6 @@ class Floor:
     """N·m."""
     independent_share: NDArray
     """Independent samples per sample: noise resembles itself from block to block."""
-    slow_share: NDArray
-    """Power density of the scatter below 1 Hz over that between 2 and 6 Hz."""
     from_periods: bool
 
 
@@ -36,7 +34,7 @@ def noise_floor(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Floor:
     else:
         from_periods = True
     outputs = residuals[0].shape[1]
-    rms, share, slow = np.full(outputs, np.nan), np.ones(outputs), np.ones(outputs)
+    rms, share = np.full(outputs, np.nan), np.ones(outputs)
     for o in range(outputs):
         d = [p[:, o] for p in pairs if len(p)]
         known = np.concatenate(d)
@@ -44,9 +42,17 @@ def noise_floor(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Floor:
         if len(known) > 20:
             rms[o] = np.sqrt(np.mean(known**2))
             share[o] = 1.0 / _correlation_time(d)
-            rate = runs[0].motion.sample_rate_hz / runs[0].block.decimation
-            slow[o] = _slow_share(d, rate) if from_periods else 1.0
-    return Floor(rms, share, slow, from_periods)
+    return Floor(rms, share, from_periods)
+
+
+def slow_scatter(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray:
+    """Return the scatter's power density below 1 Hz over that between 2 and 6 Hz, for each output, (O,).
+
+    About 1 for a sensor's noise; many times that where a person or a drift does not repeat; 1 without periods.
+    """
+    pairs = [_differences(run, residual) for run, residual in zip(runs, residuals, strict=True)]
+    rate = runs[0].motion.sample_rate_hz / runs[0].block.decimation
+    return np.array([_slow_share([p[:, o] for p in pairs], rate) for o in range(residuals[0].shape[1])])
 
 
 def _differences(run: Run, residual: NDArray) -> NDArray:

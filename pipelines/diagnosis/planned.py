@@ -56,4 +56,4 @@ def planned_noise(noise: NoiseSettings, rate_hz: float, block: BlockAverage) -> 
     variance = (1.0 + 2.0 * np.sum((1.0 - lags / D) * rho**lags)) / D
     integral = (1.0 + rho) / (1.0 - rho) / D
     rms = np.array([noise.hip_nm, noise.knee_nm]) * np.sqrt(variance)
-    return Floor(np.append(rms, [np.nan, np.nan]), np.full(4, variance / integral), np.ones(4), from_periods=False)
+    return Floor(np.append(rms, [np.nan, np.nan]), np.full(4, variance / integral), from_periods=False)

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.floor import Floor
-
 AT_FLOOR = 1.03
 """RMSE over floor up to which a joint has no systematic error (CONTRACTS, verdict/1)."""
 EXPLAINED = 0.2
@@ -18,7 +16,7 @@ SIGNIFICANT = 3.0
 MATERIAL = 1.08
 """RMSE over floor from which an error that nothing explains is worth an alarm."""
 WANDERING = 3.0
-"""Slow scatter between periods over fast scatter from which something moves that does not repeat."""
+"""Slow over fast scatter between periods from which something moves that does not repeat."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +61,3 @@ def status_of(standing: Standing, named: bool, wandering: bool) -> str:
         return "unknown_cause" if alarmed else "nothing_missing"
     left = [share for share in standing.unexplained if share is not None]
     return "explained" if all(share <= EXPLAINED for share in left) else "partly_explained"
-
-
-def wanders(floor: Floor, joints: int) -> bool:
-    """Tell whether what does not repeat moves slowly: a person, a drift, not a sensor's noise."""
-    return bool(np.any(floor.slow_share[:joints] > WANDERING))
