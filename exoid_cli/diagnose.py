@@ -23,6 +23,7 @@ def diagnose(
     from pipelines.contracts import CANDIDATES, PARAMETERS, RESIDUALS, describe
     from pipelines.contracts.atomic import write_text
     from pipelines.diagnosis.candidate_table import candidates
+    from pipelines.diagnosis.detect import as_json, detectability
     from pipelines.diagnosis.diagnose import diagnose as find
     from pipelines.diagnosis.verdict import verdict
     from pipelines.mechanics.read import geometry_from, read_motions
@@ -45,6 +46,8 @@ def diagnose(
     RESIDUALS.write(output / "residuals.parquet", found.residuals, shared)
     CANDIDATES.write(output / "candidates.parquet", candidates(found), shared)
     write_text(output / "verdict.json", json.dumps(said | {"provenance": shared}, indent=1, ensure_ascii=False) + "\n")
+    visible = as_json(detectability(found.train, found.baseline, found.floor))
+    write_text(output / "detectability.json", json.dumps(visible, indent=1, ensure_ascii=False) + "\n")
     console.emit(said)
     _show(said, output)
 
@@ -74,4 +77,4 @@ def _show(said: dict[str, Any], output: Path) -> None:
         for tie in cause["indistinguishable_from"]:
             other = f"{tie['effect']}@{tie['joint']}" if tie["joint"] else tie["effect"]
             console.say(f"  or {other}: {tie['why']}; {tie['how_to_separate']}")
-    console.say(f"\n{output}: verdict.json, parameters, residuals, candidates")
+    console.say(f"\n{output}: verdict.json, parameters, residuals, candidates, detectability.json")
