@@ -132,6 +132,35 @@ def test_parameters_are_no_motion(exoid, recordings, tmp_path):
     assert "holds parameters/1, expected motion/1" in outcome.err
 
 
+def test_a_recording_is_not_overwritten_by_its_motion(exoid, recordings, tmp_path):
+    file = tmp_path / "run.parquet"
+    file.write_bytes((recordings / "exo_alone_train.parquet").read_bytes())
+    outcome = exoid("filter", file, "-o", file)
+    assert outcome.code == 2
+    assert "holds recording/1, not overwritten with motion/1" in outcome.err
+    assert RECORDING.read(file).metadata["run"] == "exo_alone"
+
+
+def test_an_output_that_cannot_be_written_ends_in_one_line_that_names_it(exoid, recordings, tmp_path):
+    recording = recordings / "exo_alone_train.parquet"
+    (tmp_path / "file").write_text("in the way")
+    inside = tmp_path / "file" / "motion.parquet"
+    for output, words in {tmp_path: "is a folder", inside: "a file stands where a folder should"}.items():
+        outcome = exoid("filter", recording, "-o", output)
+        assert outcome.code == 2
+        assert outcome.err.count("\n") == 1
+        assert f"{tmp_path}" in outcome.err
+        assert words in outcome.err
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_settings_that_are_not_there_end_in_one_line(exoid, recordings, tmp_path):
+    outcome = exoid("filter", recordings / "exo_alone_train.parquet", "-o", tmp_path / "m", "--config", "none.toml")
+    assert (outcome.code, outcome.err.count("\n")) == (2, 1)
+    assert "none.toml: no such file" in outcome.err
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_one_run_only_and_no_empty_run_are_refused(exoid, recordings, tmp_path):
     alone = exoid("identify", recordings / "exo_alone_train.parquet", "-o", tmp_path)
     assert alone.code == 2

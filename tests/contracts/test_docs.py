@@ -8,7 +8,8 @@ import pytest
 from pipelines.contracts import CONTRACTS
 from pipelines.contracts.joints import QUANTITIES
 
-PAGE = (Path(__file__).parents[2] / "docs" / "contracts.md").read_text(encoding="utf-8")
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = (DOCS / "contracts.md").read_text(encoding="utf-8")
 EXPANDED = PAGE.replace("{thigh,shank}_{front,back}_force_{x,y,z}_n", "cuff") + "angle velocity acceleration"
 
 
@@ -23,3 +24,9 @@ def test_every_table_and_column_is_documented(contract):
             assert patterns.revolute.format(joint="*") in PAGE or column.name in EXPANDED
         else:
             assert f"`{column.name}`" in PAGE
+
+
+def test_every_page_stands_in_the_index():
+    pages = {path.name for path in DOCS.glob("*.md")} - {"README.md"}
+    index = (DOCS / "README.md").read_text(encoding="utf-8")
+    assert {page for page in pages if f"({page})" not in index} == set()

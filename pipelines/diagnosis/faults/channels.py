@@ -51,6 +51,9 @@ def _repeated(motion: Motion) -> Iterator[Fault]:
         return
     same = np.zeros(motion.torque.shape, dtype=bool)
     same[1:] = (np.diff(motion.measured_angle, axis=0) == 0) & (np.diff(motion.torque, axis=0) == 0)
+    for j, torque in enumerate(motion.torque.T):
+        # A torque that stands for longer is stuck, whatever the angle does.
+        same[:, j] &= ~mask_of(constant_stretches(torque, round(STUCK_TORQUE_S * motion.sample_rate_hz)), len(torque))
     step = np.abs(motion.dq) / motion.sample_rate_hz
     sure = same & (step > COUNTS * np.array([_count_of(angle) for angle in motion.measured_angle.T]))
     stale = [j for j in range(len(motion.joints)) if sure[:, j].sum() >= STALE]

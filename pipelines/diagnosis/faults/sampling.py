@@ -16,21 +16,25 @@ UNEVEN = 0.05
 """Of a sample period, rms, of instants that stray. Sticking joints and impacts reach 0.01."""
 EVEN = 0.04
 """Of a sample period: a stamp that strays more is another fault, and says so itself."""
-SURE = 6.0
+SURE = 5.0
 """Standard errors."""
 WINDOW = 4
 """Samples that make a third difference."""
 SPREAD = 20.0
 """Variance of the third difference of independent numbers: 1 + 9 + 9 + 1."""
-BLOCK = 100
-"""Neighbouring differences share samples; sums over so many are independent."""
+BLOCK = 20
+"""Neighbouring differences share samples; sums over so many are nearly independent."""
+LEAST = 1000
+"""Differences that a verdict needs."""
 
 
 def sampling_faults(motion: Motion) -> Iterator[Fault]:
     """Yield what two joints' angles say together of the instants at which they were taken."""
-    if motion.measured_angle is None or motion.q.shape[1] < 2 or len(motion) < WINDOW * BLOCK:
+    if motion.measured_angle is None or motion.q.shape[1] < 2 or len(motion) < WINDOW:
         return
     trusted = _undisturbed(motion)
+    if trusted.sum() < LEAST:
+        return
     rough = np.diff(motion.measured_angle[:, :2], 3, axis=0)[trusted]
     speeds = np.prod(motion.dq[2:-1, :2][trusted], axis=1)
     alike = np.prod(rough, axis=1) * speeds

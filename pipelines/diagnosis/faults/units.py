@@ -24,6 +24,8 @@ IMPOSSIBLE = 30.0
 """Times that mass moment, or a part of it: no leg."""
 EXPLAINED = 0.7
 """Of the torque's power by rigid body and friction: below, a joint is no witness of anything's size."""
+NOTHING = 1e-4
+"""No unit is as far from N·m as this: the channels contradict each other in another way."""
 LAW_HOLDS = 0.8
 """Of the torque's power that a position loop must explain before its gain is compared."""
 LARGEST_ANGLE_RAD = np.pi
@@ -117,15 +119,17 @@ def _against_the_other_joint(run: Averages) -> dict[int, tuple[float, str]]:
     """Return the joints whose torque is in another unit, judged by the shank, which both drives carry."""
     moment, scale = shank(run)
     typical = SHANK_KG_M[run.motion.run]
-    if moment <= 0.0 or any(fit(run.joint_columns(j), run.torque[:, j])[0] > 1.0 - EXPLAINED for j in range(2)):
+    if min(moment, scale) < NOTHING or any(
+        fit(run.joint_columns(j), run.torque[:, j])[0] > 1.0 - EXPLAINED for j in range(2)
+    ):
         return {}
     by_knee, by_hip = moment / typical, scale * moment / typical
     if 1 / WRONG_BETWEEN_JOINTS < scale < WRONG_BETWEEN_JOINTS:
         if 1 / IMPOSSIBLE < by_knee < IMPOSSIBLE:
             return {}
         return {j: (by_knee, "the weight of a leg") for j in range(2)}
-    if abs(np.log(by_knee)) > abs(np.log(max(by_hip, 1e-6))):
-        return {1: (1 / max(scale, 1e-6), "the hip, which carries the same shank")}
+    if abs(np.log(by_knee)) > abs(np.log(by_hip)):
+        return {1: (1 / scale, "the hip, which carries the same shank")}
     return {0: (scale, "the knee, which carries the same shank")}
 
 

@@ -22,8 +22,9 @@ from pipelines.diagnosis.faults.body import (
 from pipelines.diagnosis.faults.fault import WHOLE_ROW, Fault, column
 from pipelines.mechanics.motion import CUFFS, Motion
 
-FAR_BETTER = 0.25
-"""Of the power that is left: missing physics of a quarter of the torque changes it by a few tenths."""
+FAR_BETTER = 0.5
+"""By which the power left unexplained must fall for each channel said to be wrong: the more channels, the less
+likely. Missing physics of a quarter of the torque changes it by a few tenths."""
 FOLLOWS = 0.9
 """Correlation of an angle with its set-point."""
 SIGN, SWAP = "reversed", "exchanged"
@@ -42,12 +43,16 @@ WIRINGS: tuple[Wiring, ...] = (
     (AS_RECORDED, CROSSED, (1.0, 1.0), BOTH_TORQUES, SWAP),
     (EXCHANGED, STRAIGHT, (1.0, 1.0), BOTH_ANGLES, SWAP),
     (EXCHANGED, CROSSED, (1.0, 1.0), BOTH_ANGLES + BOTH_TORQUES, SWAP),
-    # The equations are odd: a reversed hip is a reversed knee with all torques reversed.
+    # The equations are odd: a reversed hip is a reversed knee with all torques reversed, a hip reversed in both
+    # channels cannot be told from such a knee, nor both angles from both torques.
     (KNEE_REVERSED, STRAIGHT, (1.0, 1.0), ((KNEE, "angle"),), SIGN),
     (KNEE_REVERSED, STRAIGHT, (-1.0, -1.0), ((HIP, "angle"),), SIGN),
     (KNEE_REVERSED, STRAIGHT, (1.0, -1.0), ((KNEE, "angle"), (KNEE, "torque")), SIGN),
-    (KNEE_REVERSED, STRAIGHT, (-1.0, 1.0), ((HIP, "angle"), (HIP, "torque")), SIGN),
 )
+MIRROR_IMAGES = {
+    BOTH_TORQUES: "both angles",
+    ((KNEE, "angle"), (KNEE, "torque")): "the hip's angle and torque",
+}
 
 
 def angle_faults(motion: Motion) -> Iterator[Fault]:
@@ -83,13 +88,15 @@ def wiring_faults(run: Averages) -> Iterator[Fault]:
         reading, channels, signs, *_ = wiring
         return sum(left[reading, j, channels[j], signs[j]] for j in (HIP, KNEE)) / 2
 
-    as_recorded, best = WIRINGS[0], min(WIRINGS, key=misfit)
-    if misfit(best) >= FAR_BETTER * misfit(as_recorded):
+    as_recorded, best = WIRINGS[0], min(WIRINGS, key=lambda wiring: misfit(wiring) / FAR_BETTER ** len(wiring[3]))
+    if best is as_recorded:
         return
     why = (
         f"rigid body and friction leave {_percent(misfit(best))} of the torques' power unexplained that way, "
         f"{_percent(misfit(as_recorded))} as recorded"
     )
+    if best[4] == SIGN and (mirror := MIRROR_IMAGES.get(best[3])):
+        why += f" (so they would with {mirror} reversed instead: a mirror image)"
     say = _reversed if best[4] == SIGN else _exchanged
     yield say(run.motion, best[3], why)
 
@@ -107,7 +114,7 @@ def cuff_faults(run: Averages) -> Iterator[Fault]:
     as_recorded = cuff_misfit(run, run.cuffs)
     misfits = {what: cuff_misfit(run, cuffs) for what, cuffs in readings.items()}
     best = min(misfits, key=misfits.__getitem__)
-    if misfits[best] < FAR_BETTER * as_recorded:
+    if misfits[best] < FAR_BETTER**2 * as_recorded:
         chosen = [cuff for cuff in CUFFS if "all" in best or "exchanged" in best or cuff.split("_")[0] in best]
         yield Fault(
             run.motion.file,

@@ -1,0 +1,241 @@
+"""Faults of acquisition are named, and physics is not mistaken for one.
+
+The plant's recordings are sound; each test spoils one in the way its name says.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pipelines.contracts.table import Table
+from pipelines.diagnosis.faults import excluding, find_faults
+from pipelines.mechanics.fourier import FourierTrajectory
+from pipelines.mechanics.kinematics import motion_table
+from pipelines.mechanics.motion import CUFFS, Motion, motion_from_table
+from pipelines.rig.plant import Plant
+from pipelines.rig.record import record
+from pipelines.settings.filter import FilterSettings
+from pipelines.settings.plant import PlantSettings
+from tests.effects.catalogue import TERMS
+
+RICH = FourierTrajectory(
+    omega=0.2 * np.pi,
+    theta0=np.array([0.65, -0.93]),
+    a=np.array([[0.22, -0.16, 0.10], [0.12, 0.24, -0.11]]),
+    b=np.array([[0.10, 0.12, -0.07], [-0.22, 0.08, 0.10]]),
+)
+"""Three harmonics that move both joints through most of their range."""
+KINDS = ("exo_alone", "with_human")
+SPOILED = 1
+"""The run with the person, which has all channels."""
+WITNESSES = ("hip_reference_rad", "knee_reference_rad", "sequence")
+"""Columns that a lab may not have, and that give many a fault away."""
+
+
+def recordings(settings: PlantSettings, seed: int = 0) -> list[tuple[pd.DataFrame, dict]]:
+    return [record(Plant(settings, kind, seed=seed + i), RICH, 30.0) for i, kind in enumerate(KINDS)]
+
+
+def motion(frame: pd.DataFrame, metadata: dict, name: str) -> Motion:
+    return motion_from_table(motion_table(Table(frame, metadata, Path(name)), FilterSettings()))
+
+
+@pytest.fixture(scope="module")
+def sound():
+    return recordings(PlantSettings())
+
+
+@pytest.fixture(params=[True, False], ids=["all_columns", "only_the_needed_columns"])
+def session(request, sound):
+    """Frames and metadata of a sound session that a test may spoil."""
+    copies = [(frame.copy(), dict(metadata)) for frame, metadata in sound]
+    if not request.param:
+        copies = [
+            (f.drop(columns=list(WITNESSES)), {k: v for k, v in m.items() if k != "controller"}) for f, m in copies
+        ]
+    return copies
+
+
+def faults_of(session):
+    return find_faults([motion(*run, f"{kind}.parquet") for run, kind in zip(session, KINDS, strict=True)])
+
+
+def only_fault(session):
+    """Return the one fault, which must be the spoiled run's."""
+    found = faults_of(session)
+    assert [fault.file for fault in found] == ["with_human.parquet"], [fault.what for fault in found]
+    return found[0]
+
+
+def test_a_sound_session_has_no_fault(session):
+    assert faults_of(session) == []
+
+
+def test_a_gap_is_named_with_its_length_and_place(session):
+    frame, metadata = session[SPOILED]
+    session[SPOILED] = frame.drop(index=range(2000, 2300)).reset_index(drop=True), metadata
+    fault = only_fault(session)
+    assert fault.channel == "time_s"
+    assert "1 gap" in fault.what and "300 missing samples (1.50 s) after 10.00 s" in fault.what
+
+
+def test_samples_dropped_one_by_one_are_counted_and_leave_the_run_usable(session):
+    frame, metadata = session[SPOILED]
+    lost = np.arange(50, len(frame) - 50, 40)
+    session[SPOILED] = frame.drop(index=lost).reset_index(drop=True), metadata
+    fault = only_fault(session)
+    assert f"{len(lost)} dropped samples" in fault.what
+    assert motion(*session[SPOILED], "x").valid.mean() > 0.9
+
+
+def test_late_stamps_are_jitter_and_not_gaps(session):
+    frame, _ = session[SPOILED]
+    rng = np.random.default_rng(1)
+    frame["time_s"] += np.minimum(rng.exponential(1e-3, len(frame)), 4.5e-3)
+    fault = only_fault(session)
+    assert fault.what.startswith("clock jitter: irregular") and "only the stamps are wrong" in fault.what
+
+
+def test_samples_taken_unevenly_under_even_stamps_are_jitter(session):
+    frame, _ = session[SPOILED]
+    count = np.arange(len(frame))
+    taken = count + np.random.default_rng(2).normal(0.0, 0.2, len(frame))
+    for name in set(frame.columns) - {"time_s", "sequence"}:
+        frame[name] = np.interp(taken, count, frame[name])
+    assert only_fault(session).what.startswith("clock jitter: the stamps are even")
+
+
+def test_a_clock_five_percent_slow_is_named_with_the_true_rate(session):
+    session[SPOILED][0]["time_s"] *= 1.05
+    assert "190.48 Hz in place of 200 Hz" in only_fault(session).what
+
+
+def test_a_counter_that_starts_anew_is_named(sound):
+    session = [(frame.copy(), metadata) for frame, metadata in sound]
+    session[SPOILED][0].loc[3000:, "sequence"] -= 3000
+    fault = only_fault(session)
+    assert fault.channel == "sequence" and "goes back 1 time, first at 15.00 s" in fault.what
+
+
+def test_stale_rows_are_counted_and_marked(session):
+    frame, _ = session[SPOILED]
+    stale = np.arange(100, len(frame), 17)
+    values = [name for name in frame.columns if name not in ("time_s", "sequence")]
+    frame.loc[stale, values] = frame.loc[stale - 1, values].to_numpy()
+    fault = only_fault(session)
+    assert f"{len(stale)} repeated samples" in fault.what and fault.channel == "all channels"
+    assert set(np.flatnonzero(fault.samples)) == set(stale)
+
+
+@pytest.mark.parametrize("joint", ["hip", "knee"])
+def test_a_stuck_encoder_is_named_and_its_samples_excluded(session, joint):
+    frame, metadata = session[SPOILED]
+    name = f"{joint}_angle_rad"
+    frame.loc[2000:2600, name] = frame.loc[2000, name]
+    fault = only_fault(session)
+    assert fault.channel == name and "stuck" in fault.what
+    assert fault.samples[2000:2601].all() and fault.samples.sum() < 800
+    left = excluding([motion(frame, metadata, "with_human.parquet")], [fault])[0]
+    assert not left.valid[2000:2601].any() and left.valid.sum() > 4500
+
+
+def test_a_stuck_torque_is_not_taken_for_stale_samples(session):
+    frame, _ = session[SPOILED]
+    frame.loc[2000:2300, "knee_torque_nm"] = frame.loc[2000, "knee_torque_nm"]
+    fault = only_fault(session)
+    assert fault.channel == "knee_torque_nm" and "stuck" in fault.what
+
+
+def test_a_clipped_torque_is_saturated_at_its_limit(session):
+    frame, _ = session[SPOILED]
+    limit = round(float(frame["hip_torque_nm"].abs().quantile(0.9)), 2)
+    frame["hip_torque_nm"] = frame["hip_torque_nm"].clip(-limit, limit)
+    fault = only_fault(session)
+    assert fault.channel == "hip_torque_nm" and "saturated" in fault.what and f"{limit:.4g} N·m" in fault.what
+    assert (frame["hip_torque_nm"].abs()[fault.samples] == limit).all()
+
+
+@pytest.mark.parametrize("joint", ["hip", "knee"])
+@pytest.mark.parametrize("quantity", ["torque_nm", "angle_rad"])
+def test_a_reversed_sign_is_named_at_its_channel(session, joint, quantity):
+    name = f"{joint}_{quantity}"
+    session[SPOILED][0][name] *= -1.0
+    fault = only_fault(session)
+    assert fault.channel == name and "reversed" in fault.what
+
+
+def test_both_torques_reversed_are_told_apart_from_neither(session):
+    session[SPOILED][0][["hip_torque_nm", "knee_torque_nm"]] *= -1.0
+    assert "hip_torque_nm and knee_torque_nm is reversed" in only_fault(session).what
+
+
+@pytest.mark.parametrize("quantity", ["torque_nm", "angle_rad"])
+def test_exchanged_joints_are_named(session, quantity):
+    frame, _ = session[SPOILED]
+    names = [f"hip_{quantity}", f"knee_{quantity}"]
+    frame[names] = frame[names[::-1]].to_numpy()
+    assert f"{names[0]} and {names[1]} are swapped" in only_fault(session).what
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "N·mm"), (1e2, "N·cm"), (1 / 9.80665, "kgf·m")])
+@pytest.mark.parametrize("joint", ["hip", "knee"])
+def test_a_torque_in_another_unit_is_named_with_the_unit(session, joint, factor, unit):
+    name = f"{joint}_torque_nm"
+    session[SPOILED][0][name] *= factor
+    fault = only_fault(session)
+    assert fault.channel == name and "unit" in fault.what
+    assert unit in fault.what
+
+
+def test_an_angle_in_degrees_is_named(session):
+    session[SPOILED][0]["knee_angle_rad"] *= 180 / np.pi
+    fault = only_fault(session)
+    assert fault.channel == "knee_angle_rad" and "degrees" in fault.what
+
+
+def test_one_run_at_four_times_the_scale_of_its_like_is_named_without_any_other_witness():
+    session = [record(Plant(PlantSettings(), "exo_alone", seed=i), RICH, 30.0) for i in range(2)]
+    session = [(f.drop(columns=list(WITNESSES)), {k: v for k, v in m.items() if k != "controller"}) for f, m in session]
+    session[SPOILED][0][["hip_torque_nm", "knee_torque_nm"]] *= 4.0
+    found = faults_of(session)
+    assert [fault.channel for fault in found] == ["hip_torque_nm", "knee_torque_nm"]
+    assert all("unit" in fault.what and "another run" in fault.what for fault in found)
+
+
+def test_a_dead_force_channel_is_named(session):
+    session[SPOILED][0]["shank_front_force_y_n"] = 0.0
+    fault = only_fault(session)
+    assert fault.channel == "shank_front_force_y_n" and "dead" in fault.what
+
+
+def test_cuffs_of_thigh_and_shank_exchanged_are_named(session):
+    frame, _ = session[SPOILED]
+    names = [f"{cuff}_force_{axis}_n" for cuff in CUFFS for axis in "xyz"]
+    frame[names] = frame[names[6:] + names[:6]].to_numpy()
+    assert "thigh and shank are exchanged" in only_fault(session).what
+
+
+@pytest.mark.parametrize("spoil", ["gain", "offset", "drift", "noise"])
+def test_what_physics_can_do_to_a_torque_is_no_fault(session, spoil):
+    frame, _ = session[SPOILED]
+    torque = frame["knee_torque_nm"]
+    frame["knee_torque_nm"] = {
+        "gain": 1.3 * torque,
+        "offset": torque + 3.0,
+        "drift": torque + 0.1 * frame["time_s"],
+        "noise": torque + np.random.default_rng(3).normal(0.0, 3.0, len(frame)),
+    }[spoil]
+    assert faults_of(session) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "term",
+    [t for t in TERMS if t.effect.name not in ("rigid_body", "friction")],
+    ids=lambda t: f"{t.effect.name}@{t.effect.joint}",
+)
+def test_no_effect_of_the_catalogue_is_taken_for_a_fault(term):
+    made = [record(Plant(PlantSettings(), kind, i, (term,)), RICH, 30.0) for i, kind in enumerate(KINDS)]
+    assert [fault.what for fault in faults_of(made)] == []
