@@ -20,6 +20,7 @@ from exoid_cli.acquire import acquire
 from exoid_cli.console import console
 from exoid_cli.design import design
 from exoid_cli.detect import detect
+from exoid_cli.diagnose import diagnose
 from exoid_cli.effects import effects
 from exoid_cli.filter import filter_
 from exoid_cli.identify import identify
@@ -46,6 +47,7 @@ app.command("design", short_help="Search an excitation, or judge a given one.")(
 app.command("acquire", short_help="Move the leg along an excitation; record every sample.")(acquire)
 app.command("filter", short_help="Filter a recording's angles and differentiate them.")(filter_)
 app.command("identify", short_help="Fit the leg's parameters; judge them on other runs.")(identify)
+app.command("diagnose", short_help="Name what the model gets wrong, and measure the gain.")(diagnose)
 app.command("simulate", short_help="Simulate the identified leg, or replay a recording.")(simulate)
 app.command("show", short_help="Say what a file is, and what is in it.")(show)
 app.command("effects", short_help="List the effects a model can have, or explain one.")(effects)

@@ -12,6 +12,11 @@ from pipelines.diagnosis.observations import Baseline, Run, with_load
 from pipelines.diagnosis.scan import Scan, worth_a_look
 
 PASSES = 3
+Report = Callable[[float, str], None]
+
+
+def silent(share: float, what: str) -> None:
+    """Report to nobody."""
 
 
 @dataclass(frozen=True)

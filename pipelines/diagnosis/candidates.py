@@ -123,7 +123,7 @@ def signatures(
 
 
 def torque_columns(candidate: Candidate, number: int, run: Run) -> NDArray:
-    """Return a torque effect's columns in one run, (m, O, k): in the drives, in the cuffs where a person makes it."""
+    """Return a torque effect's columns in one run, (m, O, k): in the drives, and in the cuffs where a person has it."""
     effect = candidate.effect
     own = run.average(effect.columns(run.motion, candidate.shapes[number]))
     return np.concatenate([own, own if effect.on_limb else np.zeros_like(own)], axis=1)

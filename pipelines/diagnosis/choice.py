@@ -1,6 +1,5 @@
 """Which set of causes is named, how likely each is, and what cannot be told from it."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,15 +8,15 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.bank import Bank
 from pipelines.diagnosis.fit import Fit, fit, refined
 from pipelines.diagnosis.floor import Floor
-from pipelines.diagnosis.search import SHAPE_COST, Scored, Scorer, search
+from pipelines.diagnosis.search import Scored, Scorer, cost, imperfection, log_likelihood, search
 
 MOST_INDEPENDENT = 1 / 6
 """Of 25 ms blocks: what a model leaves of a leg is never white (DESIGN section 5)."""
 NEEDED = 6.0
 """Log likelihood that one more cause must gain."""
-MATERIAL = 0.03
+MATERIAL = 0.02
 """Share of a joint's error that one more cause must take away."""
-FINALISTS = 4
+FINALISTS = 3
 """Sets of each size whose shapes are refined before they are compared."""
 BEHIND = 30.0
 """Log likelihood behind the best at which a set is no finalist."""
@@ -49,6 +48,12 @@ class Choice:
     independent: NDArray
 
 
+def nothing_chosen(empty: Fit) -> Choice:
+    """Return the choice of no cause."""
+    nothing = Ranked(empty, 0.0)
+    return Choice(nothing, [], [{nothing.labels: nothing}], np.zeros(len(empty.rms)))
+
+
 def choose(bank: Bank, floor: Floor) -> Choice:
     """Search, refine the finalists, and stop at the smallest set that nothing improves enough."""
     count = bank.gram.count.sum(axis=0)
@@ -56,8 +61,8 @@ def choose(bank: Bank, floor: Floor) -> Choice:
     scorer = Scorer(bank, independent)
     levels = search(scorer)
     empty = fit((), bank.runs, bank.baseline, bank.weights)
-    ranked: list[dict[tuple[str, ...], Ranked]] = [{(): Ranked(empty, 0.0)}]
-    named = ranked[0][()]
+    named = Ranked(empty, 0.0)
+    ranked = [{named.labels: named}]
     for level in levels:
         finalists = [_rank(bank, s, empty, independent) for s in _finalists(level)]
         ranked.append({r.labels: r for r in finalists})
@@ -78,11 +83,10 @@ def _finalists(level: dict[tuple[str, ...], Scored]) -> list[Scored]:
 def _rank(bank: Bank, scored: Scored, empty: Fit, independent: NDArray) -> Ranked:
     """Refine a set's shapes and score it on what it was fitted to, less a price for every parameter."""
     best = refined([bank.candidates[i] for i in scored.chosen], bank.runs, bank.baseline, bank.weights)
-    there = independent > 0
-    gain = float(np.sum(independent[there] * np.log(empty.rms[there] / best.rms[there])))
-    linear = len(best.values) - len(empty.values)
-    shapes = sum(len(c.effect.shape) for c in best.causes)
-    return Ranked(best, gain - SHAPE_COST * shapes - 0.5 * linear)
+    gain = log_likelihood(best.rms, empty.rms, independent, imperfection(bank))
+    # One that bends the motion has no amplitude of its own, but its shape is as free as one.
+    columns = len(best.values) - len(empty.values) + sum(c.bends for c in best.causes)
+    return Ranked(best, gain - cost(best.causes, columns, independent))
 
 
 def _worth_it(best: Ranked, before: Ranked, joints: int) -> bool:
@@ -113,9 +117,3 @@ def probabilities(behind: dict[str, float]) -> dict[str, float]:
     odds = {label: float(np.exp(-SOFTENING * gap)) for label, gap in behind.items()}
     total = sum(odds.values())
     return {label: odd / total for label, odd in odds.items()}
-
-
-def without(named: Ranked, cause: str, bank: Bank) -> Fit:
-    """Return the named set less one cause, fitted anew: what that cause alone is worth."""
-    rest: Sequence = [c for c in named.fit.causes if c.label != cause]
-    return fit(rest, bank.runs, bank.baseline, bank.weights)

@@ -4,7 +4,7 @@ Shared parameters come from training. What is tied to wall time, an onset or a p
 fits for itself: on odd periods to be scored on even ones, and the other way round.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +14,10 @@ from pipelines.diagnosis.candidates import Candidate, columns_under
 from pipelines.diagnosis.fit import Fit
 from pipelines.diagnosis.observations import Baseline, Run
 from pipelines.diagnosis.scan import NEVER, ONSETS
+from pipelines.model import Term
+
+ALIKE = 4.0
+"""Weighted squared error within which two onsets explain a run alike."""
 
 
 def evaluate(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> list[NDArray]:
@@ -39,7 +43,7 @@ def _halves(run: Run) -> NDArray:
     return run.fold % 2
 
 
-def _shared_term(cause: Candidate):
+def _shared_term(cause: Candidate) -> Term:
     return cause.term(0)
 
 
@@ -57,39 +61,57 @@ def _shared_values(fit: Fit, baseline: Baseline) -> tuple[NDArray, NDArray]:
     return np.array(values), np.array(own, dtype=bool)
 
 
+def settled(fit: Fit, run: Run, baseline: Baseline) -> tuple[list[Term], NDArray]:
+    """Return the causes as terms of a run's model with its own onsets and phases, and the baseline's values."""
+    values, _, terms = _learn(fit, run, baseline, run.usable)
+    at = baseline.size
+    filled = []
+    for term in terms:
+        width = len(term.effect.linear)
+        filled.append(replace(term, values=np.append(values[at : at + width], term.shape)))
+        at += width
+    return filled, values[: baseline.size]
+
+
 def _own(fit: Fit, run: Run, baseline: Baseline, learnt: NDArray) -> NDArray:
-    """Return the run's residual with its own onsets and phases fitted where ``learnt`` (m, O)."""
-    values, own = _shared_values(fit, baseline)
-    terms = [_shared_term(c) for c in fit.causes]
-    best, least = None, np.inf
-    for tried in _onsets(fit, terms, run):
-        columns, measured = columns_under(tried, run, baseline)
-        left = measured - columns @ values
+    return _learn(fit, run, baseline, learnt)[1]
+
+
+def _learn(fit: Fit, run: Run, baseline: Baseline, learnt: NDArray) -> tuple[NDArray, NDArray, list[Term]]:
+    """Fit the run's own onsets and phases where ``learnt`` (m, O): values, residual (m, O), terms.
+
+    Onsets that explain the learnt samples alike are as likely as one another: the middle one is taken.
+    """
+    shared, own = _shared_values(fit, baseline)
+    tried = []
+    for terms in _onsets(fit, [_shared_term(c) for c in fit.causes], run):
+        columns, measured = columns_under(terms, run, baseline)
+        values = shared.copy()
         if own.any():
             root = np.sqrt(fit.weights) * learnt
             A = (columns[:, :, own] * root[:, :, np.newaxis]).reshape(-1, int(own.sum()))
-            phases = np.linalg.lstsq(A, (left * root).ravel(), rcond=1e-9)[0]
-            left = left - columns[:, :, own] @ phases
+            values[own] = np.linalg.lstsq(A, ((measured - columns @ shared) * root).ravel(), rcond=1e-9)[0]
+        left = measured - columns @ values
         cost = float(np.sum(fit.weights * np.sum(np.where(learnt, left, 0.0) ** 2, axis=0)))
-        if cost < least:
-            best, least = left, cost
-    assert best is not None
-    return best
+        tried.append((cost, values, left, terms))
+    least = min(cost for cost, *_ in tried)
+    alike = [entry for entry in tried if entry[0] < least + ALIKE]
+    return alike[len(alike) // 2][1:]
 
 
-def _onsets(fit: Fit, terms: list, run: Run):
+def _onsets(fit: Fit, terms: list[Term], run: Run) -> Iterator[list[Term]]:
     """Yield the terms with each onset that the run may have, never among them."""
-    yield_as_is = True
-    for number, cause in enumerate(fit.causes):
-        at = [i for i, p in enumerate(cause.effect.shape) if p.per_run]
-        if not at:
-            continue
-        yield_as_is = False
-        first = len(cause.effect.linear) + at[0]
-        instants = [NEVER, *np.linspace(run.time[0], run.time[-1], ONSETS + 2)[1:-1]]
-        for instant in instants:
-            changed = terms[number].values.copy()
-            changed[first] = instant
-            yield [replace(t, values=changed) if k == number else t for k, t in enumerate(terms)]
-    if yield_as_is:
+    dated = [
+        (number, len(cause.effect.linear) + i)
+        for number, cause in enumerate(fit.causes)
+        for i, parameter in enumerate(cause.effect.shape)
+        if parameter.per_run
+    ]
+    if not dated:
         yield terms
+        return
+    number, at = dated[0]
+    for instant in (NEVER, *np.linspace(run.time[0], run.time[-1], ONSETS + 2)[1:-1]):
+        values = terms[number].values.copy()
+        values[at] = instant
+        yield [replace(t, values=values) if k == number else t for k, t in enumerate(terms)]

@@ -45,6 +45,16 @@ def noise_floor(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Floor:
     return Floor(rms, share, from_periods)
 
 
+def slow_scatter(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray:
+    """Return the scatter's power density below 1 Hz over that between 2 and 6 Hz, for each output, (O,).
+
+    About 1 for a sensor's noise; many times that where a person or a drift does not repeat; 1 without periods.
+    """
+    pairs = [_differences(run, residual) for run, residual in zip(runs, residuals, strict=True)]
+    rate = runs[0].motion.sample_rate_hz / runs[0].block.decimation
+    return np.array([_slow_share([p[:, o] for p in pairs], rate) for o in range(residuals[0].shape[1])])
+
+
 def _differences(run: Run, residual: NDArray) -> NDArray:
     """Return differences of adjacent periods over the root of two, (k, O); NaN where either is not usable."""
     period = run.motion.period_s
@@ -86,3 +96,20 @@ def _correlation_time(series: Sequence[NDArray]) -> float:
             break
         total += 2 * rho
     return float(total)
+
+
+def _slow_share(series: Sequence[NDArray], rate_hz: float) -> float:
+    """Compare slow with fast scatter: noise of a sensor is flat there, a person or a drift is not.
+
+    Samples that are not usable count as nought, which leaves the ratio as it is.
+    """
+    slow, fast = 0.0, 0.0
+    for s in series:
+        filled = np.nan_to_num(s)
+        if len(filled) < 64:
+            continue
+        frequency = np.fft.rfftfreq(len(filled), 1.0 / rate_hz)
+        power = np.abs(np.fft.rfft(filled * np.hanning(len(filled)))) ** 2
+        slow += float(power[(frequency > 0.05) & (frequency < 1.0)].mean())
+        fast += float(power[(frequency > 2.0) & (frequency < 6.0)].mean())
+    return slow / fast if fast > 0 else 1.0

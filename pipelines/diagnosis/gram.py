@@ -53,8 +53,8 @@ def gram_of(columns: NDArray, measured: NDArray, usable: NDArray, fold: NDArray,
     fold : (m,) array of int
     """
     _, outputs, c = columns.shape
-    each = (folds, outputs)
-    out = Gram(np.zeros((*each, c, c)), np.zeros((*each, c)), np.zeros(each), np.zeros(each))
+    by_output = np.zeros((2, folds, outputs))
+    out = Gram(np.zeros((folds, outputs, c, c)), np.zeros((folds, outputs, c)), *by_output)
     for f in range(folds):
         for o in range(outputs):
             rows = (fold == f) & usable[:, o]

@@ -61,7 +61,7 @@ class Run:
         if limb.q is self.motion.q or not self.has_cuffs:
             return self.measured
         cuffs = cuff_torque_of(self.motion, limb.q)
-        assert cuffs is not None  # has_cuffs
+        assert cuffs is not None, "a run that has cuffs has their forces"
         joints = len(self.motion.joints)
         return np.hstack([self.measured[:, :joints], np.nan_to_num(self.average(cuffs))])
 

@@ -21,6 +21,8 @@ MOST = 3
 """Causes in a set."""
 SHAPE_COST = 2.0
 """What a shape parameter must gain, in units of log likelihood, for having been searched."""
+IMPERFECTION = (0.008, 0.02)
+"""Share of a drive's and of a cuff's torque that even a good model of a good machine leaves."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,27 @@ class Scored:
     """(O,) root mean square held-out error, N·m."""
 
 
+def imperfection(bank: Bank) -> NDArray:
+    """Return what no model of a real machine gets right, (O,) N·m: errors below it are worth nothing."""
+    count = np.maximum(bank.gram.count.sum(axis=0), 1)
+    rms = np.sqrt(bank.gram.square.sum(axis=0) / count)
+    joints = len(bank.baseline.joints)
+    return rms * np.repeat(IMPERFECTION, joints)
+
+
+def log_likelihood(rms: NDArray, before: NDArray, independent: NDArray, imperfect: NDArray) -> float:
+    """Return what a model's errors gain over another's; all (O,), outputs without samples have none independent."""
+    there = independent > 0
+    ratio = (before[there] ** 2 + imperfect[there] ** 2) / (rms[there] ** 2 + imperfect[there] ** 2)
+    return float(0.5 * np.sum(independent[there] * np.log(ratio)))
+
+
+def cost(causes: Sequence[Candidate], columns: int, independent: NDArray) -> float:
+    """Return what a set must gain for its parameters: Schwarz's price for each amplitude, and the shapes' search."""
+    shapes = sum(len(c.effect.shape) for c in causes)
+    return SHAPE_COST * shapes + 0.5 * columns * float(np.log(np.max(independent)))
+
+
 class Scorer:
     """Scores sets of candidates against the baseline."""
 
@@ -41,24 +64,26 @@ class Scorer:
         """Prepare; ``independent`` (O,) is how many of each output's samples are independent."""
         self.bank, self.independent = bank, independent
         self.count = bank.gram.count.sum(axis=0)
-        self.active = self.count > 0
-        self._plain = np.zeros(len(self.count))
-        self.baseline = self(())
-        self._plain = self.baseline.error
+        self.imperfect = imperfection(bank)
+        plain = self._held_out(())
+        assert plain is not None, "the baseline has no sign that could be impossible"
+        self.plain = plain
 
     def __call__(self, chosen: Sequence[int]) -> Scored:
         """Score a set."""
+        rms = self._held_out(chosen)
+        if rms is None:
+            return Scored(tuple(chosen), -np.inf, np.full(len(self.count), np.nan))
+        columns = len(self.bank.columns_of(chosen)) - self.bank.baseline.size
+        causes = [self.bank.candidates[i] for i in chosen]
+        gain = log_likelihood(rms, self.plain, self.independent, self.imperfect)
+        return Scored(tuple(chosen), gain - cost(causes, columns, self.independent), rms)
+
+    def _held_out(self, chosen: Sequence[int]) -> NDArray | None:
         gram = self.bank.gram.select(self.bank.columns_of(chosen))
         if not self._possible(gram, chosen):
-            return Scored(tuple(chosen), -np.inf, np.full(len(self.count), np.nan))
-        squares = held_out_error(gram, self.bank.weights)
-        rms = np.sqrt(squares / np.maximum(self.count, 1))
-        gain = 0.0
-        if np.any(self._plain):
-            a = self.active
-            gain = float(np.sum(self.independent[a] * np.log(self._plain[a] / rms[a])))
-        shapes = sum(len(self.bank.candidates[i].effect.shape) for i in chosen)
-        return Scored(tuple(chosen), gain - SHAPE_COST * shapes, rms)
+            return None
+        return np.sqrt(held_out_error(gram, self.bank.weights) / np.maximum(self.count, 1))
 
     def _possible(self, gram: Gram, chosen: Sequence[int]) -> bool:
         """Tell whether no cause comes out with a sign that physics forbids it."""

@@ -95,8 +95,8 @@ def cuff_misfit(run: Averages, cuffs: NDArray) -> float:
     """Return the share of the cuffs' torque, (m, 2, 3) N, that no limb explains; the sensors' zeros are free."""
     g = run.motion.geometry
     felt = cuff_torque(cuffs[:, 0], cuffs[:, 1], run.q, g)
-    tiled = np.broadcast_to(ZEROS[:, :, np.newaxis], (len(ZEROS), 2, len(felt), 3))
-    zeros = np.stack([cuff_torque(thigh, shank, run.q, g) for thigh, shank in tiled], -1)
+    wide = [np.broadcast_to(unit, (len(felt), 2, 3)) for unit in ZEROS]
+    zeros = np.stack([cuff_torque(unit[:, 0], unit[:, 1], run.q, g) for unit in wide], -1)
     weight = 1.0 / np.maximum(felt.std(axis=0), 1e-12)
     stacked = [np.concatenate([x[:, j] * weight[j] for j in range(2)]) for x in (run.body(), felt, zeros)]
     return fit(stacked[0], stacked[1], stacked[2])[0]

@@ -56,7 +56,7 @@ def _repeated(motion: Motion) -> Iterator[Fault]:
         same[:, j] &= ~mask_of(constant_stretches(torque, round(STUCK_TORQUE_S * motion.sample_rate_hz)), len(torque))
     step = np.abs(motion.dq) / motion.sample_rate_hz
     sure = same & (step > COUNTS * np.array([_count_of(angle) for angle in motion.measured_angle.T]))
-    stale = [j for j in range(same.shape[1]) if sure[:, j].sum() >= STALE]
+    stale = [j for j in range(len(motion.joints)) if sure[:, j].sum() >= STALE]
     if not stale:
         return
     together = len(stale) > 1 and bool((same[:, stale].all(axis=1) == same[:, stale].any(axis=1)).mean() > 0.999)

@@ -1,0 +1,80 @@
+"""``exoid diagnose``: what the model gets wrong, its physical cause, and what naming it gains."""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from exoid_cli.console import console
+
+
+def diagnose(
+    files: Annotated[
+        list[Path], typer.Argument(help="recording/1 or motion/1 files, some to train and some to validate.")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--out", "--output", help="Folder for verdict, tables and figures.")],
+    config: Annotated[Path | None, typer.Option("--config", help="exoid.toml: geometry and [filter].")] = None,
+) -> None:
+    """Name what rigid body and friction get wrong, extend the model with it, and measure the gain.
+
+    Example: exoid diagnose recordings/*.parquet --out diagnosed/
+    """
+    from pipelines.contracts import CANDIDATES, PARAMETERS, RESIDUALS, describe
+    from pipelines.contracts.atomic import write_text
+    from pipelines.diagnosis.candidate_table import candidates
+    from pipelines.diagnosis.detect import as_json, detectability
+    from pipelines.diagnosis.diagnose import diagnose as find
+    from pipelines.diagnosis.verdict import verdict
+    from pipelines.mechanics.read import geometry_from, read_motions
+    from pipelines.settings import Experiment
+
+    settings = Experiment.load(config) if config else Experiment()
+    motions = read_motions(files, settings.filter, geometry_from(settings.mechanism))
+    with console.progress("diagnosing", 1.0) as report:
+        found = find(motions, report)
+    said = verdict(found)
+    used = {"mechanism": settings.mechanism.model_dump(mode="json"), "filter": settings.filter.model_dump(mode="json")}
+    shared = {"joints": motions[0].joint_metadata} | describe(inputs=files, config=used)
+    model = {
+        "covariance": found.covariance.tolist(),
+        "mechanism": "leg",
+        "geometry": motions[0].geometry.metadata(),
+        "method": {"name": "joint fit of baseline and named causes", "status": found.status},
+    }
+    PARAMETERS.write(output / "parameters.parquet", found.parameters, shared | model)
+    RESIDUALS.write(output / "residuals.parquet", found.residuals, shared)
+    CANDIDATES.write(output / "candidates.parquet", candidates(found), shared)
+    write_text(output / "verdict.json", json.dumps(said | {"provenance": shared}, indent=1, ensure_ascii=False) + "\n")
+    visible = as_json(detectability(found.train, found.baseline, found.floor))
+    write_text(output / "detectability.json", json.dumps(visible, indent=1, ensure_ascii=False) + "\n")
+    console.emit(said)
+    _show(said, output)
+
+
+def _show(said: dict[str, Any], output: Path) -> None:
+    console.say(said["summary"])
+    console.say("")
+    joints = list(said["noise_floor_nm"])
+    console.table(
+        ("joint", "noise floor", "rigid + friction", "with the causes", "unexplained"),
+        [
+            (joint, *(f"{said[key][joint]:.3f}" for key in ("noise_floor_nm", "baseline_rmse_nm", "extended_rmse_nm")),
+             "at the floor" if said["unexplained"][joint] is None else f"{said['unexplained'][joint]:.0%}")
+            for joint in joints
+        ],
+        title="torque error on runs no fit has seen, N·m",
+        numbers="noise floor, rigid + friction, with the causes, unexplained",
+    )  # fmt: skip
+    for cause in said["causes"]:
+        where = f" at the {cause['joint']}" if cause["joint"] else ""
+        console.say(f"\n{cause['effect']}{where} ({cause['side']}), probability {cause['probability']:.2f}")
+        for p in cause["parameters"]:
+            low, high = p["ci95"]
+            console.say(f"  {p['name']} {p['value']:.4g} {p['unit']} ({low:.4g} … {high:.4g})")
+        for sentence in cause["evidence"]:
+            console.say(f"  - {sentence}")
+        for tie in cause["indistinguishable_from"]:
+            other = f"{tie['effect']}@{tie['joint']}" if tie["joint"] else tie["effect"]
+            console.say(f"  or {other}: {tie['why']}; {tie['how_to_separate']}")
+    console.say(f"\n{output}: verdict.json, parameters, residuals, candidates, detectability.json")

@@ -1,0 +1,122 @@
+"""``candidates/1``: every set of causes that was tried, and what became of it."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipelines.diagnosis.choice import NEEDED, Ranked
+from pipelines.diagnosis.diagnose import Diagnosis, Extended
+from pipelines.diagnosis.evaluate import evaluate
+from pipelines.diagnosis.gain import errors_of, gain
+from pipelines.effects import EFFECTS
+
+
+def candidates(d: Diagnosis) -> pd.DataFrame:
+    """Return every set tried, the named one first, then by score."""
+    rows = [
+        _row(d, labels, scored.score, refined.get(labels))
+        for level, refined in zip(d.choice.levels, d.choice.refined[1:], strict=False)
+        for labels, scored in level.items()
+        if np.isfinite(scored.score)
+    ]
+    rows += [_absorbed(d, effect.name, joint, into) for effect in EFFECTS for joint, into in effect.absorbed.items()
+             if joint in d.baseline.joints]  # fmt: skip
+    order = {"named": 0, "indistinguishable": 1, "rejected": 2, "absorbed": 3}
+    rows.sort(key=lambda r: (order[r["verdict"]], -(r["train_score"] or 0.0)))
+    frame = pd.DataFrame(rows)
+    frame.insert(0, "rank", range(1, len(frame) + 1))
+    return frame
+
+
+def _row(d: Diagnosis, labels: tuple[str, ...], score: float, ranked: Ranked | None) -> dict[str, Any]:
+    extended = _evaluated(d, labels, ranked)
+    row: dict[str, Any] = {
+        "causes": list(labels),
+        "parameters": _parameters(ranked, d) if ranked else [],
+        "train_score": ranked.score if ranked else score,
+        "gain_nm": None,
+        "gain_low_nm": None,
+        "gain_high_nm": None,
+        "probability": _probability(d, labels),
+    }
+    for j, joint in enumerate(d.baseline.joints):
+        row[f"rmse_before_{joint}_nm"] = float(d.before.errors.rms[j])
+        row[f"rmse_after_{joint}_nm"] = float(extended.errors.rms[j]) if extended else None
+    if extended:
+        worth = gain(d.before.errors, extended.errors)
+        row |= {"gain_nm": worth.value, "gain_low_nm": worth.low, "gain_high_nm": worth.high}
+    row["verdict"], row["reason"] = _judged(d, labels, row["train_score"])
+    return row
+
+
+def _evaluated(d: Diagnosis, labels: tuple[str, ...], ranked: Ranked | None) -> Extended | None:
+    if ranked is None:
+        return None
+    if labels == d.choice.named.labels:
+        return d.after
+    residuals = tuple(evaluate(ranked.fit, d.validate, d.baseline))
+    return Extended(ranked.fit, residuals, errors_of(d.validate, residuals))
+
+
+def _parameters(ranked: Ranked, d: Diagnosis) -> list[dict[str, Any]]:
+    """Return what was fitted, as files name it; amplitudes that each run has for itself are left out."""
+    found, at = [], d.baseline.size
+    for cause in ranked.fit.causes:
+        effect = cause.effect
+        apart = [] if cause.bends else [p.per_run for p in effect.linear]
+        shared = apart.count(False)
+        if not any(apart):
+            fitted = np.append(ranked.fit.values[at : at + shared], cause.shapes[0])
+            found += [
+                {"name": p.name, "value": float(v), "unit": p.unit}
+                for p, v in zip(effect.parameters, effect.physical(fitted), strict=True)
+            ]
+        at += shared + apart.count(True) * ranked.fit.acting(cause)
+    return found
+
+
+def _probability(d: Diagnosis, labels: tuple[str, ...]) -> float | None:
+    """Return how likely a set is that differs from the named one in one cause at most."""
+    if not d.causes:
+        return None
+    named = set(d.choice.named.labels)
+    if set(labels) == named:
+        return float(np.prod([d.likely[label][label] for label in named]))
+    if len(labels) != len(named) or len(named - set(labels)) != 1:
+        return None
+    label, rival = (named - set(labels)).pop(), (set(labels) - named).pop()
+    return d.likely[label].get(rival)
+
+
+def _judged(d: Diagnosis, labels: tuple[str, ...], score: float) -> tuple[str, str]:
+    best = d.choice.named
+    if d.causes and labels == best.labels:
+        return "named", "it earned its place: nothing smaller explains as much, nothing larger enough more"
+    if not d.causes:
+        return "rejected", (
+            f"it gains {score:.1f} in log likelihood; a cause must gain {NEEDED:g}, take away a material share of a "
+            "joint's error, and hold up on validation runs"
+        )
+    if len(labels) == len(best.labels):
+        for label in d.causes:
+            rest = set(best.labels) - {label}
+            rivals = set(labels) - rest
+            if rest <= set(labels) and len(rivals) == 1 and next(iter(rivals)) in d.alike(label):
+                return "indistinguishable", f"it explains these data as well as {label} does"
+    if len(labels) > len(best.labels) and set(best.labels) <= set(labels):
+        extra = ", ".join(sorted(set(labels) - set(best.labels)))
+        return "rejected", f"{extra} adds too little beside what is named"
+    return (
+        "rejected",
+        f"it explains less than {' and '.join(best.labels)} (log likelihood {best.score - score:.1f} behind)",
+    )
+
+
+def _absorbed(d: Diagnosis, name: str, joint: str, into: str) -> dict[str, Any]:
+    blank = {f"rmse_{when}_{j}_nm": None for j in d.baseline.joints for when in ("before", "after")}
+    return {
+        "causes": [f"{name}@{joint}"], "parameters": [], "train_score": None, "gain_nm": None, "gain_low_nm": None,
+        "gain_high_nm": None, "probability": None, **blank, "verdict": "absorbed",
+        "reason": f"it is part of {into} and cannot be seen apart from it",
+    }  # fmt: skip

@@ -1,0 +1,227 @@
+"""The whole diagnosis: recordings in, verdict and tables out."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipelines.diagnosis import tables
+from pipelines.diagnosis.bank import Bank, fill, silent
+from pipelines.diagnosis.choice import Choice, Ranked, choose, nothing_chosen, probabilities, rivals
+from pipelines.diagnosis.evaluate import evaluate, settled
+from pipelines.diagnosis.faults import Fault, excluding, find_faults
+from pipelines.diagnosis.fit import Fit, fit, stacked_columns
+from pipelines.diagnosis.floor import Floor, noise_floor, slow_scatter
+from pipelines.diagnosis.gain import Errors, errors_of
+from pipelines.diagnosis.observations import Baseline, Run, baseline_of, observe, with_load
+from pipelines.diagnosis.status import WANDERING, Standing, status_of
+from pipelines.diagnosis.uncertainty import Uncertainty, uncertainty
+from pipelines.dynamics.replay import replay
+from pipelines.errors import ExoidError, InputError
+from pipelines.mechanics.motion import Motion
+from pipelines.model import Model, model_from_parameters
+
+SEARCH_SHARE = 0.75
+"""Of the progress bar that filling the bank takes."""
+
+
+@dataclass(frozen=True)
+class Extended:
+    """A set of causes, fitted, and what it leaves of the validation runs."""
+
+    fit: Fit
+    residuals: tuple[NDArray, ...]
+    """(m, O) of each validation run."""
+    errors: Errors
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Everything a verdict is written from."""
+
+    baseline: Baseline
+    bank: Bank
+    choice: Choice
+    status: str
+    before: Extended
+    after: Extended
+    without: dict[str, Extended]
+    """The named set less one cause, by that cause's label."""
+    likely: dict[str, dict[str, float]]
+    """For each named cause the probability of it and of each that could stand in its place."""
+    standing: Standing
+    floor: Floor
+    sure: Uncertainty
+    parameters: pd.DataFrame
+    covariance: NDArray
+    residuals: pd.DataFrame
+    train: tuple[Run, ...]
+    validate: tuple[Run, ...]
+    faults: tuple[Fault, ...]
+    strayed: dict[str, NDArray | None]
+    """(J,) rad: the 1 s simulation error of the baseline and of the extended model."""
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """Labels of the named causes, the most probable first, the more gainful first among equals."""
+        if self.status in ("unknown_cause", "nothing_missing"):
+            return ()
+
+        def order(label: str) -> tuple[float, float]:
+            worth = float(np.sum(self.without[label].errors.rms - self.after.errors.rms))
+            return (-round(sum(self.alike(label).values()), 1), -worth)
+
+        return tuple(sorted(self.likely, key=order))
+
+    def alike(self, label: str) -> dict[str, float]:
+        """Return a named cause and those that cannot be told from it, with their probabilities."""
+        from pipelines.diagnosis.ties import ALIKE
+
+        odds = self.likely[label]
+        return {other: p for other, p in odds.items() if p >= ALIKE * odds[label]}
+
+
+def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = silent) -> Diagnosis:
+    """Find what the rigid body with Coulomb and viscous friction gets wrong, and why.
+
+    Selection, shapes and shared parameters use ``train`` runs; every error is measured on ``validate`` runs.
+
+    Parameters
+    ----------
+    motions : sequence of Motion
+        Runs of one machine, some to train and some to validate.
+    report : callable, optional
+        Told the share that is done, 0 to 1, and what is being tried.
+
+    Raises
+    ------
+    InputError
+        Where there is no run to train or none to validate on.
+    """
+    faults = tuple(find_faults(motions))
+    train, validate = _dealt(excluding(motions, faults))
+    baseline = baseline_of(train)
+    bank = fill(train, baseline, lambda share, what: report(SEARCH_SHARE * share, what))
+    empty = fit((), bank.runs, baseline, bank.weights)
+    validate = tuple(with_load(run, baseline, empty.values) for run in validate)
+    report(SEARCH_SHARE, "combinations")
+    left = [y - c @ empty.values for c, y in stacked_columns((), bank.runs, baseline)]
+    # Where masking does not help, physics would be blamed for what acquisition did.
+    spoilt = any(fault.samples is None for fault in faults)
+    choice = nothing_chosen(empty) if spoilt else choose(bank, noise_floor(bank.runs, left))
+    before = _extended(empty, validate, baseline)
+    after = _extended(choice.named.fit, validate, baseline)
+    floor = noise_floor(validate, after.residuals)
+    standing = _standing(before, after, floor, validate)
+    if choice.named.fit.causes and not standing.held_up:
+        # What the training runs promised does not hold on others: nothing is named.
+        choice = replace(choice, named=nothing_chosen(empty).named)
+        after, floor = before, noise_floor(validate, before.residuals)
+        standing = _standing(before, before, floor, validate)
+    report(0.95, "intervals")
+    named = choice.named.labels
+    scatter = slow_scatter(validate, after.residuals)[: len(baseline.joints)]
+    wandering = bool(np.any(scatter > WANDERING))
+    status = "unknown_cause" if spoilt else status_of(standing, bool(named), wandering)
+    sure = uncertainty(choice.named.fit, bank.runs, baseline)
+    frame, covariance = tables.parameters(choice.named.fit, baseline, sure)
+    plain, _ = tables.parameters(empty, baseline, uncertainty(empty, bank.runs, baseline))
+    return Diagnosis(
+        baseline=baseline, bank=bank, choice=choice, status=status, before=before, after=after,
+        without={label: _less(choice.named, label, bank, validate) for label in named},
+        likely={label: probabilities(rivals(choice, bank, label)) for label in named},
+        standing=standing, floor=floor, sure=sure, parameters=frame, covariance=covariance,
+        residuals=tables.residual_table(validate, {"baseline": before.residuals, "extended": after.residuals}),
+        train=bank.runs, validate=validate, faults=faults,
+        strayed={"baseline": _strayed(plain, empty, validate, baseline),
+                 "extended": _strayed(frame, choice.named.fit, validate, baseline)},
+    )  # fmt: skip
+
+
+def _dealt(motions: Sequence[Motion]) -> tuple[tuple[Run, ...], tuple[Run, ...]]:
+    listed = ", ".join(f"{m.file} ({m.run}, {m.purpose})" for m in motions) or "none"
+    for purpose, why in (("train", "causes are searched there"), ("validate", "the gain is measured there")):
+        if not any(m.purpose == purpose for m in motions):
+            raise InputError(
+                f"found no run to {purpose} on among: {listed}; {why}: record one with `exoid acquire`, "
+                "or set `purpose` in a recording's metadata"
+            )
+    trained = {m.run for m in motions if m.purpose == "train"}
+    strangers = [m.file for m in motions if m.purpose == "validate" and m.run not in trained]
+    if strangers:
+        raise InputError(
+            f"{strangers[0]} is the only kind of run without one to train on: {listed}; "
+            "record a train run of that kind, or leave it out"
+        )
+    runs = [observe(m) for m in motions]
+    return (
+        tuple(run for run in runs if run.motion.purpose == "train"),
+        tuple(run for run in runs if run.motion.purpose == "validate"),
+    )
+
+
+def _extended(made: Fit, validate: Sequence[Run], baseline: Baseline) -> Extended:
+    residuals = tuple(evaluate(made, validate, baseline))
+    return Extended(made, residuals, errors_of(validate, residuals))
+
+
+def _less(named: Ranked, label: str, bank: Bank, validate: Sequence[Run]) -> Extended:
+    rest = [c for c in named.fit.causes if c.label != label]
+    return _extended(fit(rest, bank.runs, bank.baseline, bank.weights), validate, bank.baseline)
+
+
+def _standing(before: Extended, after: Extended, floor: Floor, validate: Sequence[Run]) -> Standing:
+    J = len(validate[0].motion.joints)
+    counts = float(before.errors.counts.sum())
+    return Standing(floor.rms[:J], before.errors.rms, after.errors.rms, counts * floor.independent_share[:J])
+
+
+def _strayed(frame: pd.DataFrame, made: Fit, validate: Sequence[Run], baseline: Baseline) -> NDArray | None:
+    """Return the rms angle error of 1 s simulations over all validation runs, (J,) rad; None where none can run."""
+    squares, count = 0.0, 0
+    for run in validate:
+        try:
+            model = _with_own(model_from_parameters(frame, run.motion.run), made, run, baseline)
+            result = replay(model, run.motion)
+        except (ExoidError, ZeroDivisionError):
+            # Causes that the forward dynamics cannot hold together, or a mass matrix that no leg has: the torque
+            # error stands all the same.
+            return None
+        squares = squares + np.sum(result.error**2, axis=(0, 1))
+        count += result.error.shape[0] * result.error.shape[1]
+    with np.errstate(invalid="ignore"):
+        rms = np.sqrt(squares / max(count, 1))
+    return rms if np.all(np.isfinite(rms)) else None
+
+
+def _with_own(model: Model, made: Fit, run: Run, baseline: Baseline) -> Model:
+    """Give the causes the onsets and phases of this run."""
+    if not any(p.per_run for cause in made.causes for p in cause.effect.fitted):
+        return model
+    own = {term.effect.label: term for term in settled(made, run, baseline)[0]}
+    return Model(tuple(replace(t, values=own[t.effect.label].values) if t.effect.label in own else t for t in model))
+
+
+def summary_numbers(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return the verdict's numbers by joint."""
+    joints = diagnosis.baseline.joints
+
+    def by_joint(values: Any) -> dict[str, float | None]:
+        if values is None:
+            return dict.fromkeys(joints)
+        return {joint: None if v is None else float(v) for joint, v in zip(joints, values, strict=True)}
+
+    before, after = diagnosis.before.errors, diagnosis.after.errors
+    return {
+        "noise_floor_nm": by_joint(diagnosis.standing.floor),
+        "baseline_rmse_nm": by_joint(before.rms),
+        "extended_rmse_nm": by_joint(after.rms),
+        "baseline_rmse_unmasked_nm": by_joint(before.unmasked),
+        "extended_rmse_unmasked_nm": by_joint(after.unmasked),
+        "baseline_simulation_rmse_rad": by_joint(diagnosis.strayed["baseline"]),
+        "extended_simulation_rmse_rad": by_joint(diagnosis.strayed["extended"]),
+        "unexplained": by_joint(diagnosis.standing.unexplained),
+    }

@@ -1,0 +1,125 @@
+"""The tables a diagnosis writes: parameters of the extended model, residuals before and after, candidates."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipelines.contracts.joints import joints_of
+from pipelines.diagnosis.fit import Fit
+from pipelines.diagnosis.gain import scored
+from pipelines.diagnosis.observations import BODY, Baseline, Run
+from pipelines.diagnosis.uncertainty import Uncertainty
+from pipelines.effects.friction import Friction
+from pipelines.effects.rigid_body import RigidBody
+
+
+def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.DataFrame, NDArray]:
+    """Return ``parameters/1`` of a fit and its covariance, rigid bodies for each kind of run, and the human's."""
+    rows: list[dict[str, Any]] = []
+    maps: list[NDArray] = []
+    size = len(sure.covariance)
+    values = np.zeros(size)
+    values[: len(fit.values)] = fit.values
+
+    def add(effect: str, name: str, symbol: str, unit: str, joint: str | None, run: str | None, step: str,
+            slope: NDArray, value: float) -> None:  # fmt: skip
+        rows.append({"name": name, "symbol": symbol, "joint": joint, "run": run, "value": value, "unit": unit,
+                     "step": step, "effect": effect})  # fmt: skip
+        maps.append(slope)
+
+    for run, bodies in _bodies(baseline).items():
+        for i, p in enumerate(RigidBody.linear):
+            slope = np.zeros(size)
+            slope[[b * BODY + i for b in bodies]] = 1.0
+            add("rigid_body", p.name, p.symbol, p.unit, None, run, "inertia", slope, float(slope @ values))
+    at = BODY * len(baseline.bodies)
+    for joint in baseline.joints:
+        for p in Friction.linear:
+            add("friction", p.name, p.symbol, p.unit, joint, None, "friction", _unit(size, at), values[at])
+            at += 1
+    _add_causes(fit, baseline, sure, add)
+    frame = pd.DataFrame(rows)
+    T = np.array(maps)
+    covariance = T @ sure.covariance @ T.T
+    error = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    frame["std_error"] = error
+    frame["ci95_low"] = frame["value"] - sure.critical * error
+    frame["ci95_high"] = frame["value"] + sure.critical * error
+    return frame, covariance
+
+
+def _bodies(baseline: Baseline) -> dict[str, list[int]]:
+    if len(baseline.bodies) == 1:
+        return {baseline.bodies[0]: [0]}
+    return {"exo_alone": [0], "with_human": [0, 1], "human": [1]}
+
+
+def _unit(size: int, at: int) -> NDArray:
+    slope = np.zeros(size)
+    slope[at] = 1.0
+    return slope
+
+
+def _add_causes(fit: Fit, baseline: Baseline, sure: Uncertainty, add) -> None:
+    """Add each cause's parameters as files name them; those that every run has for itself are its first run's."""
+    size, at = len(sure.covariance), baseline.size
+    for number, cause in enumerate(fit.causes):
+        effect = cause.effect
+        apart = [False] * len(effect.linear) if cause.bends else [p.per_run for p in effect.linear]
+        shared = [i for i, a in enumerate(apart) if not a]
+        places: list[int | None] = [None] * len(effect.fitted)
+        for k, i in enumerate(shared):
+            places[i] = at + k
+        own = [i for i, a in enumerate(apart) if a]
+        for k, i in enumerate(own):
+            places[i] = at + len(shared) + k
+        at += len(shared) + len(own) * fit.acting(cause)
+        for order, (which, i, run) in enumerate(sure.shapes):
+            if which == number and run in (-1, 0):
+                places[len(effect.linear) + i] = len(fit.values) + order
+        linear = [fit.values[p] if p is not None else 0.0 for p in places[: len(effect.linear)]]
+        fitted = np.append(linear, cause.shapes[0])
+        jacobian, physical = effect.jacobian(fitted), effect.physical(fitted)
+        for i, p in enumerate(effect.parameters):
+            slope = np.zeros(size)
+            for k, place in enumerate(places):
+                if place is not None:
+                    slope[place] = jacobian[i, k]
+            add(effect.name, p.name, p.symbol, p.unit, effect.joint, effect.run, "extension", slope, float(physical[i]))
+
+
+def residual_rows(run: Run, residual: NDArray, model: str) -> pd.DataFrame:
+    """Return a run's rows of ``residuals/1``."""
+    joints = joints_of(run.motion.metadata)
+    J = len(joints)
+    columns: dict[str, Any] = {
+        "file": np.full(len(run.time), run.motion.file),
+        "run": run.motion.run,
+        "purpose": run.motion.purpose,
+        "segment": run.motion.segment[run.starts],
+        "time_s": run.time,
+        "model": model,
+        "scored": scored(run),
+    }
+    quantities: Mapping[str, NDArray] = {
+        "angle": run.state[0], "velocity": run.state[1], "acceleration": run.state[2], "torque": run.measured[:, :J],
+        "predicted": run.measured[:, :J] - residual[:, :J], "residual": residual[:, :J],
+    }  # fmt: skip
+    for j, joint in enumerate(joints):
+        columns |= {joint.column(name): values[:, j] for name, values in quantities.items()}
+    return pd.DataFrame(columns)
+
+
+def residual_table(runs: Sequence[Run], by_model: Mapping[str, Sequence[NDArray]]) -> pd.DataFrame:
+    """Return ``residuals/1`` of several runs under several models."""
+    return pd.concat(
+        [
+            residual_rows(run, residual, model)
+            for model, residuals in by_model.items()
+            for run, residual in zip(runs, residuals, strict=True)
+        ],
+        ignore_index=True,
+    )

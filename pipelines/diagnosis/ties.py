@@ -1,0 +1,57 @@
+"""Causes that data of a kind can never separate, why, and what would."""
+
+from dataclasses import dataclass
+
+ALIKE = 0.1
+"""Odds against the named cause from which another counts as not told apart."""
+
+
+@dataclass(frozen=True)
+class Tie:
+    """Why two causes look alike, and how to part them."""
+
+    why: str
+    how_to_separate: str
+
+
+STRUCTURAL: dict[frozenset[str], Tie] = {
+    frozenset({"torque_offset", "coulomb_asymmetry"}): Tie(
+        "while the joint always moves, a friction that differs with direction adds the same constant torque",
+        "hold the joint still and read the torque with the drive off: an offset of the sensor stays",
+    ),
+    frozenset({"base_tilt", "encoder_offset"}): Tie(
+        "a tilted base turns gravity just as a hip encoder with a shifted zero does",
+        "put a spirit level on the base, or let the leg hang freely and read the hip angle",
+    ),
+    frozenset({"encoder_offset", "mass_off_axis"}): Tie(
+        "with one kind of run a shifted zero and a mass beside the axis turn gravity alike",
+        "record the other kind of run as well: an offset is one angle in both, a mass is not",
+    ),
+    frozenset({"base_tilt", "mass_off_axis"}): Tie(
+        "with one kind of run a tilted base and a mass beside the axis turn gravity alike",
+        "record the other kind of run as well, or put a spirit level on the base",
+    ),
+    frozenset({"torque_gain"}): Tie(
+        "without cuff forces only the ratio of the two joints' gains shows: one too high is the other too low",
+        "hang a known weight on each joint in turn, or record the cuff forces",
+    ),
+    frozenset({"backlash", "encoder_offset"}): Tie(
+        "while the load pushes to one side only, play shifts the angle by a constant half of it",
+        "move the joint through angles where the load changes sign, or shake the link by hand",
+    ),
+    frozenset({"torque_drift", "torque_offset"}): Tie(
+        "over runs this short a drift is an offset that differs from run to run",
+        "record longer, or read the torque at rest before and after each run",
+    ),
+}
+
+
+def tie_between(named: str, other: str, confirm_named: str, confirm_other: str) -> Tie:
+    """Return why two effects (names without joints) are not told apart, structural or only on this motion."""
+    structural = STRUCTURAL.get(frozenset({named, other}))
+    if structural:
+        return structural
+    return Tie(
+        "along this motion their torques differ by less than noise and the other parameters can make up",
+        f"for the one: {confirm_named}; for the other: {confirm_other}",
+    )

@@ -1,0 +1,154 @@
+"""Effects hidden in the plant's recordings are named, and faultless ones raise no alarm."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.contracts import CANDIDATES, PARAMETERS, RECORDING, RESIDUALS
+from pipelines.contracts.table import Table
+from pipelines.diagnosis.candidate_table import candidates
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.verdict import verdict
+from pipelines.errors import InputError
+from pipelines.mechanics.fourier import FourierTrajectory
+from pipelines.mechanics.kinematics import motion_table
+from pipelines.mechanics.motion import motion_from_table
+from pipelines.model import effect_named, term_from
+from pipelines.rig.plant import Plant
+from pipelines.rig.record import record
+from pipelines.settings.filter import FilterSettings
+from pipelines.settings.plant import PlantSettings
+
+RICH = FourierTrajectory(
+    theta0=np.array([0.65, -0.93]),
+    a=np.array([[0.22, -0.16, 0.10], [0.12, 0.24, -0.11]]),
+    b=np.array([[0.10, 0.12, -0.07], [-0.22, 0.08, 0.10]]),
+    omega=0.2 * np.pi,
+)
+RUNS = [(run, purpose) for run in ("exo_alone", "with_human") for purpose in ("train", "validate")]
+
+
+def recordings(effect=None, joint=None, seed=1, **values):
+    """Return four recordings of 40 s, named by their place."""
+    hidden = [term_from(effect_named(effect)(joint=joint), values)] if effect else []
+    made = []
+    for number, (run, purpose) in enumerate(RUNS):
+        plant = Plant(PlantSettings(), run, seed=10 * seed + number, effects=hidden)
+        made.append(Table(*record(plant, RICH, 40.0, purpose)))
+    return made
+
+
+def session(*args, **values):
+    motions = [motion_from_table(motion_table(table, FilterSettings())) for table in recordings(*args, **values)]
+    return [replace(m, file=f"run_{i}.parquet") for i, m in enumerate(motions)]
+
+
+def labels(cause):
+    """Return a cause and what it is said not to be told from."""
+    return {(c["effect"], c["joint"]) for c in (cause, *cause["indistinguishable_from"])}
+
+
+@pytest.fixture(scope="module")
+def faultless():
+    return diagnose(session())
+
+
+def test_where_nothing_is_hidden_nothing_is_missing(faultless):
+    said = verdict(faultless)
+    assert said["status"] == "nothing_missing"
+    assert said["causes"] == []
+    assert said["data_faults"] == []
+
+
+def test_the_floor_is_the_noise_that_was_put_in(faultless):
+    """Ripple of 0.6 and 0.4 N·m, correlated over 20 ms: what a mean over 25 ms leaves of it."""
+    rho = np.exp(-1 / (200 * 0.02))
+    mean = np.sqrt((5 + 2 * sum((5 - k) * rho**k for k in range(1, 5))) / 25)
+    np.testing.assert_allclose(faultless.standing.floor, np.array([0.6, 0.4]) * mean, rtol=0.06)
+
+
+@pytest.mark.parametrize(
+    ("effect", "joint", "values", "parameter"),
+    [
+        ("stribeck_friction", "knee", {"stribeck_torque": 2.0, "stribeck_velocity": 0.15}, "stribeck_torque"),
+        ("load_dependent_friction", "hip", {"load_coefficient": 0.06}, "load_coefficient"),
+        ("cogging", "knee", {"amplitude": 1.0, "cycles_per_turn": 24.0, "phase": 0.3}, "amplitude"),
+        ("mass_off_axis", "knee", {"mass_moment": 0.15}, "mass_moment"),
+        ("torque_gain", "hip", {"gain": 1.08}, "gain"),
+        ("voluntary_torque", "hip", {"amplitude": 2.2, "frequency": 0.43, "phase": 0.4}, "frequency"),
+    ],
+)
+def test_a_hidden_effect_is_named_with_its_size_and_the_error_falls_to_the_floor(effect, joint, values, parameter):
+    found = diagnose(session(effect, joint, seed=3, **values))
+    said = verdict(found)
+    assert said["status"] == "explained"
+    first = said["causes"][0]
+    assert (effect, joint) in labels(first)
+    assert first["probability"] > 0.5
+    size = next(p for p in first["parameters"] if p["name"] == parameter)
+    assert size["value"] == pytest.approx(values[parameter], rel=0.15)
+    np.testing.assert_allclose(found.after.errors.rms, found.standing.floor, rtol=0.08)
+    assert first["gain"]["ci95"][0] > 0
+
+
+@pytest.mark.parametrize(
+    ("effect", "joint", "values", "tied"),
+    [
+        ("torque_offset", "knee", {"offset": 1.0}, ("coulomb_asymmetry", "knee")),
+        ("base_tilt", None, {"tilt": 0.04}, ("encoder_offset", "hip")),
+    ],
+)
+def test_what_no_data_of_a_kind_can_part_is_said_to_be_one_or_the_other(effect, joint, values, tied):
+    first = verdict(diagnose(session(effect, joint, seed=5, **values)))["causes"][0]
+    assert {(effect, joint), tied} <= labels(first)
+    for tie in first["indistinguishable_from"]:
+        assert tie["why"]
+        assert tie["how_to_separate"]
+
+
+def test_a_torque_that_no_cause_explains_is_called_unknown():
+    """A knee torque in proportion to the product of both speeds, in no catalogue."""
+    odd = []
+    for m in session(seed=7):
+        extra = np.zeros_like(m.torque)
+        extra[:, 1] = 6.0 * np.sin(9.0 * m.q[:, 0]) * m.dq[:, 0]
+        odd.append(replace(m, torque=m.torque + extra))
+    said = verdict(diagnose(odd))
+    assert said["status"] in ("unknown_cause", "partly_explained")
+    assert said["unexplained"]["knee"] > 0.2
+
+
+def test_a_fault_of_acquisition_is_named_before_any_physics():
+    motions = session(seed=8)
+    flipped = [replace(m, torque=m.torque * [1.0, -1.0]) for m in motions]
+    said = verdict(diagnose(flipped))
+    assert said["data_faults"]
+    assert said["causes"] == []
+    assert said["summary"].startswith("Acquisition, not physics")
+
+
+def test_the_tables_keep_their_contracts(faultless):
+    meta = {"geometry": {}, "covariance": faultless.covariance.tolist()}
+    PARAMETERS.check(faultless.parameters, meta)
+    RESIDUALS.check(faultless.residuals, {})
+    CANDIDATES.check(candidates(faultless), {})
+
+
+def test_without_a_run_to_validate_on_no_gain_can_be_measured():
+    with pytest.raises(InputError, match="found no run to validate on among: run_0"):
+        diagnose([m for m in session(seed=9) if m.purpose == "train"])
+
+
+def test_the_command_writes_verdict_and_tables(tmp_path, capsys):
+    from exoid_cli.app import run
+
+    files = []
+    for number, table in enumerate(recordings("parallel_spring", "knee", seed=4, stiffness=6.0, rest_angle=-0.5)):
+        files.append(tmp_path / f"run_{number}.parquet")
+        RECORDING.write(files[-1], table.frame, table.metadata)
+    assert run(["diagnose", *map(str, files), "--out", str(tmp_path / "d")]) == 0
+    assert "parallel spring at the knee" in capsys.readouterr().out
+    for name in ("verdict.json", "parameters.parquet", "residuals.parquet", "candidates.parquet", "detectability.json"):
+        assert (tmp_path / "d" / name).is_file()
+    assert (PARAMETERS.read(tmp_path / "d" / "parameters.parquet").frame["step"] == "extension").any()
