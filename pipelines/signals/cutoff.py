@@ -15,7 +15,7 @@ HIGHEST_SHARE = 0.125
 SLOW_SHARE = 0.9999
 """Of the signal's power: the motion itself, which the filter must leave alone."""
 BEFORE_NOISE = 0.7
-"""Cut-off over the frequency where signal and noise meet: in acceleration the noise outweighs the signal well before."""
+"""Cut-off over the frequency where signal and noise meet: in acceleration noise outweighs signal well before."""
 QUIET_HZ = 3.0
 """Width of noise after which no more signal is expected."""
 CLEAR = 3.0
