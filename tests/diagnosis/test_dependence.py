@@ -1,0 +1,147 @@
+"""What a residual depends on is found, and noise depends on nothing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from pipelines.diagnosis.dependence import dependences, describe, excesses
+from pipelines.diagnosis.floor import Floor
+from pipelines.diagnosis.observations import observe
+from pipelines.diagnosis.planned import planned_motions
+from pipelines.diagnosis.smooth_term import smooth_term
+from pipelines.mechanics.fourier import FourierTrajectory
+from pipelines.settings.design import NoiseSettings
+from pipelines.settings.plant import PlantSettings
+
+NOISE = NoiseSettings(duration_s=60.0)
+FLOOR = Floor(np.array([0.4, 0.4, np.nan, np.nan]), np.full(4, 0.2), from_periods=True)
+KINDS = ("exo_alone", "with_human")
+
+
+def moved(seed):
+    """Runs on an excitation of its own, within what a leg can do."""
+    rng = np.random.default_rng(seed)
+    a, b = rng.normal(size=(2, 2, 4)) * [0.3, 0.2, 0.12, 0.08]
+    trajectory = FourierTrajectory(theta0=np.array([0.6, -0.9]), a=a, b=b, omega=0.2 * np.pi)
+    return [observe(m) for m in planned_motions(trajectory, PlantSettings(), NOISE, KINDS, 200.0)]
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return moved(1)
+
+
+@pytest.fixture(scope="module")
+def fresh():
+    return moved(2)
+
+
+def noise(runs, rng, rms=0.4):
+    """Coloured noise of every output; a block resembles the one before it."""
+    return [rms * lfilter([0.6], [1, -0.8], rng.normal(size=run.measured.shape), axis=0) for run in runs]
+
+
+LAWS = {
+    "angle": lambda run: 4.0 * np.maximum(-0.9 - run.state[0][:, 1], 0.0) ** 1.5 * 3.0,
+    "speed": lambda run: 8.0 * np.abs(run.state[1][:, 1]),
+    "other_angle": lambda run: 1.5 * np.sin(5.0 * run.state[0][:, 0]),
+    "time": lambda run: 6.0 * np.exp(-run.time / 30.0),
+}
+
+
+def product(run):
+    """Torque lost where both joints move: neither speed alone foretells it."""
+    return 12.0 * run.state[1][:, 0] * run.state[1][:, 1]
+
+
+def with_law(runs, rng, law, kinds=KINDS):
+    """Noise, and a law at the knee."""
+    residuals = noise(runs, rng)
+    for run, residual in zip(runs, residuals, strict=True):
+        if run.motion.run in kinds:
+            residual[:, 1] += law(run)
+    return residuals
+
+
+def rms(runs, residuals, j=1):
+    known = [e[run.usable[:, j], j] for run, e in zip(runs, residuals, strict=True)]
+    return np.sqrt(np.mean(np.concatenate(known) ** 2))
+
+
+@pytest.mark.parametrize("variable", LAWS)
+def test_the_variable_behind_a_residual_comes_first(runs, variable):
+    found = dependences(runs, with_law(runs, np.random.default_rng(0), LAWS[variable]))
+    first = next(d for d in found if d.joint == "knee")
+    assert first.variable == variable
+    law = np.concatenate([LAWS[variable](run)[run.usable[:, 1]] for run in runs])
+    assert 0.5 < first.share < law.var() / (law.var() + 0.4**2) + 0.02
+    assert max(d.share for d in found if d.joint == "hip") < 0.05
+
+
+def test_coloured_noise_depends_on_nothing(runs):
+    for seed in range(5):
+        found = dependences(runs, noise(runs, np.random.default_rng(seed)))
+        assert max(d.share for d in found) < 0.05
+
+
+def test_a_tone_beside_the_harmonics_is_found_with_its_frequency(runs):
+    residuals = noise(runs, np.random.default_rng(1))
+    for phase, (run, residual) in enumerate(zip(runs, residuals, strict=True)):
+        residual[:, 0] += np.sin(2 * np.pi * 3.137 * run.time + phase)
+    first = dependences(runs, residuals)[0]
+    assert (first.joint, first.variable) == ("hip", "tone")
+    assert "3.14 Hz" in first.sentence
+
+
+def test_the_description_names_joint_variable_and_kind_of_run(runs):
+    residuals = with_law(runs, np.random.default_rng(2), LAWS["angle"], kinds=("with_human",))
+    text = describe(dependences(runs, residuals), excesses(runs, residuals, FLOOR))
+    assert "left at the knee goes with the knee's angle" in text
+    assert "mostly with the human" in text
+
+
+def test_of_noise_it_is_said_that_nothing_foretells_it(runs):
+    residuals = noise(runs, np.random.default_rng(3))
+    assert "depends on nothing that was measured" in describe(
+        dependences(runs, residuals), excesses(runs, residuals, FLOOR)
+    )
+
+
+def test_a_law_learnt_on_one_excitation_lowers_the_error_on_another(runs, fresh):
+    rng = np.random.default_rng(4)
+    for law in (LAWS["speed"], LAWS["angle"], product):
+        term = smooth_term(runs, with_law(runs, rng, law))
+        before = with_law(fresh, rng, law)
+        after = [e - term.torque(run) for run, e in zip(fresh, before, strict=True)]
+        # The other excitation reaches beyond what was learnt, where a curve stays at its last value.
+        assert rms(fresh, after) < 0.9 * rms(fresh, before)
+
+
+def test_two_variables_are_named_where_neither_alone_foretells(runs):
+    residuals = with_law(runs, np.random.default_rng(5), product)
+    together = smooth_term(runs, residuals).together
+    text = describe(dependences(runs, residuals), excesses(runs, residuals, FLOOR), together)
+    assert "together with" in text
+
+
+def test_noise_leaves_no_smooth_term(runs):
+    for seed in range(5):
+        assert smooth_term(runs, noise(runs, np.random.default_rng(seed))).surfaces == ()
+
+
+def test_a_wander_of_each_runs_own_is_no_law(runs):
+    rng = np.random.default_rng(6)
+    residuals = noise(runs, rng)
+    for run, residual in zip(runs, residuals, strict=True):
+        wander = lfilter([1.0], [1, -0.98], rng.normal(size=len(run.time)))
+        residual[:, 1] += wander / wander.std()
+    assert smooth_term(runs, residuals).surfaces == ()
+
+
+def test_a_run_that_does_not_know_a_variable_is_left_unexplained(runs):
+    cold = [replace(run, motion=replace(run.motion, temperature=None)) for run in runs]
+    names = {d.variable for d in dependences(cold, noise(cold, np.random.default_rng(7)))}
+    assert "temperature" not in names
+    assert "cuff_force" not in names
