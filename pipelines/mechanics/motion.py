@@ -99,13 +99,18 @@ class Motion:
         thigh, shank = self.forces[:, :2].sum(axis=1), self.forces[:, 2:].sum(axis=1)
         return self._smoothed(cuff_torque(thigh, shank, self.q, self.geometry))
 
+    @property
+    def _load_cutoff_hz(self) -> float:
+        # Long blocks make a motion whose own rate is below what a load's filter would pass.
+        return min(self.cutoff_hz, LOAD_CUTOFF_HZ, 0.4 * self.sample_rate_hz)
+
     def _smoothed(self, torque: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Smooth and differentiate: the derivatives would otherwise be those of the noise."""
         smooth, rate, curvature = torque.copy(), np.zeros_like(torque), np.zeros_like(torque)
         for stretch in self.segments():
             if stretch.stop - stretch.start < shortest(self.sample_rate_hz, self.cutoff_hz):
                 continue
-            smooth[stretch] = low_pass(torque[stretch], self.sample_rate_hz, min(self.cutoff_hz, LOAD_CUTOFF_HZ))
+            smooth[stretch] = low_pass(torque[stretch], self.sample_rate_hz, self._load_cutoff_hz)
             rate[stretch] = derivative(smooth[stretch], self.sample_rate_hz, 1)
             curvature[stretch] = derivative(smooth[stretch], self.sample_rate_hz, 2)
         return smooth, rate, curvature
