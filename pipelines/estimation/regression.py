@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.errors import InputError
 from pipelines.mechanics.motion import Motion
 from pipelines.model import Model
 from pipelines.signals.blocks import BlockAverage, dilate
@@ -50,8 +51,14 @@ class Regression:
 
 
 def block_average(motion: Motion) -> BlockAverage:
-    """Return the regression filter that the motion's file asks for."""
+    """Return the regression filter that the motion's file asks for; a filter of another kind is refused."""
     chosen = motion.metadata.get("regression_filter") or {}
+    kind = chosen.get("kind", "block_average")
+    if kind != "block_average":
+        raise InputError(
+            f'{motion.file or "the motion"}: metadata regression_filter.kind: found "{kind}", expected "block_average"; '
+            "filter the recording with `exoid filter`, or leave regression_filter out for blocks of 25 ms"
+        )
     if "decimation" in chosen:
         return BlockAverage(int(chosen["decimation"]))
     return BlockAverage.lasting(0.025, motion.sample_rate_hz)

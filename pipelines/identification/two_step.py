@@ -73,15 +73,18 @@ def identify(motions: Sequence[Motion]) -> Identified:
     train = {kind: [regress(m, models[kind]) for m in runs.of("train", kind)] for kind in runs.kinds}
     alone = solve(train["exo_alone"], _names(models["exo_alone"]))
     rows = [Row(e, p, e.run, "friction") for e, p in models["exo_alone"].linear_parameters]
-    values, covariance, critical = alone.values, alone.covariance, alone.critical
+    values, covariance = alone.values, alone.covariance
+    critical = np.full(len(rows), alone.critical)
     collinear = [f"exo_alone: {s}" for s in _collinear(train["exo_alone"], alone, models["exo_alone"])]
     if "with_human" in runs.kinds:
         second = _with_friction_held(train["with_human"], alone, models["with_human"])
         values, covariance = _joined(alone, second)
-        critical = max(critical, second.estimate.critical)
         body = [(e, p) for e, p in models["with_human"].linear_parameters if e.name == "rigid_body"]
         rows += [Row(e, p, "with_human", "inertia") for e, p in body]
         rows += [Row(e, p, "human", "inertia") for e, p in body]
+        # Each fit's intervals by its own lag; a difference of both fits is no surer than the less sure of them.
+        own, either = second.estimate.critical, max(alone.critical, second.estimate.critical)
+        critical = np.concatenate([critical, np.repeat([own, either], len(body))])
         collinear += [f"with_human: {s}" for s in second.collinear]
     table = _table(rows, values, covariance, critical)
     final = {kind: _of_run(models[kind], table, kind) for kind in runs.kinds}
@@ -152,7 +155,7 @@ def _joined(alone: Estimate, second: _Second) -> tuple[NDArray, NDArray]:
     return stack @ values, stack @ covariance @ stack.T
 
 
-def _table(rows: Sequence[Row], values: NDArray, covariance: NDArray, critical: float) -> pd.DataFrame:
+def _table(rows: Sequence[Row], values: NDArray, covariance: NDArray, critical: NDArray) -> pd.DataFrame:
     error = np.sqrt(np.diag(covariance))
     return pd.DataFrame(
         {

@@ -95,6 +95,20 @@ def test_uncertain_friction_widens_the_interval_of_inertia(noiseless_motions):
     assert np.max(poor["std_error"][body] / rich["std_error"][body]) > 1.2
 
 
+def test_slow_noise_with_the_human_widens_no_interval_of_friction(noiseless_motions):
+    """The human's runs alone tremble slowly: friction, fitted before, keeps the intervals of a session without."""
+    quiet = with_noise(noiseless_motions, "white", (0.6, 0.4), 6)
+    slow = with_noise(noiseless_motions, "0.2 s", (0.6, 0.4), 6)
+    alone, human = ("exo_alone", "with_human")
+    mixed = [s if s.run == human else q for q, s in zip(quiet, slow, strict=True)]
+    before, after = identify(quiet).parameters, identify(mixed).parameters
+    critical = ((after["ci95_high"] - after["value"]) / after["std_error"]).groupby(after["run"].fillna(alone)).first()
+    assert critical[human] > critical[alone]
+    assert_allclose(critical["human"], critical[human], rtol=1e-12)
+    first = before["run"].isna() | (before["run"] == alone)
+    assert_allclose(after["ci95_high"][first], before["ci95_high"][first], rtol=1e-12)
+
+
 def test_two_steps_agree_with_one_fit_of_everything(noiseless_motions):
     found = identify(with_noise(noiseless_motions, "20 ms", (0.6, 0.4), 3))
     apart = np.abs(found.parameters["value"] - found.one_step) / found.parameters["std_error"]
@@ -160,3 +174,11 @@ def test_runs_of_two_machines_are_refused(noiseless_motions):
     longer = replace(other, geometry=replace(other.geometry, thigh_length_m=0.45))
     with pytest.raises(InputError, match=r"exo_alone_validate.parquet has thigh_length_m 0.45, .* has 0.38952"):
         identify([noiseless_motions[0], longer, *noiseless_motions[2:]])
+
+
+def test_a_regression_filter_of_another_kind_is_refused_and_never_replaced(noiseless_motions):
+    first = noiseless_motions[0]
+    foreign = replace(first, metadata={**first.metadata, "regression_filter": {"kind": "low_pass", "cutoff_hz": 5.0}})
+    told = r'exo_alone_train.parquet: metadata regression_filter.kind: found "low_pass", expected "block_average"; '
+    with pytest.raises(InputError, match=told):
+        identify([foreign, *noiseless_motions[1:]])
