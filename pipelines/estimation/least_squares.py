@@ -144,7 +144,7 @@ def long_run_covariance(runs: Sequence[Sequence[NDArray]], parameters: int) -> t
 
 
 def _lag(segments: Sequence[NDArray], total: int) -> int:
-    """Return Andrews' lag for first-order autocorrelation, each score weighing alike."""
+    """Return Andrews' lag for first-order autocorrelation, each score weighing alike whatever its unit."""
     above, below = 0.0, 0.0
     for column in range(segments[0].shape[1]):
         now = np.concatenate([segment[1:, column] for segment in segments])
@@ -153,7 +153,8 @@ def _lag(segments: Sequence[NDArray], total: int) -> int:
         if power == 0.0:
             continue
         rho = float(np.clip(now @ before / power, -0.97, 0.97))
-        variance = float(np.mean((now - rho * before) ** 2))
+        # Of the innovations, over the score's own: scores have the units of their parameters.
+        variance = float(np.sum((now - rho * before) ** 2)) / power
         above += 4 * rho**2 * variance**2 / ((1 - rho) ** 6 * (1 + rho) ** 2)
         below += variance**2 / (1 - rho) ** 4
     if below == 0.0:

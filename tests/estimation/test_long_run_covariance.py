@@ -31,3 +31,14 @@ def test_the_critical_value_grows_with_the_share_of_the_lag():
     rng = np.random.default_rng(1)
     slow = lfilter([1], [1, -0.95], rng.standard_normal(400))[:, np.newaxis]
     assert long_run_covariance([[slow]], 1)[1] > long_run_covariance([[rng.standard_normal((400, 1))]], 1)[1] >= 1.96
+
+
+def test_a_parameter_in_another_unit_changes_no_lag():
+    """One slow score among fast ones: in rad or in degrees, the covariance is the same thing in other units."""
+    rng = np.random.default_rng(3)
+    fast, slow = (lfilter([1], [1, -rho], rng.standard_normal(4000)) for rho in (0.1, 0.95))
+    scores, scale = np.column_stack([fast, slow]), np.array([100.0, 0.01])
+    covariance, critical = long_run_covariance([[scores]], 2)
+    scaled, scaled_critical = long_run_covariance([[scores * scale]], 2)
+    assert scaled_critical == critical
+    np.testing.assert_allclose(scaled, covariance * np.outer(scale, scale), rtol=1e-10)
