@@ -17,12 +17,13 @@ from pipelines.diagnosis.fit import Fit, fit, stacked_columns
 from pipelines.diagnosis.floor import Floor, noise_floor, slow_scatter
 from pipelines.diagnosis.gain import Errors, errors_of
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, observe, with_load
+from pipelines.diagnosis.second_look import rings, slower
 from pipelines.diagnosis.status import WANDERING, Standing, status_of
 from pipelines.diagnosis.uncertainty import Uncertainty, uncertainty
 from pipelines.dynamics.replay import replay
 from pipelines.errors import ExoidError, InputError
 from pipelines.mechanics.motion import Motion
-from pipelines.model import Model, model_from_parameters
+from pipelines.model import Model, effect_named, model_from_parameters
 
 SEARCH_SHARE = 0.75
 """Of the progress bar that filling the bank takes."""
@@ -102,7 +103,18 @@ def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = s
         Where there is no run to train or none to validate on.
     """
     faults = tuple(find_faults(motions))
-    train, validate = _dealt(excluding(motions, faults))
+    sound = excluding(motions, faults)
+    first = _look(sound, faults, report)
+    if first.status != "unknown_cause" or any(fault.samples is None for fault in faults):
+        return first
+    second = _look([slower(m) for m in sound], faults, report)
+    named = {effect_named(label.partition("@")[0]) for label in second.causes}
+    return second if any(rings(effect) for effect in named) else first
+
+
+def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable[[float, str], None]) -> Diagnosis:
+    """Diagnose at the bandwidth that the motions have."""
+    train, validate = _dealt(motions)
     baseline = baseline_of(train)
     bank = fill(train, baseline, lambda share, what: report(SEARCH_SHARE * share, what))
     empty = fit((), bank.runs, baseline, bank.weights)

@@ -9,7 +9,7 @@ AT_FLOOR = 1.03
 """RMSE over floor up to which a joint has no systematic error (CONTRACTS, verdict/1)."""
 EXPLAINED = 0.2
 """Share of the systematic power that may be left of an explained joint."""
-HELD_UP = 0.3
+HELD_UP = 0.2
 """Share of the systematic power that the named causes must take away on validation runs to stay named."""
 SIGNIFICANT = 3.0
 """Standard errors of the floor by which an error must exceed it to be systematic."""

@@ -7,6 +7,7 @@ import pandas as pd
 from pipelines.diagnosis.diagnose import Diagnosis, summary_numbers
 from pipelines.diagnosis.gain import gain
 from pipelines.diagnosis.ties import tie_between
+from pipelines.diagnosis.unknown import Unknown, unknown
 from pipelines.effects import Effect
 from pipelines.estimation.regression import MASK
 from pipelines.model import effect_named
@@ -19,10 +20,12 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
     """Return the verdict as JSON objects, keys as in docs/contracts.md."""
     first = d.validate[0]
     causes = [_cause(d, label) for label in d.causes]
+    spoilt = any(fault.samples is None for fault in d.faults)
+    left = unknown(d) if d.status in ("unknown_cause", "partly_explained") and not spoilt else None
     return {
         "contract": "verdict/1",
         "status": d.status,
-        "summary": _summary(d, causes),
+        "summary": _summary(d, causes, left),
         "scoring": {
             "bandwidth_hz": first.block.cutoff_hz(first.motion.sample_rate_hz),
             "mask": MASK,
@@ -31,6 +34,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         **summary_numbers(d),
         "causes": causes,
         "data_faults": [{"file": f.file, "channel": f.channel, "what": f.what} for f in d.faults],
+        "residual": left.as_json() if left else None,
         "runs": sorted({run.motion.run for run in d.validate}),
         "noise_floor_from": "periods" if d.floor.from_periods else "the band above the motion",
     }
@@ -112,7 +116,7 @@ def _evidence(d: Diagnosis, label: str, effect: Effect, worth: float, joint: str
     return sentences
 
 
-def _summary(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
+def _summary(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -> str:
     floor = d.standing.floor
     error = d.before.errors.rms
     worst = int((error / floor).argmax())
@@ -127,12 +131,12 @@ def _summary(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
     if d.status == "unknown_cause":
         return (
             f"The model misses something that no known cause explains: the torque error is {size}. "
-            "Look at what the residual depends on, or record a richer motion."
+            f"{left.description if left else ''}"
         )
     said = " and ".join(_in_words(cause) for cause in causes)
     after = d.after.errors.rms[worst]
-    left = "which explains it" if d.status == "explained" else "and more is left that they do not explain"
-    return f"The simulation misses {said}. With it the torque error falls from {size}, to {after:.2f} N·m, {left}."
+    ending = "which explains it" if d.status == "explained" else "and more is left that they do not explain"
+    return f"The simulation misses {said}. With it the torque error falls from {size}, to {after:.2f} N·m, {ending}."
 
 
 def _in_words(cause: dict[str, Any]) -> str:

@@ -1,0 +1,51 @@
+"""What can be said, and had, where no cause is known: what the residual depends on, and a smooth term for it."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pipelines.diagnosis.dependence import Dependence, dependences, describe, excesses
+from pipelines.diagnosis.diagnose import Diagnosis
+from pipelines.diagnosis.fit import stacked_columns
+from pipelines.diagnosis.gain import errors_of
+from pipelines.diagnosis.smooth_term import smooth_term
+
+MENTIONED = 5
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """The residual that no named cause explains."""
+
+    description: str
+    depends_on: list[Dependence]
+    smooth: str
+    """The smooth term in words."""
+    rmse_nm: dict[str, float]
+    """Of the model with the smooth term, on validation runs: measured, for it may do harm there."""
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what the verdict says of it."""
+        return {
+            "description": self.description,
+            "depends_on": [{"joint": d.joint, "variable": d.variable, "share": d.share} for d in self.depends_on],
+            "smooth_term": {"what": self.smooth, "rmse_nm": self.rmse_nm},
+        }
+
+
+def unknown(d: Diagnosis) -> Unknown:
+    """Describe the residual of validation runs and extend the model by a smooth term learnt on train runs."""
+    made = d.after.fit
+    train = [y - c @ made.values for c, y in stacked_columns(made.causes, d.train, d.baseline)]
+    term = smooth_term(d.train, train)
+    found = dependences(d.validate, list(d.after.residuals))
+    above = excesses(d.validate, list(d.after.residuals), d.floor)
+    left = [r - np.nan_to_num(term.torque(run)) for run, r in zip(d.validate, d.after.residuals, strict=True)]
+    rms = errors_of(d.validate, left).rms
+    return Unknown(
+        description=describe(found, above, together=term.together),
+        depends_on=found[:MENTIONED],
+        smooth=term.describe(),
+        rmse_nm={joint: float(v) for joint, v in zip(d.baseline.joints, rms, strict=True)},
+    )
