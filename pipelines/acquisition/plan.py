@@ -45,7 +45,9 @@ def make_plan(
     run = check_trajectory(rig, trajectory, duration_s, sample_rate_hz)
     lead_in = _ramp(rig, trajectory, start, sample_rate_hz, before=True, end_s=duration_s)
     lead_out = _ramp(rig, trajectory, start, sample_rate_hz, before=False, end_s=duration_s)
-    return Plan(np.concatenate([lead_in, run, lead_out]), len(lead_in), len(lead_in) + len(run))
+    plan = Plan(np.concatenate([lead_in, run, lead_out]), len(lead_in), len(lead_in) + len(run))
+    _refuse_ramps_outside(rig, plan, start, sample_rate_hz)
+    return plan
 
 
 def check_trajectory(rig: RigSettings, trajectory: Trajectory, duration_s: float, sample_rate_hz: float) -> NDArray:
@@ -106,13 +108,38 @@ def _extended(trajectory: Trajectory, time: NDArray) -> NDArray:
     return trajectory.at(np.mod(time, trajectory.period_s) if trajectory.period_s else time)[0]
 
 
+def _refuse_ramps_outside(rig: RigSettings, plan: Plan, rest: NDArray, rate: float) -> None:
+    """Refuse a plan whose ways into and out of the run, or the seams between, leave the drives' limits.
+
+    A run shorter than the trajectory's period does not show where the ramps lead: they run its other phases.
+    """
+    speed = np.diff(np.vstack([rest, plan.reference, rest]), axis=0) * rate
+    for j, drive in enumerate(rig.drive):
+        low, high = drive.angle_rad
+        outside = ~((plan.reference[:, j] >= low) & (plan.reference[:, j] <= high))  # NaN too
+        if outside.any():
+            k = int(np.argmax(outside))
+            raise InputError(
+                f"the {drive.joint} would be at {plan.reference[k, j]:.3f} rad on the way "
+                f"{'into' if k < plan.first else 'out of'} the run, but the rig allows {low:g} to {high:g} rad; make "
+                "the excitation smaller, or record a whole period of it to see where it leaves the limits"
+            )
+        fast = ~(np.abs(speed[:, j]) <= drive.speed_rad_s * (1.0 + 1e-9))
+        if fast.any():
+            k = int(np.argmax(fast))
+            raise InputError(
+                f"the {drive.joint} would move at {speed[k, j]:.3f} rad/s {(k - plan.first) / rate:.3f} s after the "
+                f"run's beginning, but the rig allows {drive.speed_rad_s:g} rad/s; make the excitation slower or smaller"
+            )
+
+
 def _refuse_outside(rig: RigSettings, run: NDArray, time: NDArray, rate: float) -> None:
     """Refuse a motion that leaves the drives' limits."""
     margin = rig.safety.angle_margin_rad
     speed = np.diff(run, axis=0) * rate
     for j, drive in enumerate(rig.drive):
         low, high = drive.angle_rad[0] + margin, drive.angle_rad[1] - margin
-        outside = (run[:, j] < low) | (run[:, j] > high)
+        outside = ~((run[:, j] >= low) & (run[:, j] <= high))  # NaN too
         if outside.any():
             k = int(np.argmax(outside))
             raise InputError(
@@ -120,7 +147,7 @@ def _refuse_outside(rig: RigSettings, run: NDArray, time: NDArray, rate: float) 
                 f"{low:g} to {high:g} rad (its limits less angle_margin_rad); make the excitation smaller, or design "
                 "it within the rig's limits"
             )
-        fast = np.abs(speed[:, j]) > drive.speed_rad_s
+        fast = ~(np.abs(speed[:, j]) <= drive.speed_rad_s)
         if fast.any():
             k = int(np.argmax(fast))
             raise InputError(

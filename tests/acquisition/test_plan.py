@@ -65,3 +65,16 @@ def test_a_motion_too_fast_for_the_rig_is_refused(rig_file, motion):
         make_plan(load_rig(rig_file()), fast, REST, 5.0, RATE)
     assert "the hip would move at" in str(caught.value)
     assert str(caught.value).endswith("but the rig allows 3 rad/s; make the excitation slower or smaller")
+
+
+def test_a_run_shorter_than_the_period_does_not_let_the_ramps_leave_the_limits(rig_file):
+    # The first half of the period keeps the limits; the ramps run the other half, where the hip is at 2 rad.
+    half = FourierTrajectory(
+        np.array([1.2, -0.9]), np.array([[-0.8], [0.1]]), np.array([[0.0], [0.0]]), omega=0.2 * np.pi
+    )
+    rig = load_rig(rig_file(shipped="plain", ramp_s=3.0, settle_s=1.0))
+    assert half.at((np.arange(1000) + 0.5) / RATE)[0][:, 0].max() < 1.73
+    with pytest.raises(InputError) as caught:
+        make_plan(rig, half, REST, 5.0, RATE)
+    assert "the hip would be at 1.7" in str(caught.value)
+    assert "on the way into the run, but the rig allows -0.35 to 1.75 rad" in str(caught.value)
