@@ -13,6 +13,7 @@ from pipelines.contracts.provenance import sha256
 from pipelines.errors import SettingsError
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.experiment import Experiment
+from pipelines.settings.rig import load_rig
 
 SECTIONS = ("mechanism", "design", "acquire", "filter", "identify", "simulate")
 
@@ -22,6 +23,9 @@ def split(experiment: Experiment, folder: Path) -> None:
     sections: dict[str, Any] = {name: getattr(experiment, name).model_dump(mode="json") for name in SECTIONS}
     # A rig or an excitation is a setting too: its content counts, not the time of its file.
     sections["acquire"]["rig_sha256"] = _digest(experiment, "acquire.rig", experiment.acquire.rig)
+    # No stage reads this file, it only has a time for make: what the rig keeps sealed goes no further than its hash.
+    sealed = _sealed(experiment)
+    sections["acquire"]["hidden_sha256"] = sha256(sealed) if sealed else None
     for run in experiment.run:
         section = sections[f"run-{run.name}"] = run.model_dump(mode="json")
         if run.trajectory:
@@ -38,6 +42,14 @@ def _digest(experiment: Experiment, key: str, name: str) -> str:
     return sha256(path)
 
 
+def _sealed(experiment: Experiment) -> Path | None:
+    """Return the file of what the rig hides, where there is one; a rig that lacks it says so when it is started."""
+    path = experiment.file(experiment.acquire.rig)
+    plant = load_rig(path).plant
+    sealed = path.parent / plant.sealed if plant and plant.sealed else None
+    return sealed if sealed and sealed.is_file() else None
+
+
 def _write_if_changed(path: Path, text: str) -> None:
     if not path.is_file() or path.read_text(encoding="utf-8") != text:
         write_text(path, text)
@@ -49,9 +61,17 @@ def _graph(experiment: Experiment) -> str:
         "# Written by `exoid settings split`; changes here are lost.",
         f"RUNS := {' '.join(run.name for run in experiment.run)}",
         f"VALIDATE_RUNS := {validate}",
+        *_looked_at(experiment),
         *(_recording_rule(experiment, run) for run in experiment.run),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _looked_at(experiment: Experiment) -> list[str]:
+    """Return rules by which the settings are split anew where the sealed file has changed."""
+    sealed = _sealed(experiment)
+    # Its own rule, without a recipe, keeps make from giving up where the file is gone.
+    return [f"$(SETTINGS)/graph.mk: {sealed}", f"{sealed}:"] if sealed else []
 
 
 def _recording_rule(experiment: Experiment, run: RunSettings) -> str:

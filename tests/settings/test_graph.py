@@ -1,6 +1,7 @@
 """The experiment's graph of files: what a change re-runs, with stand-ins for the commands that take minutes."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -48,8 +49,7 @@ class Make:
 @pytest.fixture
 def make(tmp_path, monkeypatch):
     shipped = tmp_path / "datasets"
-    (shipped / "rigs").mkdir(parents=True)
-    (shipped / "rigs" / "default.toml").write_text("embedded = true\n")
+    shutil.copytree(datasets() / "rigs", shipped / "rigs")
     (shipped / "experiments").symlink_to(datasets() / "experiments")
     monkeypatch.setattr("pipelines.settings.template.datasets", lambda: shipped)
     stand_in = tmp_path / "stand-in"
@@ -88,8 +88,26 @@ def test_only_what_depends_on_a_change_runs_again(make):
 
 def test_a_change_of_the_rig_records_again(make):
     make()
-    (make.folder / "rigs" / "default.toml").write_text("embedded = false\n")
+    rig = make.folder / "rigs" / "default.toml"
+    rig.write_text(rig.read_text().replace("cuff_force_n = 400.0", "cuff_force_n = 300.0"))
     assert sorted(make()) == sorted(["acquire", "filter"] * 4 + FIT)
+
+
+def test_a_change_of_what_the_rig_hides_records_again(make):
+    make()
+    sealed = make.folder / "rigs" / "sealed" / "default.toml"
+    sealed.touch()
+    assert make() == []
+    sealed.write_text(sealed.read_text().replace("seed = 20", "seed = 21"))
+    assert sorted(make()) == sorted(["acquire", "filter"] * 4 + FIT)
+    assert make() == []
+
+
+def test_make_goes_on_without_the_sealed_file(make):
+    make()
+    (make.folder / "rigs" / "sealed" / "default.toml").unlink()
+    make.change("order = 4", "order = 2")
+    assert "filter" in make()
 
 
 def test_a_run_with_an_excitation_of_its_own_heeds_it_alone(make):
