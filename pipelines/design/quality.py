@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from pipelines.errors import InputError
+from pipelines.estimation.regression import away_from_reversals
 from pipelines.mechanics.leg import INERTIAL, Geometry
 from pipelines.mechanics.limits import Margin, margins
 from pipelines.mechanics.motion import Motion
@@ -76,14 +77,17 @@ def quality(trajectory: Trajectory, settings: DesignSettings, geometry: Geometry
 
 def regressor(trajectory: Trajectory, geometry: Geometry, time: NDArray) -> NDArray:
     """Regressor of rigid body and friction at times (n,), shape (n, 2, 8)."""
+    return paper_model().regressor(_planned(trajectory, geometry, time))
+
+
+def _planned(trajectory: Trajectory, geometry: Geometry, time: NDArray, sample_rate_hz: float = 200.0) -> Motion:
     q, dq, ddq = trajectory.at(time)
     nothing = np.zeros_like(q)
     count = len(time)
-    motion = Motion(
+    return Motion(
         time, q, dq, ddq, torque=nothing, load=nothing, segment=np.zeros(count, np.int64), valid=np.ones(count, bool),
-        geometry=geometry,
+        sample_rate_hz=sample_rate_hz, geometry=geometry,
     )  # fmt: skip
-    return paper_model().regressor(motion)
 
 
 def standard_errors(trajectory: Trajectory, noise: NoiseSettings, geometry: Geometry, sample_rate_hz: float) -> NDArray:
@@ -91,11 +95,13 @@ def standard_errors(trajectory: Trajectory, noise: NoiseSettings, geometry: Geom
 
     Torque noise of a joint is stationary, with standard deviation s and correlation exp(-|t| / T). With weights
     1 / s², information I = sum of A_j'A_j / s_j² and R the noise's correlation matrix, the fit's covariance is
-    I⁻¹ (sum of A_j' R A_j / s_j²) I⁻¹ exactly (White's sandwich), whatever the fit believes of its noise.
+    I⁻¹ (sum of A_j' R A_j / s_j²) I⁻¹ exactly (White's sandwich), whatever the fit believes of its noise. Rows near
+    a joint's reversals are zero in A_j, because the fit leaves them out.
     """
     duration = min(noise.duration_s, trajectory.duration_s)
-    A = regressor(trajectory, geometry, np.arange(0.0, duration, 1.0 / sample_rate_hz))
-    A = A / np.array([noise.hip_nm, noise.knee_nm])[:, np.newaxis]
+    motion = _planned(trajectory, geometry, np.arange(0.0, duration, 1.0 / sample_rate_hz), sample_rate_hz)
+    weight = away_from_reversals(motion) / np.array([noise.hip_nm, noise.knee_nm])
+    A = paper_model().regressor(motion) * weight[:, :, np.newaxis]
     rho = np.exp(-1.0 / (sample_rate_hz * noise.correlation_s)) if noise.correlation_s > 0.0 else 0.0
     # Row k of ``earlier`` is sum over i < k of rho^(k - i) A_i, so that A'RA = A'A + A'earlier + earlier'A.
     earlier = lfilter([0.0, rho], [1.0, -rho], A, axis=0)

@@ -143,7 +143,11 @@ def test_a_design_survives_its_file(tmp_path):
 def test_expected_standard_errors_are_the_scatter_of_simulated_fits(published, correlation_s):
     noise = NoiseSettings(hip_nm=1.5, knee_nm=0.5, correlation_s=correlation_s, duration_s=20.0)
     expected = standard_errors(published, noise, Geometry(), 100.0)
-    A = regressor(published, Geometry(), np.arange(0.0, 20.0, 0.01))
+    time = np.arange(0.0, 20.0, 0.01)
+    A = regressor(published, Geometry(), time)
+    # 0.08 s around what is slower than 0.04 rad/s no fit looks at.
+    slow = np.abs(published.at(time)[1]) < 0.04
+    A[np.column_stack([np.convolve(column, np.ones(17), "same") > 0 for column in slow.T])] = 0.0
     size = np.array([noise.hip_nm, noise.knee_nm])
     fit = np.linalg.pinv((A / size[:, np.newaxis]).reshape(-1, 8))
     rng = np.random.default_rng(0)
