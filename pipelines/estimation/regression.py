@@ -56,7 +56,8 @@ def block_average(motion: Motion) -> BlockAverage:
     kind = chosen.get("kind", "block_average")
     if kind != "block_average":
         raise InputError(
-            f'{motion.file or "the motion"}: metadata regression_filter.kind: found "{kind}", expected "block_average"; '
+            f'{motion.file or "the motion"}: metadata regression_filter.kind: found "{kind}", '
+            'expected "block_average"; '
             "filter the recording with `exoid filter`, or leave regression_filter out for blocks of 25 ms"
         )
     if "decimation" in chosen:
