@@ -21,7 +21,9 @@ def load(path: Path) -> tuple[pa.Table, dict[str, Any]]:
     try:
         # Not read_table(path): it would take a folder named "run=1" above the file for a column of a data set.
         table = pq.ParquetFile(path).read()
-    except (pa.ArrowException, UnicodeDecodeError) as error:
+    except (pa.ArrowException, UnicodeDecodeError, OSError) as error:
+        if isinstance(error, OSError) and error.errno:
+            raise  # the system's refusal; Arrow tells of a damaged page by an OSError that has no number
         raise ContractError(f"{path}: {_what_is_wrong_with_the_bytes(path)}") from error
     return table, _metadata(table.schema, path)
 

@@ -352,3 +352,12 @@ def test_a_motion_needs_what_a_recording_lacks(swinging_leg, run_metadata):
         "a.parquet: column hip_angle_measured_rad is missing, expected measured joint angle (rad); "
         "a motion/1 table must have it"
     )
+
+
+def test_a_damaged_page_is_one_line_that_names_the_file(tmp_path, swinging_leg, run_metadata):
+    path = tmp_path / "a.parquet"
+    RECORDING.write(path, swinging_leg, run_metadata)
+    content = bytearray(path.read_bytes())
+    content[4:400] = bytes(396)
+    path.write_bytes(content)
+    assert refusal(storage.load, path) == f"{path}: is a damaged or truncated Parquet file; copy or make it again"
