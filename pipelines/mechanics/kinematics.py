@@ -115,7 +115,7 @@ def differentiate(
         raise InputError(
             f"no stretch without a gap lasts the {2 * edge / rate_hz:.2f} s that a {cutoff.hz:.1f} Hz filter needs; "
             "the longest has "
-            f"{len(longest)} samples: record longer runs, or raise filter.cutoff_hz"
+            f"{_count(len(longest))}: record longer runs, or raise filter.cutoff_hz"
         )
     return Kinematics(q, dq, ddq, segment, valid, cutoff)
 
@@ -124,7 +124,7 @@ def _cutoff(time: NDArray, angle: NDArray, rate_hz: float, settings: FilterSetti
     if settings.cutoff_hz == "auto":
         if len(time) < 2 * shortest(rate_hz, rate_hz / 8):
             raise InputError(
-                f"the longest stretch without a gap has {len(time)} samples, too few to choose a cut-off from; "
+                f"the longest stretch without a gap has {_count(len(time))}, too few to choose a cut-off from; "
                 "record longer runs, or set filter.cutoff_hz"
             )
         return choose_cutoff(_on_grid(time, angle, rate_hz)[1], rate_hz, names)
@@ -134,6 +134,10 @@ def _cutoff(time: NDArray, angle: NDArray, rate_hz: float, settings: FilterSetti
             f"{rate_hz:g} Hz; lower it"
         )
     return Cutoff(settings.cutoff_hz, "set by hand")
+
+
+def _count(samples: int) -> str:
+    return "1 sample" if samples == 1 else f"{samples} samples"
 
 
 def _filtered(time: NDArray, angle: NDArray, rate_hz: float, cutoff_hz: float, order: int) -> list[NDArray]:
