@@ -21,6 +21,7 @@ def check(config: Annotated[Path, typer.Argument(help="The experiment's exoid.to
     from pipelines.settings import Experiment
 
     experiment = Experiment.load(config)
+    experiment.refuse_what_cannot_run()
     console.emit(experiment.model_dump(mode="json"))
     console.say(f"{config}: {len(experiment.run)} runs, all settings are valid")
 

@@ -1,5 +1,6 @@
 """``[design]``: the excitation and the search for it."""
 
+import math
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
@@ -19,6 +20,11 @@ class Bounds(Settings):
         low, high = self.angle_rad
         if low >= high:
             raise ValueError(f"angle_rad: found [{low}, {high}], expected the lowest angle first; swap them")
+        if max(abs(low), abs(high)) > 2 * math.pi:
+            raise ValueError(
+                f"angle_rad: found [{low}, {high}], expected radians, at most one turn; it looks like degrees, "
+                f"write [{math.radians(low):.4f}, {math.radians(high):.4f}]"
+            )
         return self
 
 

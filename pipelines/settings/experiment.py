@@ -61,6 +61,22 @@ class Experiment(Settings):
         """Return the path of a file that the settings name."""
         return self._path.parent / name
 
+    def refuse_what_cannot_run(self) -> None:
+        """Refuse what only other files or other sections show: a file that is not there, a cut-off above Nyquist's."""
+        named = {"acquire.rig": self.acquire.rig}
+        named |= {f"run {run.name}.trajectory": run.trajectory for run in self.run if run.trajectory}
+        for key, name in named.items():
+            if not self.file(name).is_file():
+                raise SettingsError(
+                    f"{self._path}: {key}: {self.file(name)}: no such file; name one relative to the experiment's file"
+                )
+        cutoff_hz, rate_hz = self.filter.cutoff_hz, self.acquire.sample_rate_hz
+        if cutoff_hz != "auto" and cutoff_hz >= rate_hz / 2:
+            raise SettingsError(
+                f"{self._path}: filter.cutoff_hz: found {cutoff_hz:g}, expected less than half of "
+                f"acquire.sample_rate_hz, {rate_hz:g} Hz; lower it"
+            )
+
     def run_named(self, name: str) -> RunSettings:
         """Return one run's settings by its name."""
         for run in self.run:

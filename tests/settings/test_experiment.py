@@ -8,6 +8,7 @@ import pytest
 from pipelines.errors import SettingsError
 from pipelines.settings import Experiment, datasets
 from pipelines.settings.base import models_in
+from pipelines.settings.design import Bounds
 from pipelines.settings.reference import reference, sections_of
 
 ROOT = Path(__file__).parents[2]
@@ -100,3 +101,27 @@ def test_what_is_no_toml_is_refused(tmp_path, content, told):
 def test_an_unknown_run_is_told_with_the_known_ones():
     with pytest.raises(SettingsError, match=r"exoid\.toml: has no \[\[run\]\] named with_human; "):
         Experiment().run_named("with_human")
+
+
+def test_bounds_in_degrees_are_refused_with_their_radians():
+    with pytest.raises(ValueError, match=r"looks like degrees, write \[0.0873, 1.2217\]"):
+        Bounds(angle_rad=(5.0, 70.0))
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ('[acquire]\nrig = "no.toml"', "acquire.rig: .*no.toml: no such file"),
+        (
+            '[acquire]\nrig = "exoid.toml"\n[[run]]\nname = "a"\nrun = "exo_alone"\npurpose = "train"\n'
+            'trajectory = "b.toml"',
+            "run a.trajectory: .*b.toml: no such file",
+        ),
+        ('[acquire]\nrig = "exoid.toml"\n[filter]\ncutoff_hz = 100.0', "filter.cutoff_hz: found 100, expected less"),
+    ],
+)
+def test_what_cannot_run_is_refused_before_anything_runs(tmp_path, text, complaint):
+    path = tmp_path / "exoid.toml"
+    path.write_text(text)
+    with pytest.raises(SettingsError, match=complaint):
+        Experiment.load(path).refuse_what_cannot_run()
