@@ -28,10 +28,14 @@ def rig(
     """
     from pipelines.rig.server import serve_file
 
+    told = False
+
     def announce(host: str, port: int) -> None:
+        nonlocal told
+        if not told and not until_input_ends:
+            console.say(f"{file}: a virtual rig, {run}; Ctrl-C ends it")
+            told = True
         # Not through the console: whoever started the rig waits for this line.
         print(f"{host}:{port}", flush=True)
 
-    if not until_input_ends:
-        console.say(f"{file}: a virtual rig, {run}; Ctrl-C ends it")
     serve_file(file, run, seed, port, sample_rate_hz, announce, until_input_ends=until_input_ends)
