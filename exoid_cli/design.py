@@ -100,4 +100,4 @@ def _show(file: str, found: "Quality") -> None:
     console.table(headings, rows, numbers="lowest, highest, at least, at most, margin")
     outside = [str(margin) for margin in found.margins if not margin.kept]
     if outside:
-        console.warn(f"{file}: outside its limits, and `exoid acquire` will refuse it: {'; '.join(outside)}")
+        console.warn(f"{file}: outside its limits: {'; '.join(outside)}")
