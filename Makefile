@@ -18,7 +18,7 @@ help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | sort | expand -t 12
 
 all: $(INSTALLED) ## design, acquire, filter, identify and simulate the default experiment, into build/default
-	@$(EXPERIMENT) all
+	+@$(EXPERIMENT) all
 
 test: $(INSTALLED) ## the tests
 	$(BIN)/pytest -n 2 -m "not slow"
