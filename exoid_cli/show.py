@@ -22,15 +22,22 @@ def show(
     found = inspect(file)
     console.emit(found.as_json())
     console.say(f"{file}: {found.contract}, {found.purpose}")
-    _show_facts("Where it came from", found.origin)
-    _show_facts("Metadata", found.metadata)
     if found.columns:
         headings = ("column", "unit", "type", "min", "max", "nulls")
         rows = [[column[heading] for heading in headings] for column in found.columns]
         console.say(f"\n{found.rows} rows")
         console.table(headings, [_shortened(row) for row in rows], numbers="min, max, nulls")
+    _show_facts("Where it came from", _folded(found.origin))
+    _show_facts("Metadata", found.metadata)
     if found.fault:
         raise found.fault
+
+
+def _folded(origin: dict[str, Any]) -> dict[str, Any]:
+    """Say of the settings only that they are there: they are a screenful."""
+    if "config" not in origin:
+        return origin
+    return {**origin, "config": f"{len(_lines({'config': origin['config']}))} settings; --json shows them"}
 
 
 def _show_facts(title: str, facts: dict[str, Any]) -> None:

@@ -46,7 +46,7 @@ def _alike(found: pa.DataType, expected: pa.DataType) -> bool:
         return _alike(found.value_type, expected)
     if _is_list(found) and _is_list(expected):
         return _alike(found.value_type, expected.value_type)
-    same_kind = (_is_number, _is_text, pa.types.is_boolean, pa.types.is_struct)
+    same_kind = (_is_number, is_text, pa.types.is_boolean, pa.types.is_struct)
     return any(is_kind(found) and is_kind(expected) for is_kind in same_kind)
 
 
@@ -58,7 +58,8 @@ def _is_number(dtype: pa.DataType) -> bool:
     return pa.types.is_integer(dtype) or pa.types.is_floating(dtype) or pa.types.is_decimal(dtype)
 
 
-def _is_text(dtype: pa.DataType) -> bool:
+def is_text(dtype: pa.DataType) -> bool:
+    """Tell whether a type is one of Arrow's for text."""
     return pa.types.is_string(dtype) or pa.types.is_large_string(dtype) or pa.types.is_string_view(dtype)
 
 

@@ -26,7 +26,7 @@ class Inspection:
     metadata: dict[str, Any] = field(default_factory=dict)
     rows: int = 0
     columns: list[dict[str, Any]] = field(default_factory=list)
-    """Each with column, unit, type, min, max, nulls and meaning."""
+    """Each with column, unit, type, min and max (None for text), nulls (NaN among them) and meaning."""
     fault: ContractError | None = None
     """Why the file does not keep its contract, if so."""
 
@@ -69,7 +69,9 @@ def _column(table: pa.Table, name: str) -> dict[str, Any]:
     index = table.column_names.index(name)
     column, about = table.column(index), table.schema.field(index).metadata or {}
     low, high = None, None
-    if not pa.types.is_nested(column.type):
+    if pa.types.is_floating(column.type):
+        column = pc.if_else(pc.is_nan(column), None, column)  # no number is no value, however it is written
+    if not (pa.types.is_nested(column.type) or checks.is_text(column.type)):
         low, high = pc.min_max(column).as_py().values()
     return {
         "column": name,

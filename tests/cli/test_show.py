@@ -28,7 +28,7 @@ def test_a_table_is_shown_with_origin_metadata_and_columns_in_80_columns(exoid, 
     assert outcome.code == 0
     title, *lines = outcome.out.splitlines()
     assert title == f"{recording}: recording/1, one run on the rig"
-    for expected in ("created_by", "excitation.toml", "config.bounds.hip", "sample_rate_hz", "rad", "-0.5", "float64"):
+    for expected in ("created_by", "excitation.toml", "2 settings;", "sample_rate_hz", "rad", "-0.5", "float64"):
         assert expected in outcome.out
     assert all(len(line) <= 80 for line in lines)
 
@@ -42,6 +42,8 @@ def test_json_may_be_asked_for_before_or_after_the_command(exoid, recording):
     columns = {column["column"]: column for column in found["columns"]}
     assert columns["hip_angle_rad"]["max"] == 0.5
     assert columns["hip_current_a"]["nulls"] == 5
+    assert (columns["lab_note"]["min"], columns["lab_note"]["max"]) == (None, None)
+    assert found["origin"]["config"]["bounds"] == {"hip": [0, 1]}
 
 
 def test_quiet_prints_nothing(exoid, recording):
@@ -83,3 +85,12 @@ def test_what_is_no_exoid_file_is_one_line_and_exit_code_2(exoid, tmp_path, cont
     assert outcome.code == 2
     assert outcome.err.startswith(f"exoid: {path}: ")
     assert outcome.err.count("\n") == 1
+
+
+def test_nan_counts_as_missing_and_is_in_no_range(exoid, tmp_path):
+    import pyarrow as pa
+
+    path = tmp_path / "nan.parquet"
+    parquet.save(path, pa.table({"time_s": [0.0, float("nan"), None, 1.0]}), {"contract": "trajectory/1"})
+    (column,) = json.loads(exoid("show", path, "--json").out)["columns"]
+    assert (column["nulls"], column["min"], column["max"]) == (2, 0.0, 1.0)
