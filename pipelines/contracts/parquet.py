@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,8 @@ from pipelines.errors import ContractError
 
 KEY = b"exoid"
 MAGIC = b"PAR1"
+STREAM = b"\xff\xff\xff\xff"
+"""How an Arrow stream starts, and so the journal of a run."""
 
 
 def load(path: Path) -> tuple[pa.Table, dict[str, Any]]:
@@ -81,9 +84,22 @@ def _refuse_what_is_no_file(path: Path) -> None:
 
 
 def _what_is_wrong_with_the_bytes(path: Path) -> str:
-    if (start := _start(path)) != MAGIC:
+    if (start := _start(path)) == STREAM:
+        return (
+            f"is an Arrow stream: the journal of a run that was killed, with {_whole_rows(path)} whole samples; "
+            "read it with pyarrow.ipc.open_stream, batch by batch, see docs/rig.md"
+        )
+    if start != MAGIC:
         return f"is not a Parquet file (it starts with {start!r}, expected {MAGIC!r}); name a file that exoid wrote"
     return "is a damaged or truncated Parquet file; copy or make it again"
+
+
+def _whole_rows(path: Path) -> int:
+    rows = 0
+    with suppress(pa.ArrowException, OSError), open(path, "rb") as file:  # cut off; what stands before is whole
+        for batch in pa.ipc.open_stream(file):
+            rows += batch.num_rows
+    return rows
 
 
 def _start(path: Path) -> bytes:

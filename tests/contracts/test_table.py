@@ -361,3 +361,16 @@ def test_a_damaged_page_is_one_line_that_names_the_file(tmp_path, swinging_leg, 
     content[4:400] = bytes(396)
     path.write_bytes(content)
     assert refusal(storage.load, path) == f"{path}: is a damaged or truncated Parquet file; copy or make it again"
+
+
+def test_a_journal_is_recognised_and_its_whole_samples_are_counted(tmp_path):
+    path = tmp_path / "a.parquet.journal"
+    batch = pa.record_batch({"time_s": [0.0, 0.005, 0.01]})
+    with open(path, "wb") as file, pa.ipc.new_stream(file, batch.schema) as stream:
+        stream.write_batch(batch)
+        stream.write_batch(batch)
+    path.write_bytes(path.read_bytes()[:-40])
+    assert refusal(storage.load, path) == (
+        f"{path}: is an Arrow stream: the journal of a run that was killed, with 3 whole samples; "
+        "read it with pyarrow.ipc.open_stream, batch by batch, see docs/rig.md"
+    )
