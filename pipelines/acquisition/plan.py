@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.errors import InputError
+from pipelines.mechanics.ramp import smooth_share
 from pipelines.mechanics.trajectory import Trajectory
 from pipelines.registers import Block
 from pipelines.settings.rig import RigSettings, registers_of
@@ -84,8 +85,7 @@ def _ramp(
     settle_s = rig.safety.settle_s if before else 0.0
     while ramp_s <= LONGEST_RAMP_S:
         ahead = (np.arange(round((ramp_s + settle_s) * rate)) + 0.5) / rate
-        s = np.minimum(1.0, ahead / ramp_s)
-        share = (s**3 * (10.0 - 15.0 * s + 6.0 * s**2))[:, np.newaxis]
+        share = smooth_share(ahead / ramp_s)[:, np.newaxis]
         # Time runs backwards from the motion's beginning, forwards from its end; the share grows towards it.
         motion = _extended(trajectory, -ahead[::-1] if before else end_s + ahead)
         reference = rest + (share if before else share[::-1]) * (motion - rest)

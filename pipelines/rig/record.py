@@ -7,6 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.mechanics.motion import CUFFS
+from pipelines.mechanics.ramp import smooth_share
 from pipelines.mechanics.trajectory import Trajectory
 from pipelines.rig.plant import JOINTS, Plant
 
@@ -45,8 +46,7 @@ def record(
 def _lead_in(start: NDArray, trajectory: Trajectory, samples: int, rate: float) -> NDArray:
     """Return set-points (n, J) from rest into the motion: a share of it that grows smoothly from 0 to 1."""
     ahead = (np.arange(-samples, 0) + 0.5) / rate
-    s = np.minimum(1.0, 1.0 + (ahead + 0.25 * LEAD_S) / (0.75 * LEAD_S))
-    share = (s**3 * (10.0 - 15.0 * s + 6.0 * s**2))[:, np.newaxis]
+    share = smooth_share((ahead + LEAD_S) / (0.75 * LEAD_S))[:, np.newaxis]
     period = trajectory.period_s
     motion = trajectory.at(np.mod(ahead, period) if period else np.zeros(samples))[0]
     return start + share * (motion - start)
