@@ -4,6 +4,7 @@ import asyncio
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +14,15 @@ from pipelines.acquisition.journal import Journal
 from pipelines.acquisition.machine import Machine, Row
 from pipelines.acquisition.pace import Lockstep, PhaseLock
 from pipelines.acquisition.plan import Plan
-from pipelines.acquisition.safety import Limits, stop
+from pipelines.acquisition.safety import Limits, refuse_leap, stop
 from pipelines.errors import DeviceError
 
 REPORT_S = 0.1
 RATE_SAMPLES = 50
 RATE_TOLERANCE = 0.05
 """How far the devices' clock may be from the rate that was asked for, and after how many samples that is looked at."""
+REST_RAD = 0.02
+"""How far the leg may have moved between the plan and the moment at which the drives are enabled."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,8 @@ class Loop:
 
     def __post_init__(self) -> None:
         self._speed = np.zeros_like(self.sent)
-        self._limits = Limits(self.machine.rig, self.rate)
+        self._sent_at = time.monotonic()
+        self._limits = Limits(self.machine.rig, self.rate, [sensor.settings for sensor in self.machine.sensors])
         self._watchdog = self.machine.rig.safety.watchdog_s
         self._began: float | None = None
         self._columns = columns_of(self.machine)
@@ -85,32 +89,56 @@ class Loop:
     async def _follow(self) -> None:
         """Send set-point after set-point; raise DeviceError as soon as something is wrong."""
         pace, path = self._pace(), np.vstack([self.sent, self.plan.reference])
-        first = last = await self._exchange(path[0], np.zeros_like(self.sent))
+        await self._check_rest()
+        first = last = await self._exchange(path[0], np.zeros_like(self.sent), 0)
         began = fresh = reported = time.monotonic()
         # What is sent while a sample is latched is reached at the end of the next one.
         while last.sequence - first.sequence < len(path):
             found = await pace.wait(last.sequence)
             if self.stopped_by:
                 raise DeviceError(f"stopped by {self.stopped_by[0]}")
+            self._watch(time.monotonic() - fresh, last.sequence, found)
             index = min(found - first.sequence, len(path) - 1)
-            row = await self._exchange(path[index], (path[index] - path[index - 1]) * self.rate)
+            row = await self._exchange(path[index], (path[index] - path[index - 1]) * self.rate, found - last.sequence)
             now = time.monotonic()
-            self._watch(now - fresh, last, row)
+            self._watch(now - fresh, last.sequence, row.sequence)
             if row.sequence == last.sequence:
                 continue
+            self._check_clock(last, row)
+            if why := self._limits.violation(row):
+                raise DeviceError(why)
             self._keep(row, row.sequence - first.sequence - 2, row.sequence - last.sequence - 1)
             if row.sequence - first.sequence >= RATE_SAMPLES:
                 self._check_rate(first, row)
-            if why := self._limits.violation(row):
-                raise DeviceError(why)
             fresh, last = now, row
             if now - reported >= REPORT_S:
                 reported = now
                 self._tell(row, row.sequence - first.sequence, now - began)
 
-    async def _exchange(self, reference: NDArray, speed: NDArray) -> Row:
-        """Exchange all devices; remember how the set-points move, in case they must be slowed down."""
-        self.sent, self._speed = reference, speed
+    async def _check_rest(self) -> None:
+        """Refuse to enable drives whose leg no longer stands where the plan begins, or after a signal."""
+        row = await self.machine.look()
+        if self.stopped_by:
+            raise DeviceError(f"stopped by {self.stopped_by[0]}")
+        for drive, planned, found in zip(self.machine.rig.drive, self.sent, row.angle, strict=True):
+            if not abs(found - planned) <= REST_RAD:
+                raise DeviceError(
+                    f"the {drive.joint} moved from {planned:.3f} to {found:.3f} rad before its drive was enabled; keep "
+                    "the leg still and start again"
+                )
+        if why := self._limits.violation(row):
+            raise DeviceError(why)
+
+    async def _exchange(self, reference: NDArray, speed: NDArray, samples: int) -> Row:
+        """Exchange all devices, ``samples`` after the last time.
+
+        Remembers how the set-points move, in case they must be slowed down.
+        """
+        now, elapsed = time.monotonic(), samples / self.rate
+        if self.machine.rig.clock == "real_time":  # a counter that leaps does not make time go by
+            elapsed = min(elapsed, now - self._sent_at + 1.0 / self.rate)
+        refuse_leap(self.machine.rig, self.sent, reference, elapsed)
+        self.sent, self._speed, self._sent_at = reference, speed, now
         self._cycle += 1
         return await self.machine.cycle(reference, self._cycle)
 
@@ -126,23 +154,35 @@ class Loop:
             self._began = row.time - (index - first) / self.rate
         self.journal.append([row.time - self._began, *(value(row) for value in self._columns.values())])
 
-    def _watch(self, waited: float, last: Row, row: Row) -> None:
-        """Refuse to go on after too long a wait, or with a counter that runs backwards."""
+    def _watch(self, waited: float, last: int, found: int) -> None:
+        """Refuse to go on after too long a wait, or with a counter that runs backwards or leaps."""
         device = self.machine.drives[0].device.label
         if waited > self._watchdog:
             raise DeviceError(
                 f"watchdog: no new sample from {device} for {waited:.3f} s, allowed are {self._watchdog:g} s; its "
                 "counter stands still, or this computer is too busy"
             )
-        if row.sequence < last.sequence:
+        if found < last:
+            raise DeviceError(f"{device}: its sample counter went back from {last} to {found}; was it restarted?")
+        most = 1 + ceil(self._watchdog * self.rate)
+        if found > last + most:
             raise DeviceError(
-                f"{device}: its sample counter went back from {last.sequence} to {row.sequence}; was it restarted?"
+                f"{device}: its sample counter leapt from {last} to {found}, expected at most {most} samples within "
+                f"the watchdog's {self._watchdog:g} s; was it restarted?"
+            )
+
+    def _check_clock(self, last: Row, row: Row) -> None:
+        """Refuse a device clock that does not go on with the samples."""
+        if not row.time > last.time:
+            raise DeviceError(
+                f"{self.machine.drives[0].device.label}: its clock went from {last.time:.6f} to {row.time:.6f} s while "
+                f"its counter went from {last.sequence} to {row.sequence}; was it restarted?"
             )
 
     def _check_rate(self, first: Row, row: Row) -> None:
         """Refuse a device clock that does not tell the sample rate; a wrong unit in the rig file shows here."""
         found = (row.sequence - first.sequence) / max(row.time - first.time, 1e-9)
-        if abs(found / self.rate - 1.0) > RATE_TOLERANCE:
+        if not abs(found / self.rate - 1.0) <= RATE_TOLERANCE:
             raise DeviceError(
                 f"{self.machine.drives[0].device.label}: samples {found:.4g} times a second by its own clock, expected "
                 f"{self.rate:g}; correct acquire.sample_rate_hz, or the unit of time in the rig file"

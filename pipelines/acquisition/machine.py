@@ -1,6 +1,7 @@
 """The rig as acquisition sees it: drives and force sensors that together deliver one row a cycle."""
 
 import asyncio
+import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,7 +75,7 @@ class Drive:
     async def count(self) -> int:
         """Read the sample counter alone."""
         words = await self.device.read(self._counter.address, self._counter.count)
-        return int(self._sequence(self._counter.decode(words)["sequence"]))
+        return int(self._sequence(self._decoded(self._counter, words)["sequence"]))
 
     async def exchange(self, reference: float, *, enable: bool = True) -> Reading:
         """Send a set-point (rad) and return the sample that is latched."""
@@ -90,8 +91,19 @@ class Drive:
         words = self.tell.encode({"reference": reference, "control": self.map.disable})
         await self.device.write(self.tell, words)
 
+    def _decoded(self, block: Block, words: list[int]) -> dict[str, float]:
+        """Decode words; whatever is counted with must be a number."""
+        told = block.decode(words)
+        for name in ("sequence", "time", "status"):
+            if not np.isfinite(told.get(name, 0.0)):
+                raise DeviceError(
+                    f"{self.device.label}: its {name} is {told[name]}, expected a number; compare the register map in "
+                    "the rig file with the device's manual"
+                )
+        return told
+
     def _reading(self, words: list[int]) -> Reading:
-        told = self.told.decode(words)
+        told = self._decoded(self.told, words)
         if fault := int(told.get("status", 0)) & self.map.fault_mask:
             raise DeviceError(
                 f"{self.device.label}: reports a fault (status bits 0x{fault:04X}); see the drive's manual, "
@@ -207,12 +219,14 @@ class Machine:
         """Exchange every drive; one that has not latched the others' sample yet is asked again."""
         pairs = list(zip(self.drives, reference.tolist(), strict=True))
         readings = list(await asyncio.gather(*(drive.exchange(angle) for drive, angle in pairs)))
-        tries = int(self.rig.safety.watchdog_s / LAG_PAUSE_S)
-        for _ in range(tries):
+        until = time.monotonic() + self.rig.safety.watchdog_s
+        while True:
             counts = [reading.sequence - ahead for reading, ahead in zip(readings, self._ahead, strict=True)]
             late = [j for j, count in enumerate(counts) if count < max(counts)]
             if not late:
                 return tuple(readings)
+            if time.monotonic() > until:
+                break
             await asyncio.sleep(LAG_PAUSE_S)
             for j in late:
                 readings[j] = await self.drives[j].exchange(reference[j])

@@ -129,7 +129,7 @@ def _refuse_ramps_outside(rig: RigSettings, plan: Plan, rest: NDArray, rate: flo
             k = int(np.argmax(fast))
             raise InputError(
                 f"the {drive.joint} would move at {speed[k, j]:.3f} rad/s {(k - plan.first) / rate:.3f} s after the "
-                f"run's beginning, but the rig allows {drive.speed_rad_s:g} rad/s; make the excitation slower or smaller"
+                f"run's beginning, but the rig allows {drive.speed_rad_s:g} rad/s; make the excitation slower"
             )
 
 

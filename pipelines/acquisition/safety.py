@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +10,9 @@ from numpy.typing import NDArray
 from pipelines.acquisition.machine import Drive, Row
 from pipelines.errors import DeviceError
 from pipelines.mechanics.motion import CUFFS
-from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig import RigSettings, SensorSettings
 
+ROUNDING_RAD = 1e-9
 HOLD_SAMPLES = 20
 """Samples for which a stopped drive holds before its torque is taken away."""
 
@@ -18,9 +20,13 @@ HOLD_SAMPLES = 20
 class Limits:
     """The limits of a rig, checked at every sample."""
 
-    def __init__(self, rig: RigSettings, sample_rate_hz: float) -> None:
+    def __init__(self, rig: RigSettings, sample_rate_hz: float, sensors: Sequence[SensorSettings] = ()) -> None:
+        """Watch drives, and those cuff sensors that are read."""
         self._rig = rig
         self._rate = sample_rate_hz
+        self._sensors = {CUFFS.index(sensor.cuff): sensor for sensor in sensors}
+        self._felt: dict[int, int] = {}
+        """Of each cuff the machine's counter at its last fresh sample."""
         self._last: Row | None = None
 
     def violation(self, row: Row) -> str | None:
@@ -31,18 +37,36 @@ class Limits:
             if not low <= found.angle <= high:
                 return f"{drive.joint} angle {found.angle:.3f} rad is outside its limits {low:g} to {high:g} rad"
             speed = found.velocity
-            if np.isnan(speed) and last is not None and row.sequence > last.sequence:
+            if np.isnan(speed):
                 # The drive tells no speed: what the angle did since the last sample.
-                step = found.angle - last.drives[j].angle
-                speed = step * self._rate / (row.sequence - last.sequence)
-            if abs(speed) > drive.speed_rad_s:
+                before = row if last is None else last
+                step = found.angle - before.drives[j].angle
+                speed = step * self._rate / max(row.sequence - before.sequence, 1)
+            # Written so that a NaN breaks every limit.
+            if not abs(speed) <= drive.speed_rad_s:
                 return f"{drive.joint} speed {speed:.3f} rad/s is above its limit of {drive.speed_rad_s:g} rad/s"
-            if abs(found.torque) > drive.torque_nm:
+            if not abs(found.torque) <= drive.torque_nm:
                 return f"{drive.joint} torque {found.torque:.1f} N·m is above its limit of {drive.torque_nm:g} N·m"
-        return self._force_violation(row.forces)
+        return self.force_violation(row.forces) or self._silence(row)
 
-    def _force_violation(self, forces: NDArray) -> str | None:
-        high = np.abs(forces) > self._rig.safety.cuff_force_n  # NaN, a sensor not read, is never high
+    def _silence(self, row: Row) -> str | None:
+        """Return which cuff sensor has told nothing for too long: its limit would be watched by nobody."""
+        for cuff, sensor in self._sensors.items():
+            if np.isfinite(row.forces[cuff]).all():
+                self._felt[cuff] = row.sequence
+            silent_s = (row.sequence - self._felt.setdefault(cuff, row.sequence)) / self._rate
+            if silent_s > self._rig.safety.watchdog_s + sensor.every / self._rate:
+                return (
+                    f"watchdog: no new sample from sensor {sensor.cuff} ({sensor.host}:{sensor.port}, unit "
+                    f"{sensor.unit}) for {silent_s:.3f} s, allowed are {self._rig.safety.watchdog_s:g} s; its counter "
+                    "stands still, or what it sends is no number"
+                )
+        return None
+
+    def force_violation(self, forces: NDArray) -> str | None:
+        """Return which force (4, 3) N is above the limit; rows all NaN are sensors without a new sample."""
+        told = ~np.isnan(forces).all(axis=1, keepdims=True)
+        high = told & ~(np.abs(forces) <= self._rig.safety.cuff_force_n)
         if not high.any():
             return None
         cuff, axis = np.argwhere(high)[0]
@@ -50,6 +74,26 @@ class Limits:
             f"{CUFFS[cuff]} force {'xyz'[axis]} {forces[cuff, axis]:.0f} N is above the limit of "
             f"{self._rig.safety.cuff_force_n:g} N"
         )
+
+
+def refuse_leap(rig: RigSettings, last: NDArray, reference: NDArray, elapsed_s: float) -> None:
+    """Stand between the plan and the wire: refuse set-points (J,) rad that no planned motion may ask for.
+
+    Whatever went wrong before, each is a number, within its joint's limits, and no further from the ``last``
+    one than its speed limit allows in the time between.
+    """
+    for drive, before, angle in zip(rig.drive, last, reference, strict=True):
+        low, high = drive.angle_rad
+        if not low <= angle <= high:
+            raise DeviceError(
+                f"{drive.joint}: a set-point of {angle:.3f} rad was due, outside its limits {low:g} to {high:g} rad; "
+                "it was not sent"
+            )
+        if not abs(angle - before) <= drive.speed_rad_s * elapsed_s + ROUNDING_RAD:
+            raise DeviceError(
+                f"{drive.joint}: a set-point of {angle:.3f} rad was due {elapsed_s:.3f} s after {before:.3f} rad, "
+                f"faster than its limit of {drive.speed_rad_s:g} rad/s; it was not sent"
+            )
 
 
 async def stop(drive: Drive, reference: float, speed: float, deceleration: float, sample_rate_hz: float) -> str | None:

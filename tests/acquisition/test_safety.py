@@ -2,6 +2,7 @@
 
 import json
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,10 +11,11 @@ from pymodbus.constants import ExcCodes
 
 from pipelines.acquisition.journal import journal_of
 from pipelines.acquisition.machine import Reading, Row
-from pipelines.acquisition.safety import HOLD_SAMPLES, Limits, slowing
+from pipelines.acquisition.plan import make_plan
+from pipelines.acquisition.safety import HOLD_SAMPLES, Limits, refuse_leap, slowing
 from pipelines.contracts import RECORDING
 from pipelines.errors import DeviceError, InputError
-from pipelines.rig.server import READ_WRITE, Drive
+from pipelines.rig.server import READ_WRITE, Drive, Sensor
 from pipelines.settings.rig import load_rig
 
 RATE = 200.0
@@ -28,6 +30,21 @@ class After:
     def __call__(self, device, function, written):
         self.left -= function == READ_WRITE and isinstance(device, Drive) and device.joint == 1
         return self.fault(device, function) if self.left < 0 else None
+
+
+@pytest.fixture
+def stopped(record):
+    """Record a run that is stopped; whatever the cause, every drive that can be reached is disabled at its end."""
+
+    def run(within_reach=(0, 1), **arguments):
+        served = arguments.setdefault("served_as", [])
+        with pytest.raises(DeviceError) as caught:
+            record(**arguments)
+        assert [served[0].enabled[j] for j in within_reach] == [False] * len(within_reach)
+        assert "\n" not in str(caught.value)
+        return str(caught.value)
+
+    return run
 
 
 def aborted(tmp_path):
@@ -51,8 +68,12 @@ def row(hip=None, knee=None, forces=None):
         ({"hip": {"angle": 1.8}}, "hip angle 1.800 rad is outside its limits -0.35 to 1.75 rad"),
         ({"knee": {"velocity": -3.6}}, "knee speed -3.600 rad/s is above its limit of 3.5 rad/s"),
         ({"hip": {"torque": -151.0}}, "hip torque -151.0 N·m is above its limit of 150 N·m"),
-        ({"forces": np.where(np.arange(12).reshape(4, 3) == 4, -401.0, np.nan)},
+        ({"forces": np.array([[np.nan] * 3, [0.0, -401.0, 0.0], [np.nan] * 3, [np.nan] * 3])},
          "thigh_back force y -401 N is above the limit of 400 N"),
+        ({"forces": np.array([[np.nan] * 3, [0.0, 0.0, np.nan], [np.nan] * 3, [np.nan] * 3])},
+         "thigh_back force z nan N is above the limit of 400 N"),
+        ({"knee": {"angle": np.nan}}, "knee angle nan rad is outside its limits -2.1 to 0.35 rad"),
+        ({"hip": {"torque": np.nan}}, "hip torque nan N·m is above its limit of 150 N·m"),
     ],
 )  # fmt: skip
 def test_each_limit_is_watched_at_every_sample(rig_file, found, message):
@@ -85,82 +106,152 @@ def test_a_stop_never_leaves_the_limits():
     ("changes", "run", "words"),
     [({"torque_nm": 5.0}, "exo_alone", "torque"), ({"cuff_force_n": 25.0}, "with_human", "force")],
 )
-def test_a_broken_limit_ends_the_run_safely_and_keeps_the_record(record, tmp_path, changes, run, words):
-    served = []
+def test_a_broken_limit_ends_the_run_safely_and_keeps_the_record(stopped, tmp_path, changes, run, words):
     # The ramp may break the limit too; then there is nothing to keep, and that is said.
-    with pytest.raises(DeviceError) as caught:
-        record(run=run, served_as=served, **changes)
-    assert words in str(caught.value)
-    assert "the leg was stopped" in str(caught.value)
-    assert served[0].enabled == [False, False]
+    why = stopped(run=run, **changes)
+    assert words in why
+    assert "the leg was stopped" in why
     assert not journal_of(tmp_path / "test.parquet").exists()
     assert not (tmp_path / "test.parquet").exists()
 
 
-def test_an_exception_reply_ends_the_run_with_device_and_registers(record, tmp_path):
-    served = []
-    with pytest.raises(DeviceError) as caught:
-        record(served_as=served, fault=After(300, lambda *_: ExcCodes.DEVICE_FAILURE))
-    assert "drive knee (127.0.0.1:" in str(caught.value)
+def refuse_exchanges(device, function):
+    return ExcCodes.DEVICE_FAILURE if function == READ_WRITE else None
+
+
+def test_an_exception_reply_ends_the_run_with_device_and_registers(stopped, tmp_path):
+    why = stopped(fault=After(300, refuse_exchanges))
+    assert "drive knee (127.0.0.1:" in why
     assert (
         "unit 2): answered an exchange (writing registers 200 to 202, reading 100 to 113) with Modbus exception 4: "
         "it failed; compare the register map in the rig file with the device's manual"
-    ) in str(caught.value)
+    ) in why
     table = aborted(tmp_path)
     assert "Modbus exception 4" in table.metadata["abort"]
     assert 50 < len(table.frame) < 150
-    assert "\n" not in str(caught.value)
 
 
-def test_a_drive_that_still_answers_is_disabled_when_the_other_is_lost(record):
-    served = []
-
+def test_a_drive_that_still_answers_is_disabled_when_the_other_is_lost(stopped):
     def knee_fails(device, function):
         return ExcCodes.DEVICE_FAILURE if isinstance(device, Drive) and device.joint == 1 else None
 
-    with pytest.raises(DeviceError) as caught:
-        record(served_as=served, fault=After(300, knee_fails))
-    assert served[0].enabled[0] is False
-    assert "and could not be disabled: drive knee" in str(caught.value)
+    assert "and could not be disabled: drive knee" in stopped(fault=After(300, knee_fails), within_reach=[0])
 
 
-def test_a_rig_that_stops_half_way_leaves_the_record(record, tmp_path):
+def test_a_rig_that_stops_half_way_leaves_the_record(stopped, tmp_path):
     served = []
 
     def leave(device, function):
         served[0].stop_soon()
 
-    with pytest.raises(DeviceError) as caught:
-        record(served_as=served, fault=After(300, leave), watchdog_s=0.3)
-    assert "did not answer" in str(caught.value)
+    why = stopped(served_as=served, fault=After(300, leave), watchdog_s=0.3, within_reach=[])
+    assert "did not answer" in why
+    assert "and could not be disabled: drive hip" in why
     assert len(aborted(tmp_path).frame) > 50
 
 
-def test_a_counter_that_stands_still_trips_the_watchdog(record, tmp_path):
+def test_a_counter_that_stands_still_trips_the_watchdog(stopped, tmp_path):
     def freeze(device, function):
         device.rig.catch_up = lambda: None
 
     began = time.monotonic()
-    with pytest.raises(DeviceError) as caught:
-        record(fault=After(300, freeze), watchdog_s=0.3)
-    assert "watchdog: no new sample from drive hip" in str(caught.value)
+    assert "watchdog: no new sample from drive hip" in stopped(fault=After(300, freeze), watchdog_s=0.3)
     assert time.monotonic() - began < 30
     assert "watchdog" in aborted(tmp_path).metadata["abort"]
 
 
-def test_a_fault_bit_ends_the_run(record):
+def test_a_fault_bit_ends_the_run(stopped):
     def complain(device, function):
         device.rig.enabled = np.array([8, 8])
 
-    with pytest.raises(DeviceError) as caught:
-        record(fault=After(10, complain))
-    assert "reports a fault (status bits 0x0008); see the drive's manual" in str(caught.value)
+    assert "reports a fault (status bits 0x0008); see the drive's manual" in stopped(fault=After(10, complain))
 
 
-def test_a_clock_in_another_unit_than_the_rig_file_says_is_noticed(record):
-    with pytest.raises(DeviceError) as caught:
-        record(replace={"seed = 1": "sample_rate_hz = 100.0\nseed = 1"})
-    assert "samples 100 times a second by its own clock, expected 200" in str(caught.value)
+def test_a_clock_in_another_unit_than_the_rig_file_says_is_noticed(stopped):
+    why = stopped(replace={"seed = 1": "sample_rate_hz = 100.0\nseed = 1"})
+    assert "samples 100 times a second by its own clock, expected 200" in why
+
+
+def shows(device, sample):
+    """Let every device show another sample than the plant's; ``sample`` makes it of the true one.
+
+    It begins with the hip, which is asked first, so that both drives agree in what they show.
+    """
+    for each in device.rig.drives if device is device.rig.drives[0] else ():
+        each.show = lambda true, each=each: type(each).show(each, sample(true))
+
+
+@pytest.mark.parametrize("shipped", ["plain", "real_time"])
+@pytest.mark.parametrize(
+    ("counter", "words"),
+    [(lambda count: 0 * count, "its sample counter went back from"),
+     (lambda count: count + 900, "its sample counter leapt from")],
+)  # fmt: skip
+def test_a_counter_that_leaps_either_way_ends_the_run_before_a_set_point_follows_it(stopped, shipped, counter, words):
+    served, sent = [], []
+
+    def leap(device, function):
+        shows(device, lambda true: replace(true, sequence=counter(true.sequence)))
+        reference, enabled = device.rig.drives[0].command()
+        sent.extend([reference] if enabled else [])
+
+    why = stopped(
+        shipped=shipped, served_as=served, fault=After(150, leap), rate_hz=50.0, duration_s=4.0,
+        replace={"seed = 1 ": "sample_rate_hz = 50.0\nseed = 1 "},
+    )  # fmt: skip
+    assert words in why
+    assert np.abs(np.diff(sent)).max() < 3.0 * 3 / 50  # what the speed limit allows, and some missed samples
+
+
+def test_a_clock_that_stands_still_ends_the_run_and_what_was_recorded_is_kept(stopped, tmp_path):
+    why = stopped(fault=After(300, lambda device, _: shows(device, lambda true: replace(true, time=0 * true.time + 1))))
+    assert "drive hip (127.0.0.1:" in why
+    assert "its clock went from 1." in why
+    assert len(aborted(tmp_path).frame) > 50
+
+
+def test_a_glitch_of_the_encoder_is_told_and_is_not_in_the_record(stopped, tmp_path):
+    fault = After(300, lambda device, _: shows(device, lambda true: replace(true, angle=true.angle + 100.0)))
+    assert "hip angle 100." in stopped(fault=fault)
+    table = aborted(tmp_path)
+    assert "is outside its limits" in table.metadata["abort"]
+    assert table.frame["hip_angle_rad"].abs().max() < 2.0
+
+
+@pytest.mark.parametrize("silence", ["counter", "number"])
+def test_a_cuff_sensor_that_falls_silent_ends_the_run(stopped, silence):
+    began = []
+
+    def fall_silent(device, function):
+        if not began:
+            began.append(device.rig.sample.sequence)
+            nothing = {"sequence": began[0]} if silence == "counter" else {"forces": np.full((1, 4, 3), np.nan)}
+            for sensor in device.rig.sensors:
+                sensor.show = lambda true, sensor=sensor: Sensor.show(sensor, replace(true, **nothing))
+
+    why = stopped(run="with_human", fault=After(300, fall_silent), watchdog_s=0.2)
+    assert "watchdog: no new sample from sensor thigh_front (127.0.0.1:" in why
+    assert "allowed are 0.2 s; its counter stands still, or what it sends is no number" in why
+
+
+@pytest.mark.parametrize("angle", [np.nan, 1.8, 0.52])
+def test_no_set_point_is_sent_that_is_no_number_or_beyond_a_limit_or_too_far_from_the_last(rig_file, angle):
+    rig, last = load_rig(rig_file()), np.array([0.5, 0.0])
+    refuse_leap(rig, last, np.array([0.514, 0.0]), 1 / RATE)
+    with pytest.raises(DeviceError, match="it was not sent"):
+        refuse_leap(rig, last, np.array([angle, 0.0]), 1 / RATE)
+
+
+def test_a_leg_that_moves_before_the_drives_are_enabled_is_left_alone(stopped, monkeypatch):
+    served, planned = [], make_plan
+
+    def plan_while_it_moves(*arguments):
+        shows(served[0].rig.drives[0], lambda true: replace(true, angle=true.angle + 0.1))
+        return planned(*arguments)
+
+    monkeypatch.setattr("pipelines.acquisition.acquire.make_plan", plan_while_it_moves)
+    assert "the hip moved from 0.000 to 0.100 rad before its drive was enabled" in stopped(served_as=served)
+    assert served[0].rig.sample.sequence[0] == 0
 
 
 def test_a_trajectory_outside_the_limits_is_refused_before_anything_moves(record):
