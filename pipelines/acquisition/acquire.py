@@ -20,7 +20,7 @@ from pipelines.acquisition.pace import urgent
 from pipelines.acquisition.plan import check_start, check_trajectory, make_plan
 from pipelines.contracts import RECORDING
 from pipelines.contracts.provenance import describe
-from pipelines.errors import DeviceError, about
+from pipelines.errors import DeviceError, ExoidError, about
 from pipelines.mechanics.trajectory import Trajectory, read_trajectory
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.mechanism import MechanismSettings
@@ -109,7 +109,8 @@ async def _record(
 @contextmanager
 def _signals() -> Iterator[list[str]]:
     """Collect the names of signals that ask for a stop, so that the loop and nothing else acts on them."""
-    names = {signal.SIGINT: "Ctrl-C", signal.SIGTERM: "SIGTERM"}
+    # A terminal that is closed must not leave a drive enabled either.
+    names = {signal.SIGINT: "Ctrl-C", signal.SIGTERM: "SIGTERM", signal.SIGHUP: "SIGHUP", signal.SIGQUIT: "SIGQUIT"}
     loop, came = asyncio.get_running_loop(), list[str]()
     # Outside a process's main thread nobody can catch signals, and nobody is sent them.
     with suppress(NotImplementedError, RuntimeError, ValueError):
@@ -131,7 +132,13 @@ def _finish(output: Path, journal: Path, abort: str | None, gaps: list[tuple[flo
         raise DeviceError(f"{abort}; the leg was stopped before the recording began")
     metadata |= {"gaps": gaps} | ({"abort": abort} if abort else {})
     path = _aborted(output) if abort else output
-    RECORDING.write(path, frame, metadata)
+    try:
+        RECORDING.write(path, frame, metadata)
+    except (ExoidError, OSError) as error:
+        raise DeviceError(
+            f"{abort or 'the run is complete'}; its {len(frame)} samples are in {journal}, but could not be written as "
+            f"a recording: {error}"
+        ) from error
     journal.unlink()
     if abort:
         raise DeviceError(f"{abort}; the leg was stopped, its {len(frame)} samples so far are in {path}")

@@ -75,6 +75,8 @@ class Loop:
             await self._follow()
         except DeviceError as error:
             why = str(error)
+        except Exception as error:  # what was recorded, and what the stop has to say, must not be lost
+            why = f"a fault of exoid's own ({error!r}); please report it"
         finally:  # a fault of exoid's own must not leave a drive enabled either
             complaints = await self._stop()
         if complaints:
@@ -198,9 +200,21 @@ class Loop:
     async def _stop(self) -> list[str]:
         """Bring every drive to rest and take its torque away; return what went wrong with that."""
         safety, told = self.machine.rig.safety, zip(self.machine.drives, self.sent, self._speed, strict=True)
+        at_once = asyncio.Event()
         stops = [
-            stop(drive, float(reference), float(speed), safety.deceleration_rad_s2, self.rate)
+            stop(drive, float(reference), float(speed), safety.deceleration_rad_s2, self.rate, at_once)
             for drive, reference, speed in told
             if drive.touched
         ]
-        return [complaint for complaint in await asyncio.gather(*stops) if complaint]
+        feeling = asyncio.create_task(self._feel(at_once))
+        complaints = await asyncio.gather(*stops, return_exceptions=True)
+        feeling.cancel()
+        await asyncio.gather(feeling, return_exceptions=True)
+        return [str(complaint) for complaint in complaints if complaint]
+
+    async def _feel(self, at_once: asyncio.Event) -> None:
+        """Watch the cuffs while the drives slow down: whoever is still pressed is not to be held there."""
+        while not at_once.is_set():
+            if self._limits.force_violation(await self.machine.felt(0)):
+                at_once.set()
+            await asyncio.sleep(1.0 / self.rate)

@@ -87,9 +87,14 @@ class Drive:
         return reading
 
     async def disable(self, reference: float) -> None:
-        """Take the torque away."""
+        """Take the torque away; where the line fails, once more on a new one."""
         words = self.tell.encode({"reference": reference, "control": self.map.disable})
-        await self.device.write(self.tell, words)
+        try:
+            await self.device.write(self.tell, words)
+        except DeviceError:
+            self.device.close()
+            await self.device.connect()
+            await self.device.write(self.tell, words)
 
     def _decoded(self, block: Block, words: list[int]) -> dict[str, float]:
         """Decode words; whatever is counted with must be a number."""
@@ -191,7 +196,7 @@ class Machine:
         looks = [await asyncio.gather(*(drive.look() for drive in self.drives)) for _ in range(LOOKS)]
         ahead = np.array([[reading.sequence - look[0].sequence for reading in look] for look in looks])
         self._ahead = np.median(ahead, axis=0).astype(int).tolist()
-        return Row(tuple(looks[-1]), await self._felt(0))
+        return Row(tuple(looks[-1]), await self.felt(0))
 
     async def cycle(self, reference: NDArray, number: int) -> Row:
         """Send set-points (J,) rad and return the sample that is latched in all devices.
@@ -200,12 +205,13 @@ class Machine:
         tell when a new sample begins, so sensors are read after it.
         """
         if self.rig.clock == "lockstep":
-            forces = await self._felt(number)
+            forces = await self.felt(number)
             return Row(await self._exchange(reference), forces)
         drives = await self._exchange(reference)
-        return Row(drives, await self._felt(number))
+        return Row(drives, await self.felt(number))
 
-    async def _felt(self, number: int) -> NDArray:
+    async def felt(self, number: int) -> NDArray:
+        """Return the forces (4, 3) N of those sensors that are due in a cycle."""
         due = [sensor for sensor in self.sensors if number % sensor.settings.every == 0]
         if not due:
             return self._no_force

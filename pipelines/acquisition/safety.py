@@ -96,7 +96,9 @@ def refuse_leap(rig: RigSettings, last: NDArray, reference: NDArray, elapsed_s: 
             )
 
 
-async def stop(drive: Drive, reference: float, speed: float, deceleration: float, sample_rate_hz: float) -> str | None:
+async def stop(
+    drive: Drive, reference: float, speed: float, deceleration: float, sample_rate_hz: float, at_once: asyncio.Event
+) -> str | None:
     """Bring one drive to rest and take its torque away, whatever happens to the others.
 
     Parameters
@@ -105,6 +107,8 @@ async def stop(drive: Drive, reference: float, speed: float, deceleration: float
         Last set-point that was sent, rad, and its speed, rad/s.
     deceleration : float
         rad/s².
+    at_once : asyncio.Event
+        Set where slowing down would go on pressing: every drive is then disabled without it.
 
     Returns
     -------
@@ -114,16 +118,20 @@ async def stop(drive: Drive, reference: float, speed: float, deceleration: float
     last, due = reference, time.perf_counter()
     try:
         for last in slowing(reference, speed, deceleration, sample_rate_hz, drive.settings.angle_rad).tolist():
-            await drive.exchange(last)
+            if at_once.is_set():
+                break
+            found = await drive.exchange(last)
+            if not abs(found.torque) <= drive.settings.torque_nm:
+                at_once.set()
             # On the host's clock: the device's counter may be what has failed.
             due += 0.0 if drive.in_lockstep else 1.0 / sample_rate_hz
             await asyncio.sleep(max(0.0, due - time.perf_counter()))
-    except DeviceError:
-        pass  # it may still hear that it shall disable
+    except Exception:  # whatever it is, the drive may still hear that it shall disable
+        pass
     try:
         await drive.disable(last)
-    except DeviceError as error:
-        return str(error)
+    except Exception as error:  # one drive's failure must not hide another's
+        return str(error) if isinstance(error, DeviceError) else f"{drive.device.label}: {error!r}"
     return None
 
 

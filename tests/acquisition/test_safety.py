@@ -9,7 +9,8 @@ import pytest
 from numpy.testing import assert_allclose
 from pymodbus.constants import ExcCodes
 
-from pipelines.acquisition.journal import journal_of
+from pipelines.acquisition.device import Device as Line
+from pipelines.acquisition.journal import journal_of, read_journal
 from pipelines.acquisition.machine import Reading, Row
 from pipelines.acquisition.plan import make_plan
 from pipelines.acquisition.safety import HOLD_SAMPLES, Limits, refuse_leap, slowing
@@ -138,6 +139,74 @@ def test_a_drive_that_still_answers_is_disabled_when_the_other_is_lost(stopped):
     assert "and could not be disabled: drive knee" in stopped(fault=After(300, knee_fails), within_reach=[0])
 
 
+def test_a_drive_whose_line_breaks_is_disabled_on_a_new_one(stopped, monkeypatch):
+    write, tried = Line.write, []
+
+    async def breaks(line, block, words):
+        tried.append(line.label)
+        if tried.count(line.label) == 1:
+            line.close()
+        await write(line, block, words)
+
+    monkeypatch.setattr(Line, "write", breaks)
+    assert "could not be disabled" not in stopped(fault=After(300, refuse_exchanges))
+    assert len(tried) == 4
+
+
+def test_what_goes_wrong_with_one_drives_stop_neither_hides_nor_hinders_the_other(stopped, monkeypatch):
+    encode, disable = Line.exchange, Line.write
+
+    async def fails(line, *arguments):
+        if "hip" in line.label:
+            raise ValueError("no number")
+        await disable(line, *arguments)
+
+    async def exchange(line, *arguments):
+        if "hip" in line.label and broken:
+            raise ValueError("no number")
+        return await encode(line, *arguments)
+
+    broken = []
+    monkeypatch.setattr(Line, "write", fails)
+    monkeypatch.setattr(Line, "exchange", exchange)
+    why = stopped(fault=After(300, lambda *_: broken.append(True)), within_reach=[1])
+    assert "a fault of exoid's own (ValueError('no number'))" in why
+    assert "and could not be disabled: drive hip (127.0.0.1:" in why
+
+
+@pytest.mark.parametrize("still_pressed", [True, False])
+def test_where_a_cuff_still_presses_the_drives_are_disabled_without_slowing_down(stopped, still_pressed):
+    exchanges, pressed = [], []
+
+    def press(device, function):
+        if function == READ_WRITE:
+            exchanges.append(device.joint)
+        force = 500.0 if still_pressed or len(pressed) < 1 else 0.0
+        if isinstance(device, Sensor):
+            pressed.append(force)
+            device.show = lambda true: Sensor.show(device, replace(true, forces=np.full((1, 4, 3), force)))
+
+    assert "force x 500 N is above the limit" in stopped(run="with_human", fault=After(300, press))
+    # An exchange is a write and a read of each of two drives.
+    assert (len(exchanges) < 4 * HOLD_SAMPLES) == still_pressed
+
+
+def test_a_recording_that_cannot_be_written_does_not_hide_why_the_run_was_stopped(stopped, tmp_path):
+    hot = {"temperature = { address = 112, type = \"int16\", scale = 0.1":
+           "temperature = { address = 114, type = \"float32\", scale = 1.0"}  # fmt: skip
+
+    def burn(device, function):
+        shows(device, lambda true: replace(true, temperature=np.inf * true.temperature))
+        if device.rig.sample.sequence[0] > 400:
+            device.rig.catch_up = lambda: None
+
+    why = stopped(fault=After(300, burn), watchdog_s=0.3, replace=hot, duration_s=3.0)
+    journal = journal_of(tmp_path / "test.parquet")
+    assert why.startswith("watchdog: no new sample from drive hip")
+    assert f"samples are in {journal}, but could not be written as a recording" in why
+    assert len(read_journal(journal)[0]) > 100
+
+
 def test_a_rig_that_stops_half_way_leaves_the_record(stopped, tmp_path):
     served = []
 
@@ -196,7 +265,7 @@ def test_a_counter_that_leaps_either_way_ends_the_run_before_a_set_point_follows
         sent.extend([reference] if enabled else [])
 
     why = stopped(
-        shipped=shipped, served_as=served, fault=After(150, leap), rate_hz=50.0, duration_s=4.0,
+        shipped=shipped, served_as=served, fault=After(150, leap), rate_hz=50.0, duration_s=4.0, torque_nm=1000.0,
         replace={"seed = 1 ": "sample_rate_hz = 50.0\nseed = 1 "},
     )  # fmt: skip
     assert words in why
