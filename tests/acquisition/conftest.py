@@ -75,7 +75,7 @@ class Served:
 
     def start(self) -> None:
         self._thread.start()
-        assert self._listening.wait(60)
+        assert self._listening.wait(180)  # the first start compiles the plant
 
     @property
     def enabled(self) -> list[bool]:

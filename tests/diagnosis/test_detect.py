@@ -94,8 +94,8 @@ def test_the_needed_noncentrality_is_the_square_of_two_quantiles():
 
 
 def test_what_is_material_takes_its_share_of_a_joints_error():
-    rms = np.array([0.05, 0.05])  # so little noise that anything would show
-    runs = runs_on(RICH)
+    rms = np.array([0.05, 0.05])
+    runs = 3 * runs_on(RICH)  # so much data that anything would show
     floor = Floor(np.append(rms, [np.nan, np.nan]), np.ones(4), from_periods=False)
     one = next(d for d in detectability(runs, baseline_of(runs), floor) if d.effect.label == "torque_drift@knee")
     assert one.limited_by == "materiality"
