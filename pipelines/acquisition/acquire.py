@@ -99,9 +99,16 @@ async def _record(
             if why := check_start(rig, start):
                 raise DeviceError(why)
             plan = make_plan(rig, trajectory, start, run.duration_s, rate)
-            with Journal(path, ["time_s", *columns_of(machine)], metadata) as journal:
-                loop = Loop(machine, plan, journal, rate, report, stopped_by, sent=start)
-                return await loop.run(), loop.gaps
+            abort = None
+            try:
+                with Journal(path, ["time_s", *columns_of(machine)], metadata) as journal:
+                    loop = Loop(machine, plan, journal, rate, report, stopped_by, sent=start)
+                    abort = await loop.run()
+            except OSError as error:  # a full disk must not hide that a drive could not be disabled
+                raise DeviceError(
+                    f"{path}: cannot be written ({error}); make room{f'. {abort}' if abort else ''}"
+                ) from error
+            return abort, loop.gaps
         finally:
             machine.close()
 

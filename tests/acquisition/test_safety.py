@@ -207,6 +207,16 @@ def test_a_recording_that_cannot_be_written_does_not_hide_why_the_run_was_stoppe
     assert len(read_journal(journal)[0]) > 100
 
 
+def test_a_full_disk_stops_the_leg_and_is_told(stopped, monkeypatch):
+    def full(journal):
+        if journal.rows > 50:
+            raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("pipelines.acquisition.journal.Journal.flush", full)
+    why = stopped(watchdog_s=0.5, duration_s=4.0)
+    assert "test.parquet.journal: cannot be written ([Errno 28] No space left on device); make room" in why
+
+
 def test_a_rig_that_stops_half_way_leaves_the_record(stopped, tmp_path):
     served = []
 
