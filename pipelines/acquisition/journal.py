@@ -60,9 +60,9 @@ class Journal:
 
     def close(self) -> None:
         """Write the rest and close the file."""
-        self.flush()
-        self._stream.close()
-        self._file.close()
+        with self._file:  # closed even where the disk is full
+            self.flush()
+            self._stream.close()
 
     def __enter__(self) -> Self:
         """Return the journal; it is closed at the end of the block."""
