@@ -42,8 +42,7 @@ $(OUT)/identified/parameters.parquet: $(MOTIONS) $(SETTINGS)/identify.json $(SET
 $(OUT)/simulated/rbf.parquet: $(OUT)/identified/parameters.parquet $(SETTINGS)/simulate.json $(SETTINGS)/mechanism.json
 	$(EXOID) simulate $< --config $(CONFIG) -o $(@D)/
 
-$(OUT)/simulated/replay-%.parquet: $(OUT)/identified/parameters.parquet $(OUT)/recordings/%.parquet \
-    $(SETTINGS)/simulate.json
+$(OUT)/simulated/replay-%.parquet: $(OUT)/identified/parameters.parquet $(OUT)/recordings/%.parquet
 	$(EXOID) simulate $< --replay $(OUT)/recordings/$*.parquet --config $(CONFIG) -o $@
 
 # Kept: a recording and a motion are results, not steps on the way.

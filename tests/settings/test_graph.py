@@ -74,7 +74,7 @@ def test_only_what_depends_on_a_change_runs_again(make):
     make.change("[design]  ", "[design] # a comment")
     assert make() == []
     make.change("feedback_gain_nm_s_rad = 300.0", "feedback_gain_nm_s_rad = 400.0")
-    assert make() == ["simulate"] * 3
+    assert make() == ["simulate"]
     make.change("[identify]\nfigures = true", "[identify]\nfigures = false")
     assert make() == FIT
     make.change("order = 4", "order = 2")
