@@ -18,7 +18,7 @@ def candidates(d: Diagnosis) -> pd.DataFrame:
         _row(d, labels, scored.score, refined.get(labels))
         for level, refined in zip(d.choice.levels, d.choice.refined[1:], strict=False)
         for labels, scored in level.items()
-        if np.isfinite(scored.score)
+        if np.isfinite(scored.score) and len(set(labels)) == len(labels)
     ]
     rows += [_absorbed(d, effect.name, joint, into) for effect in EFFECTS for joint, into in effect.absorbed.items()
              if joint in d.baseline.joints]  # fmt: skip

@@ -69,21 +69,29 @@ def choose(bank: Bank, floor: Floor) -> Choice:
         if not finalists:
             break
         best = max(finalists, key=lambda r: r.score)
-        if not _worth_it(best, named, len(bank.baseline.joints)):
+        freer = [_rank(bank, s, empty, independent) for s in _freer(level, named)]
+        if not all(_worth_it(best, before, len(bank.baseline.joints)) for before in (named, *freer)):
             break
         named = best
     return Choice(named, levels, ranked, independent)
 
 
+def _freer(level: dict[tuple[str, ...], Scored], named: Ranked) -> list[Scored]:
+    """Return the named set with one of its causes in two shapes at once, the best of such sets, if there is any."""
+    made = [tuple(sorted((*named.labels, label))) for label in named.labels]
+    found = [level[labels] for labels in made if labels in level]
+    return sorted(found, key=lambda s: -s.score)[:1]
+
+
 def _finalists(level: dict[tuple[str, ...], Scored]) -> list[Scored]:
-    ordered = sorted(level.values(), key=lambda s: -s.score)
+    ordered = sorted((s for labels, s in level.items() if len(set(labels)) == len(labels)), key=lambda s: -s.score)
     return [s for s in ordered[:FINALISTS] if s.score > ordered[0].score - BEHIND]
 
 
 def _rank(bank: Bank, scored: Scored, empty: Fit, independent: NDArray) -> Ranked:
     """Refine a set's shapes and score it on what it was fitted to, less a price for every parameter."""
     best = refined([bank.candidates[i] for i in scored.chosen], bank.runs, bank.baseline, bank.weights)
-    gain = log_likelihood(best.rms, empty.rms, independent, imperfection(bank))
+    gain = log_likelihood(best.rms, empty.rms, independent, imperfection(bank.gram))
     # One that bends the motion has no amplitude of its own, but its shape is as free as one.
     columns = len(best.values) - len(empty.values) + sum(c.bends for c in best.causes)
     return Ranked(best, gain - cost(best.causes, columns, independent))
@@ -105,7 +113,7 @@ def rivals(choice: Choice, bank: Bank, cause: str) -> dict[str, float]:
     fine = choice.refined[size]
     best_coarse = choice.levels[size - 1][choice.named.labels].score
     for labels, scored in choice.levels[size - 1].items():
-        if set(others) <= set(labels) and len(labels) == len(others) + 1:
+        if set(others) <= set(labels) and len(set(labels)) == len(labels) == size:
             rival = next(iter(set(labels) - set(others)))
             gap = choice.named.score - fine[labels].score if labels in fine else best_coarse - scored.score
             behind[rival] = max(gap, 0.0) if rival != cause else 0.0

@@ -37,12 +37,14 @@ from pipelines.diagnosis.floor import Floor, noise_floor
 from pipelines.diagnosis.gram import solve
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, observe, with_load
 from pipelines.diagnosis.scan import BENDING, values_of
-from pipelines.diagnosis.search import SHAPE_COST
+from pipelines.diagnosis.search import SHAPE_COST, imperfection
 from pipelines.effects import Effect, Parameter
 from pipelines.mechanics.motion import Motion
 
 POWER = 0.9
 """Chance that an effect of the smallest visible size is found."""
+USUAL = 0.8
+"""Share of a family's shapes that the smallest size is enough for, none being known beforehand."""
 SHAPES = 6
 """Values of a free shape parameter that stand for its range."""
 ONSETS = (0.25, 0.5, 0.75)
@@ -69,7 +71,7 @@ class Detectable:
     smallest: float
     """The magnitude in the unit of ``parameter``."""
     shape: tuple[tuple[str, float], ...]
-    """Shape parameters that the size holds for: of all tried the median, none being known beforehand."""
+    """Shape parameters that the size holds for: it is enough for most of those tried, none being known beforehand."""
     best_rms_nm: float
     """The same rms at the shape that shows most."""
     limited_by: str
@@ -120,9 +122,9 @@ class Sight:
     values: NDArray
     """The baseline's values, that effects which bend the motion bend."""
     root: NDArray
-    """(O,) root of the independent share over the noise; nought where there is no such output."""
+    """(O,) root of the independent share over the noise and what a good rig leaves; nought where there is no such output."""
     noise: NDArray
-    """(O,) N·m."""
+    """(O,) N·m: noise and what a good rig leaves."""
     basis: NDArray
     """(rows, size) orthonormal basis of the weighted baseline."""
     torque_rms: NDArray
@@ -132,11 +134,12 @@ class Sight:
     def of(cls, runs: Sequence[Run], baseline: Baseline, floor: Floor) -> "Sight":
         """Fit the baseline and prepare its projection."""
         untouched = tuple(run.average(baseline.columns(run.motion, run.motion, run.motion)) for run in runs)
+        plain = gram_of_runs(runs, untouched)
         there = np.isfinite(floor.rms) & (floor.rms > 0)
-        noise = np.where(there, floor.rms, 1.0)
+        noise = np.where(there, np.hypot(floor.rms, imperfection(plain)), 1.0)
         share = np.minimum(floor.independent_share, MOST_INDEPENDENT)
         root = np.where(there, np.sqrt(share) / noise, 0.0)
-        values = solve(gram_of_runs(runs, untouched), root**2)
+        values = solve(plain, root**2)
         loaded = tuple(with_load(run, baseline, values) for run in runs)
         torque = np.concatenate([(c @ values)[run.valid] for run, c in zip(runs, untouched, strict=True)])
         rms = np.sqrt(np.mean(torque**2, axis=0))
@@ -215,7 +218,7 @@ def detectability(
         report(number / len(effects), effect.label)
         found = list(_looks(effect, sight, power))
         looks[effect] = [look for look in found if look.plausible] or found
-    chosen = [_median(own) for own in looks.values()]
+    chosen = [_usual(own) for own in looks.values()]
     unexplained = _unexplained(chosen, list(looks.values()))
     return [
         _detectable(effect, look, looks, row, float(sight.torque_rms[sight.joint(effect)]))
@@ -406,9 +409,9 @@ def _material(left: NDArray, sight: Sight) -> Iterator[float]:
         yield (sight.noise[j] ** 2 * (1.0 / (1.0 - MATERIAL) ** 2 - 1.0) / square) if square > 0 else np.inf
 
 
-def _median(looks: list[Look]) -> Look:
-    """Return the look whose shape shows neither most nor least."""
-    return sorted(looks, key=lambda look: look.rms)[(len(looks) - 1) // 2]
+def _usual(looks: list[Look]) -> Look:
+    """Return the look that shows less than most shapes do: the size that it needs is enough for ``USUAL`` of them."""
+    return sorted(looks, key=lambda look: look.rms)[round(USUAL * (len(looks) - 1))]
 
 
 def _detectable(

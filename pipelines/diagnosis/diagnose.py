@@ -15,9 +15,10 @@ from pipelines.diagnosis.evaluate import evaluate, settled
 from pipelines.diagnosis.faults import Fault, excluding, find_faults
 from pipelines.diagnosis.fit import Fit, fit, stacked_columns
 from pipelines.diagnosis.floor import Floor, noise_floor, slow_scatter
-from pipelines.diagnosis.gain import Errors, errors_of
+from pipelines.diagnosis.gain import Errors, errors_of, scored
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, observe, with_load
 from pipelines.diagnosis.second_look import rings, slower
+from pipelines.diagnosis.slow import slow_error
 from pipelines.diagnosis.status import WANDERING, Standing, status_of
 from pipelines.diagnosis.uncertainty import Uncertainty, uncertainty
 from pipelines.dynamics.replay import replay
@@ -187,8 +188,10 @@ def _less(named: Ranked, label: str, bank: Bank, validate: Sequence[Run]) -> Ext
 
 def _standing(before: Extended, after: Extended, floor: Floor, validate: Sequence[Run]) -> Standing:
     J = len(validate[0].motion.joints)
-    counts = float(before.errors.counts.sum())
-    return Standing(floor.rms[:J], before.errors.rms, after.errors.rms, counts * floor.independent_share[:J])
+    torque = np.concatenate([run.measured[scored(run), :J] for run in validate])
+    slow = [slow_error(validate, extended.residuals) for extended in (before, after)]
+    rms = np.sqrt(np.mean(torque**2, axis=0))
+    return Standing(floor.rms[:J], before.errors.rms, after.errors.rms, *slow, rms)
 
 
 def _strayed(frame: pd.DataFrame, made: Fit, validate: Sequence[Run], baseline: Baseline) -> NDArray | None:

@@ -2,7 +2,8 @@
 
 Sets are scored by the logarithm of their held-out error in each output, on as many samples as are
 independent. A beam of the best sets is extended by every candidate in turn, so that two causes which
-only together explain the residual are found even where neither comes first alone.
+only together explain the residual are found even where neither comes first alone. A cause may also stand beside
+itself in another shape: what a freer form of one cause explains as well needs no second one.
 """
 
 from collections.abc import Sequence
@@ -36,12 +37,10 @@ class Scored:
     """(O,) root mean square held-out error, N·m."""
 
 
-def imperfection(bank: Bank) -> NDArray:
+def imperfection(gram: Gram) -> NDArray:
     """Return what no model of a real machine gets right, (O,) N·m: errors below it are worth nothing."""
-    count = np.maximum(bank.gram.count.sum(axis=0), 1)
-    rms = np.sqrt(bank.gram.square.sum(axis=0) / count)
-    joints = len(bank.baseline.joints)
-    return rms * np.repeat(IMPERFECTION, joints)
+    rms = np.sqrt(gram.square.sum(axis=0) / np.maximum(gram.count.sum(axis=0), 1))
+    return np.asarray(rms * np.repeat(IMPERFECTION, len(rms) // 2))
 
 
 def log_likelihood(rms: NDArray, before: NDArray, independent: NDArray, imperfect: NDArray) -> float:
@@ -64,7 +63,7 @@ class Scorer:
         """Prepare; ``independent`` (O,) is how many of each output's samples are independent."""
         self.bank, self.independent = bank, independent
         self.count = bank.gram.count.sum(axis=0)
-        self.imperfect = imperfection(bank)
+        self.imperfect = imperfection(bank.gram)
         plain = self._held_out(())
         assert plain is not None, "the baseline has no sign that could be impossible"
         self.plain = plain
@@ -125,11 +124,11 @@ def search(scorer: Scorer, most: int = MOST) -> list[dict[tuple[str, ...], Score
     # Beside another cause a candidate may want another shape: its best few stay in the race.
     contenders = _contenders(scorer)
     for _ in range(1, most):
-        beam = sorted(levels[-1].values(), key=lambda s: -s.score)[:BEAM]
+        different = [s for labels, s in levels[-1].items() if len(set(labels)) == len(labels)]
+        beam = sorted(different, key=lambda s: -s.score)[:BEAM]
         tried = []
         for base in beam:
-            labels = {bank.candidates[i].label for i in base.chosen}
-            tried += [scorer((*base.chosen, i)) for i in contenders if bank.candidates[i].label not in labels]
+            tried += [scorer((*base.chosen, i)) for i in contenders if i not in base.chosen]
         levels.append(best_of_each_label(bank, tried))
     return levels
 

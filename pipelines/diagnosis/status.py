@@ -5,16 +5,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.diagnosis.slow import SlowError
+
 AT_FLOOR = 1.03
 """RMSE over floor up to which a joint has no systematic error (CONTRACTS, verdict/1)."""
 EXPLAINED = 0.2
 """Share of the systematic power that may be left of an explained joint."""
 HELD_UP = 0.2
 """Share of the systematic power that the named causes must take away on validation runs to stay named."""
-SIGNIFICANT = 3.0
-"""Standard errors of the floor by which an error must exceed it to be systematic."""
-MATERIAL = 1.08
-"""RMSE over floor from which an error that nothing explains is worth an alarm."""
+SIGNIFICANT = 3.5
+"""Standard errors of the floor's power by which slow error must exceed it to be systematic."""
+MATERIAL = 0.25
+"""Share of the noise floor from which slow error is worth an alarm: 3 % of the error that a user sees."""
+IMPERFECT = 0.015
+"""Share of a joint's torque up to which slow error is that of a good rig: several things off by half a percent each."""
 WANDERING = 3.0
 """Slow over fast scatter between periods from which something moves that does not repeat."""
 
@@ -26,8 +30,10 @@ class Standing:
     floor: NDArray
     baseline: NDArray
     extended: NDArray
-    independent: NDArray
-    """(J,) independent samples."""
+    slow_before: SlowError
+    slow_after: SlowError
+    torque: NDArray
+    """(J,) rms of the measured torque, N·m."""
 
     @property
     def unexplained(self) -> list[float | None]:
@@ -43,21 +49,20 @@ class Standing:
     @property
     def held_up(self) -> bool:
         """Whether the named causes take away enough where there is most to take."""
-        power = self.baseline**2 - self.floor**2
-        worst = int(np.argmax(power / self.floor**2))
-        left = self.unexplained[worst]
-        return left is None or left < 1.0 - HELD_UP
+        worst = int(np.argmax(self.slow_before.sureness))
+        before, after = self.slow_before.excess[worst], self.slow_after.excess[worst]
+        return bool(before == 0 or after**2 < (1.0 - HELD_UP) * before**2)
 
-    def systematic(self, rms: NDArray) -> NDArray:
-        """Tell at which joints an error is beyond the floor, beyond chance and beyond a good rig's, (J,) bool."""
-        chance = SIGNIFICANT * np.sqrt(2.0 / np.maximum(self.independent, 1.0))
-        return (rms / self.floor) ** 2 > np.maximum(MATERIAL**2, 1.0 + chance)
+    def systematic(self, slow: SlowError) -> NDArray:
+        """Tell at which joints an error is beyond chance, beyond the floor and beyond a good rig's, (J,) bool."""
+        large = slow.excess > np.maximum(MATERIAL * self.floor, IMPERFECT * self.torque)
+        return np.asarray(large & (slow.sureness > SIGNIFICANT))
 
 
 def status_of(standing: Standing, named: bool, wandering: bool) -> str:
     """Return the verdict's status."""
     if not named:
-        alarmed = bool(np.any(standing.systematic(standing.baseline))) or wandering
+        alarmed = bool(np.any(standing.systematic(standing.slow_before))) or wandering
         return "unknown_cause" if alarmed else "nothing_missing"
     left = [share for share in standing.unexplained if share is not None]
     return "explained" if all(share <= EXPLAINED for share in left) else "partly_explained"
