@@ -141,6 +141,11 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
 
         draw_replay(open_loop, closed_loop, plant.joints, output.with_suffix(""), f"{recording.stem}, simulated again")
     _report_replay(result, names, lacks)
+    for label, own in plant.model.of_one_run.items():
+        console.warn(
+            f"{label}: each run has its own {' and '.join(own)}, and {table.path} holds those of one run; "
+            f"unless that is {recording.name}, the errors are more than the model's"
+        )
 
 
 def _report_replay(result: dict[str, Any], names: list[str], lacks: str) -> None:

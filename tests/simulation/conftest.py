@@ -41,13 +41,19 @@ def light() -> Plant:
     return make_plant(leg(*LIGHT), Geometry(), HIP_AND_KNEE, "with_human")
 
 
-def rows_of(values, run: str) -> pd.DataFrame:
+def rows_of(values, run: str, causes=()) -> pd.DataFrame:
     X, hip, knee = values
     rows = [("rigid_body", f"X{i + 1}", f"X{i + 1}", None, run, x, "kg·m²") for i, x in enumerate(X)]
     for joint, pair in zip(NAMES, (hip, knee), strict=True):
         rows += [
             ("friction", name, symbol, joint, None, value, "N·m")
             for name, symbol, value in zip(("coulomb", "viscous"), ("Ks", "Km"), pair, strict=True)
+        ]
+    for term in causes:
+        effect = term.effect
+        rows += [
+            (effect.name, p.name, p.symbol, effect.joint, None, value, p.unit)
+            for p, value in zip(effect.parameters, effect.physical(term.values), strict=True)
         ]
     frame = pd.DataFrame(rows, columns=["effect", "name", "symbol", "joint", "run", "value", "unit"])
     return frame.assign(std_error=0.1, ci95_low=0.0, ci95_high=1.0, step="inertia")
@@ -57,9 +63,11 @@ def rows_of(values, run: str) -> pd.DataFrame:
 def parameters_file(tmp_path) -> Callable[..., Path]:
     """Write a parameters/1 file."""
 
-    def write(values=TABLE3, run="with_human") -> Path:
+    def write(values=TABLE3, run="with_human", causes=()) -> Path:
         path = tmp_path / "parameters.parquet"
-        PARAMETERS.write(path, rows_of(values, run), {"geometry": {"thigh_length_m": 0.38952, "gravity_m_s2": 9.8}})
+        PARAMETERS.write(
+            path, rows_of(values, run, causes), {"geometry": {"thigh_length_m": 0.38952, "gravity_m_s2": 9.8}}
+        )
         return path
 
     return write
