@@ -49,7 +49,8 @@ def control(d: Diagnosis) -> dict[str, Any]:
         try:
             told[which] = _tracked(frame, run, d)
         except ExoidError as error:
-            reasons.append(f"{which} the causes: {error}")
+            # What is wrong; its second sentence tells those who asked for a simulation what to do.
+            reasons.append(f"{which} the causes: {str(error).partition('. ')[0]}")
     return told | {"reason": "; ".join(reasons) or None}
 
 

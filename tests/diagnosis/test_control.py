@@ -60,6 +60,7 @@ def test_a_leg_that_cannot_exist_is_not_simulated_and_the_reason_is_told(sprung)
     assert told["with"] is None
     assert told["without"] is not None
     assert told["reason"].startswith("with the causes: the with_human parameters are no real leg: X2 (X1 - X2) = ")
+    assert told["reason"].endswith("the mass matrix is not positive definite")
 
 
 def test_where_no_cause_is_named_there_is_nothing_to_compare(sprung):
