@@ -66,6 +66,8 @@ def _show(said: dict[str, Any], output: Path) -> None:
         title="torque error on runs no fit has seen, N·m",
         numbers="noise floor, rigid + friction, with the causes, unexplained",
     )  # fmt: skip
+    if said["causes"]:
+        console.say(_control(said["control"]))
     for cause in said["causes"]:
         where = f" at the {cause['joint']}" if cause["joint"] else ""
         console.say(f"\n{cause['effect']}{where} ({cause['side']}), probability {cause['probability']:.2f}")
@@ -78,3 +80,16 @@ def _show(said: dict[str, Any], output: Path) -> None:
             other = f"{tie['effect']}@{tie['joint']}" if tie["joint"] else tie["effect"]
             console.say(f"  or {other}: {tie['why']}; {tie['how_to_separate']}")
     console.say(f"\n{output}: verdict.json, parameters, residuals, candidates, detectability.json")
+
+
+def _control(said: dict[str, Any]) -> str:
+    """Return one line: tracking error and peak torque under adaptive control, without and with the causes."""
+    if said["reason"]:
+        return f"under adaptive control: not compared, {said['reason']}"
+    before, after = said["without"], said["with"]
+    of_joints = [
+        f"{joint} error {1e3 * before['tracking_rmse_rad'][joint]:.2f} -> {1e3 * error:.2f} mrad, "
+        f"peak torque {before['peak_torque_nm'][joint]:.1f} -> {after['peak_torque_nm'][joint]:.1f} N·m"
+        for joint, error in after["tracking_rmse_rad"].items()
+    ]
+    return "under adaptive control, without -> with the causes: " + "; ".join(of_joints)

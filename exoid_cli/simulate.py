@@ -51,12 +51,13 @@ def simulate(
 def _track(table: "Table", run: str, reference: Path | None, settings: "Experiment", output: Path) -> None:
     from pipelines.contracts import SIMULATION, describe
     from pipelines.contracts.atomic import write_text
+    from pipelines.dynamics.plant import plant_from_table
+    from pipelines.dynamics.tracking import track
     from pipelines.errors import InputError
+    from pipelines.mechanics.gait import gait
     from pipelines.mechanics.read import geometry_from
     from pipelines.mechanics.trajectory import read_trajectory
-    from pipelines.simulation.closed_loop import sweep, track
-    from pipelines.simulation.gait import gait
-    from pipelines.simulation.plant import plant_from_table
+    from pipelines.simulation.sweep import sweep
 
     chosen = settings.simulate
     plant = plant_from_table(table, run, geometry_from(settings.mechanism))
@@ -107,10 +108,10 @@ def _track(table: "Table", run: str, reference: Path | None, settings: "Experime
 
 def _replay(table: "Table", recording: Path, settings: "Experiment", output: Path) -> None:
     from pipelines.contracts import SIMULATION, describe
+    from pipelines.dynamics.plant import plant_from_table
     from pipelines.dynamics.replay import replay
     from pipelines.mechanics.read import geometry_from, read_motion
     from pipelines.simulation import recorded
-    from pipelines.simulation.plant import plant_from_table
 
     default = geometry_from(settings.mechanism)
     motion = read_motion(recording, settings.filter, default)
@@ -141,6 +142,11 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
 
         draw_replay(open_loop, closed_loop, plant.joints, output.with_suffix(""), f"{recording.stem}, simulated again")
     _report_replay(result, names, lacks)
+    for label, own in plant.model.of_one_run.items():
+        console.warn(
+            f"{label}: each run has its own {' and '.join(own)}, and {table.path} holds those of one run; "
+            f"unless that is {recording.name}, the errors are more than the model's"
+        )
 
 
 def _report_replay(result: dict[str, Any], names: list[str], lacks: str) -> None:

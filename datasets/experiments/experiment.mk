@@ -22,8 +22,9 @@ $(SETTINGS)/graph.mk: $(CONFIG) $(wildcard $(dir $(CONFIG))rigs/*.toml $(dir $(C
 $(SETTINGS)/%.json: # only where one was deleted by hand
 	@$(EXOID) settings split $(CONFIG) --out $(SETTINGS)
 
-all: $(OUT)/identified/parameters.parquet $(OUT)/simulated/rbf.parquet \
-     $(VALIDATE_RUNS:%=$(OUT)/simulated/replay-%.parquet)
+# A diagnosis measures its gain on validation runs; without one there is none.
+all: $(OUT)/identified/parameters.parquet $(if $(VALIDATE_RUNS),$(OUT)/diagnosed/verdict.json) \
+     $(OUT)/simulated/rbf.parquet $(VALIDATE_RUNS:%=$(OUT)/simulated/replay-%.parquet)
 
 $(OUT)/trajectory.parquet: $(SETTINGS)/design.json $(SETTINGS)/mechanism.json
 	$(EXOID) design --config $(CONFIG) -o $@
@@ -34,10 +35,14 @@ $(OUT)/recordings/%.parquet: $(SETTINGS)/acquire.json
 $(OUT)/motions/%.parquet: $(OUT)/recordings/%.parquet $(SETTINGS)/filter.json
 	$(EXOID) filter $< --config $(CONFIG) -o $@
 
+RECORDINGS := $(RUNS:%=$(OUT)/recordings/%.parquet)
 MOTIONS := $(RUNS:%=$(OUT)/motions/%.parquet)
 
 $(OUT)/identified/parameters.parquet: $(MOTIONS) $(SETTINGS)/identify.json $(SETTINGS)/mechanism.json
 	$(EXOID) identify $(MOTIONS) --config $(CONFIG) -o $(@D)/
+
+$(OUT)/diagnosed/verdict.json: $(RECORDINGS) $(SETTINGS)/filter.json $(SETTINGS)/mechanism.json
+	$(EXOID) diagnose $(RECORDINGS) --config $(CONFIG) --out $(@D)/
 
 $(OUT)/simulated/rbf.parquet: $(OUT)/identified/parameters.parquet $(SETTINGS)/simulate.json $(SETTINGS)/mechanism.json
 	$(EXOID) simulate $< --config $(CONFIG) -o $(@D)/
@@ -49,4 +54,4 @@ $(OUT)/simulated/replay-%.parquet: $(OUT)/identified/parameters.parquet $(OUT)/r
 .SECONDARY:
 
 clean: # all but the recordings, which no command can bring back
-	rm -rf $(SETTINGS) $(addprefix $(OUT)/,trajectory.parquet motions identified simulated)
+	rm -rf $(SETTINGS) $(addprefix $(OUT)/,trajectory.parquet motions identified diagnosed simulated)

@@ -181,8 +181,10 @@ def with_load(run: Run, baseline: Baseline, values: NDArray) -> Run:
 
     The measured torques would not do: their noise would stand on both sides of the regression.
     """
-    columns = baseline.columns(run.motion, run.motion)
-    J, bodies = len(baseline.joints), BODY * len(baseline.bodies)
-    load = columns[:, :J, :bodies] @ values[:bodies]
-    limb = columns[:, :J, BODY:bodies] @ values[BODY:bodies] if bodies > BODY else load
-    return replace(run, motion=replace(run.motion, load=load, limb_load=limb))
+    bodies = values[: BODY * len(baseline.bodies)].reshape(-1, BODY)
+    # The first body is the machine's, which alone is there in runs without a wearer.
+    body = bodies.sum(axis=0) if run.motion.run == "with_human" else bodies[0]
+    m, g = run.motion, run.motion.geometry
+    columns = regressor(m.q, m.dq, m.ddq, g.thigh_length_m, g.gravity_m_s2)
+    limb = bodies[-1]
+    return replace(run, motion=replace(m, load=columns @ body, limb_load=columns @ limb, body=body, limb_body=limb))

@@ -4,6 +4,7 @@ from typing import Any
 
 import pandas as pd
 
+from pipelines.diagnosis.control import control
 from pipelines.diagnosis.diagnose import Diagnosis, summary_numbers
 from pipelines.diagnosis.gain import gain
 from pipelines.diagnosis.ties import tie_between
@@ -32,6 +33,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
             "samples": int(d.after.errors.counts.sum()),
         },
         **summary_numbers(d),
+        "control": control(d),
         "causes": causes,
         "data_faults": [{"file": f.file, "channel": f.channel, "what": f.what} for f in d.faults],
         "residual": left.as_json() if left else None,

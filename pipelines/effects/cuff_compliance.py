@@ -1,12 +1,14 @@
 """A limb that moves against its cuff."""
 
+import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.effects.effect import Effect, Parameter, Side
 from pipelines.effects.kernel import spring
+from pipelines.effects.swing import behind_spring
 from pipelines.mechanics.motion import Motion
 
-RELAXATION_S = 0.005
+RELAXATION_S = 0.02
 """Damping over stiffness of soft tissue under a strap."""
 
 MACHINE_INERTIA = 0.02
@@ -20,6 +22,8 @@ class CuffCompliance(Effect):
     rigid body bound to ``with_human`` runs. Where that body counts machine and human together, as a fit of each
     kind of run for itself has it, the stiffness comes out too high by the machine's share of the mass; with the
     machine's body of its own beside the human's it is exact.
+
+    Forward dynamics knows the shank that goes with the thigh only; ``shank_held`` is for what was measured.
     """
 
     name = "cuff_compliance"
@@ -30,7 +34,13 @@ class CuffCompliance(Effect):
     looks_like = "with the human only, gravity and inertia torques off in step with the cuff forces"
     confirm = "clamp the exoskeleton, push the limb with a force gauge, and measure how far it moves"
     acts_in = ("with_human",)
-    shape = (Parameter("stiffness", "N·m/rad", "torque between machine and limb per angle", "k", (80.0, 3000.0)),)
+    shape = (
+        Parameter("stiffness", "N·m/rad", "torque between machine and limb per angle", "k", (80.0, 3000.0)),
+        Parameter(
+            "shank_held", "1", "1 where the shank's own cuff holds it while the thigh moves", "e", (0.0, 1.0),
+            default=0.0, forms=(1.0, 0.0),
+        ),
+    )  # fmt: skip
     at_cuff = True
     motor_inertia = MACHINE_INERTIA
 
@@ -40,9 +50,26 @@ class CuffCompliance(Effect):
         return values[0] * (twist + RELAXATION_S * twist_rate)
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
-        """Return the motion of the limb."""
-        j = self.column(motion)
-        q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
-        for state, torque in zip((q, dq, ddq), motion.on_limb, strict=True):
-            state[:, j] -= torque[:, j] / shape[0]
+        """Return the motion of the limb; it follows its torque at once where its mass is unknown."""
+        stiffness, held = self.completed(shape)
+        direction = self._direction(motion, held > 0.0)
+        if motion.limb_swing is not None:
+            return behind_spring(motion, motion.limb_swing, direction, self, (stiffness, held), 0.0)
+        q, dq, ddq = (
+            state - direction * np.sum(direction * torque, axis=1, keepdims=True) / stiffness
+            for state, torque in zip((motion.q, motion.dq, motion.ddq), motion.on_limb, strict=True)
+        )
         return motion.with_state(q, dq, ddq)
+
+    def _direction(self, motion: Motion, shank_held: bool) -> NDArray:
+        """Return how the limb's joints turn per unit of twist, (n, J).
+
+        A thigh that moves in its cuff moves the knee. The shank goes with it, or pivots in a cuff that is firm.
+        """
+        j = self.column(motion)
+        direction = np.zeros_like(motion.q)
+        direction[:, j] = 1.0
+        below = motion.geometry.shank_cuff_distance_m
+        if shank_held and j == 0 and below is not None:
+            direction[:, 1] = -1.0 - motion.geometry.thigh_length_m * np.cos(motion.q[:, 1]) / below
+        return direction

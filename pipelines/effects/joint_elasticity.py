@@ -2,10 +2,12 @@
 
 from math import sqrt
 
+import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.effects.effect import Effect, Parameter, Side
 from pipelines.effects.kernel import spring
+from pipelines.effects.swing import behind_spring
 from pipelines.mechanics.motion import Motion
 
 MOTOR_INERTIA = 0.1
@@ -13,6 +15,9 @@ MOTOR_INERTIA = 0.1
 
 DAMPING_RATIO = 0.1
 """Of the motor's swing on the spring: a harmonic drive's flexspline."""
+
+SWING_RATIO = 0.1
+"""Damping ratio at which the link is let swing behind a measured motion; more forgets, less errs for longer."""
 
 
 class JointElasticity(Effect):
@@ -35,10 +40,13 @@ class JointElasticity(Effect):
         return values[0] * twist + damping * twist_rate
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
-        """Return the motion of the link behind the spring."""
+        """Return the motion of the link behind the spring; it follows its torque at once where its mass is unknown."""
         j = self.column(motion)
-        load = motion.transmitted
+        if motion.link_swing is not None:
+            direction = np.zeros_like(motion.q)
+            direction[:, j] = 1.0
+            return behind_spring(motion, motion.link_swing, direction, self, shape, SWING_RATIO)
         q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
-        for state, load_rate in zip((q, dq, ddq), load, strict=True):
+        for state, load_rate in zip((q, dq, ddq), motion.transmitted, strict=True):
             state[:, j] -= load_rate[:, j] / shape[0]
         return motion.with_state(q, dq, ddq)

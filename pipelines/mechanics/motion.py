@@ -12,10 +12,14 @@ from numpy.typing import NDArray
 from pipelines.contracts.joints import joints_of
 from pipelines.contracts.table import Table
 from pipelines.mechanics.leg import Geometry, cuff_torque
+from pipelines.mechanics.load import Load, load_along
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 
 LOAD_CUTOFF_HZ = 5.0
 """Of a load that is to be differentiated twice: noise at 25 Hz would weigh 600 times what it does at 1 Hz."""
+
+LOADS = ("transmitted", "on_limb", "link_swing", "limb_swing")
+"""What a motion knows of loads, and keeps."""
 
 CUFFS = tuple(f"{segment}_{side}" for segment in ("thigh", "shank") for side in ("front", "back"))
 
@@ -56,6 +60,10 @@ class Motion:
     """(n, J) N·m that the drive trains pass on to the links, where a fit has estimated it."""
     limb_load: NDArray | None = None
     """(n, J) N·m of the machine on the wearer's limb, where a fit has estimated it."""
+    body: NDArray | None = None
+    """(4,) inertial parameters of all that hangs behind the drive trains, where a fit has estimated them."""
+    limb_body: NDArray | None = None
+    """(4,) the same of the wearer's limb alone."""
     file: str = ""
     metadata: dict[str, Any] = field(default_factory=dict)
 
@@ -99,6 +107,16 @@ class Motion:
         thigh, shank = self.forces[:, :2].sum(axis=1), self.forces[:, 2:].sum(axis=1)
         return self._smoothed(cuff_torque(thigh, shank, self.q, self.geometry))
 
+    @cached_property
+    def link_swing(self) -> Load | None:
+        """What hangs behind the drive trains as a load that can swing; None where no fit has estimated it."""
+        return None if self.body is None else load_along(self.q, self.dq, self.ddq, self.body, self.geometry)
+
+    @cached_property
+    def limb_swing(self) -> Load | None:
+        """The wearer's limb as a load that can swing; None where no fit has estimated it."""
+        return None if self.limb_body is None else load_along(self.q, self.dq, self.ddq, self.limb_body, self.geometry)
+
     @property
     def _load_cutoff_hz(self) -> float:
         # Long blocks make a motion whose own rate is below what a load's filter would pass.
@@ -119,9 +137,7 @@ class Motion:
         """Return the same run with other kinematics, as a corrected measurement has."""
         made = replace(self, q=q, dq=dq, ddq=ddq)
         # The torques are the same, and smoothing them costs more than the correction did.
-        made.__dict__.update(
-            {name: self.__dict__[name] for name in ("transmitted", "on_limb") if name in self.__dict__}
-        )
+        made.__dict__.update({name: self.__dict__[name] for name in LOADS if name in self.__dict__})
         return made
 
 

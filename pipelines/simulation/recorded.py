@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
 from pipelines.dynamics.pd_loop import Drives, LoopState, follow, loop_at_rest, make_drives, read_encoders
+from pipelines.dynamics.plant import Plant
 from pipelines.dynamics.replay import EVERY_S, WINDOW_S, ReplayResult
 from pipelines.mechanics.motion import Motion
-from pipelines.simulation.plant import Plant
 
 NO_LIMIT_NM = 1e9
 

@@ -15,17 +15,17 @@ from scipy.integrate import solve_ivp
 
 from pipelines.contracts import HIP_AND_KNEE
 from pipelines.dynamics.pd_loop import follow, loop_at_rest, make_drives
+from pipelines.dynamics.plant import Plant, make_plant
 from pipelines.dynamics.replay import replay
+from pipelines.dynamics.tracking import track
 from pipelines.effects.friction import Friction
 from pipelines.effects.rigid_body import RigidBody
+from pipelines.mechanics.gait import gait
 from pipelines.mechanics.leg import Geometry
 from pipelines.mechanics.motion import Motion
 from pipelines.model import Model, Term
 from pipelines.settings.simulate import SimulateSettings
 from pipelines.signals.low_pass import derivative, low_pass
-from pipelines.simulation.closed_loop import track
-from pipelines.simulation.gait import gait
-from pipelines.simulation.plant import Plant, make_plant
 from tests.bench.report import Row, show
 
 SECONDS = 10.0

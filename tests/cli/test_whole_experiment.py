@@ -54,7 +54,7 @@ def written(folder):
 
 def test_a_new_experiment_finds_the_truth_of_a_rig_that_hides_nothing_and_does_nothing_twice(experiment):
     _, stages = make(experiment)
-    assert sorted(stages) == sorted(["design", *["acquire", "filter"] * 4, "identify", *["simulate"] * 3])
+    assert sorted(stages) == sorted(["design", *["acquire", "filter"] * 4, "identify", "diagnose", *["simulate"] * 3])
     found = PARAMETERS.read(experiment / "identified" / "parameters.parquet").frame
     middle, half = found["value"], AT_99_9 * (found["ci95_high"] - found["ci95_low"]) / 2
     apart = np.abs(middle - truth(experiment)) / half

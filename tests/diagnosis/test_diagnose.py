@@ -6,42 +6,11 @@ import numpy as np
 import pytest
 
 from pipelines.contracts import CANDIDATES, PARAMETERS, RECORDING, RESIDUALS
-from pipelines.contracts.table import Table
 from pipelines.diagnosis.candidate_table import candidates
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.verdict import verdict
 from pipelines.errors import InputError
-from pipelines.mechanics.fourier import FourierTrajectory
-from pipelines.mechanics.kinematics import motion_table
-from pipelines.mechanics.motion import motion_from_table
-from pipelines.model import effect_named, term_from
-from pipelines.rig.plant import Plant
-from pipelines.rig.record import record
-from pipelines.settings.filter import FilterSettings
-from pipelines.settings.plant import PlantSettings
-
-RICH = FourierTrajectory(
-    theta0=np.array([0.65, -0.93]),
-    a=np.array([[0.22, -0.16, 0.10], [0.12, 0.24, -0.11]]),
-    b=np.array([[0.10, 0.12, -0.07], [-0.22, 0.08, 0.10]]),
-    omega=0.2 * np.pi,
-)
-RUNS = [(run, purpose) for run in ("exo_alone", "with_human") for purpose in ("train", "validate")]
-
-
-def recordings(effect=None, joint=None, seed=1, **values):
-    """Return four recordings of 40 s, named by their place."""
-    hidden = [term_from(effect_named(effect)(joint=joint), values)] if effect else []
-    made = []
-    for number, (run, purpose) in enumerate(RUNS):
-        plant = Plant(PlantSettings(), run, seed=10 * seed + number, effects=hidden)
-        made.append(Table(*record(plant, RICH, 40.0, purpose)))
-    return made
-
-
-def session(*args, **values):
-    motions = [motion_from_table(motion_table(table, FilterSettings())) for table in recordings(*args, **values)]
-    return [replace(m, file=f"run_{i}.parquet") for i, m in enumerate(motions)]
+from tests.diagnosis.sessions import recordings, session
 
 
 def labels(cause):
@@ -148,7 +117,9 @@ def test_the_command_writes_verdict_and_tables(tmp_path, capsys):
         files.append(tmp_path / f"run_{number}.parquet")
         RECORDING.write(files[-1], table.frame, table.metadata)
     assert run(["diagnose", *map(str, files), "--out", str(tmp_path / "d")]) == 0
-    assert "parallel spring at the knee" in capsys.readouterr().out
+    out = " ".join(capsys.readouterr().out.split())
+    assert "parallel spring at the knee" in out
+    assert "under adaptive control, without -> with the causes: hip error" in out
     for name in ("verdict.json", "parameters.parquet", "residuals.parquet", "candidates.parquet", "detectability.json"):
         assert (tmp_path / "d" / name).is_file()
     assert (PARAMETERS.read(tmp_path / "d" / "parameters.parquet").frame["step"] == "extension").any()

@@ -20,7 +20,7 @@ esac
 echo "$1 $2" >> "$LOG"
 for last in "$@"; do :; done
 case "$last" in
-  */) mkdir -p "$last"; touch "$last/parameters.parquet" "$last/rbf.parquet" ;;
+  */) mkdir -p "$last"; touch "$last/parameters.parquet" "$last/rbf.parquet" "$last/verdict.json" ;;
   *) mkdir -p "$(dirname "$last")"; touch "$last" ;;
 esac
 """
@@ -60,10 +60,11 @@ def make(tmp_path, monkeypatch):
 
 
 FIT = ["identify", "simulate", "simulate", "simulate"]
+ALL_FROM_RECORDINGS = [*["filter"] * 4, "diagnose", *FIT]
 
 
 def test_a_first_make_runs_every_stage_and_a_second_none(make):
-    assert sorted(make()) == sorted(["design", *["acquire", "filter"] * 4, *FIT])
+    assert sorted(make()) == sorted(["design", *["acquire"] * 4, *ALL_FROM_RECORDINGS])
     assert make() == []
 
 
@@ -78,11 +79,11 @@ def test_only_what_depends_on_a_change_runs_again(make):
     make.change("[identify]\nfigures = true", "[identify]\nfigures = false")
     assert make() == FIT
     make.change("order = 4", "order = 2")
-    assert sorted(make()) == sorted(["filter"] * 4 + FIT)
+    assert sorted(make()) == sorted(ALL_FROM_RECORDINGS)
     make.change("seed = 2", "seed = 22")
-    assert sorted(make()) == sorted(["acquire", "filter", *FIT])
+    assert sorted(make()) == sorted(["acquire", "filter", "diagnose", *FIT])
     make.change("harmonics = 5", "harmonics = 4")
-    assert sorted(make()) == sorted(["design", *["acquire", "filter"] * 4, *FIT])
+    assert sorted(make()) == sorted(["design", *["acquire"] * 4, *ALL_FROM_RECORDINGS])
     assert make() == []
 
 
@@ -90,7 +91,7 @@ def test_a_change_of_the_rig_records_again(make):
     make()
     rig = make.folder / "rigs" / "default.toml"
     rig.write_text(rig.read_text().replace("cuff_force_n = 400.0", "cuff_force_n = 300.0"))
-    assert sorted(make()) == sorted(["acquire", "filter"] * 4 + FIT)
+    assert sorted(make()) == sorted(["acquire"] * 4 + ALL_FROM_RECORDINGS)
 
 
 def test_a_change_of_what_the_rig_hides_records_again(make):
@@ -99,7 +100,7 @@ def test_a_change_of_what_the_rig_hides_records_again(make):
     sealed.touch()
     assert make() == []
     sealed.write_text(sealed.read_text().replace("seed = 20", "seed = 21"))
-    assert sorted(make()) == sorted(["acquire", "filter"] * 4 + FIT)
+    assert sorted(make()) == sorted(["acquire"] * 4 + ALL_FROM_RECORDINGS)
     assert make() == []
 
 
@@ -116,6 +117,12 @@ def test_a_run_with_an_excitation_of_its_own_heeds_it_alone(make):
     make()
     make.change("harmonics = 5", "harmonics = 4")
     assert make().count("acquire") == 3
+
+
+def test_without_a_run_to_validate_on_nothing_is_diagnosed(make):
+    path = make.folder / "exoid.toml"
+    path.write_text(path.read_text().replace('purpose = "validate"', 'purpose = "train"'))
+    assert sorted(make()) == sorted(["design", *["acquire", "filter"] * 4, "identify", "simulate"])
 
 
 def test_clean_keeps_the_recordings(make):

@@ -10,11 +10,11 @@ import pytest
 
 from pipelines.contracts import HIP_AND_KNEE, PARAMETERS, RECORDING
 from pipelines.dynamics.pd_loop import follow, loop_at_rest, make_drives
+from pipelines.dynamics.plant import Plant, make_plant
 from pipelines.effects.friction import Friction
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.mechanics.leg import Geometry
 from pipelines.model import Model, Term
-from pipelines.simulation.plant import Plant, make_plant
 
 TABLE3 = ((10.3016, 3.0157, 2.2664, 5.5354), (2.6596, 4.14895), (4.7197, 7.3602))
 """Paper, Table 3: X1..X4; Ks and Km of hip and of knee."""
@@ -41,13 +41,19 @@ def light() -> Plant:
     return make_plant(leg(*LIGHT), Geometry(), HIP_AND_KNEE, "with_human")
 
 
-def rows_of(values, run: str) -> pd.DataFrame:
+def rows_of(values, run: str, causes=()) -> pd.DataFrame:
     X, hip, knee = values
     rows = [("rigid_body", f"X{i + 1}", f"X{i + 1}", None, run, x, "kg·m²") for i, x in enumerate(X)]
     for joint, pair in zip(NAMES, (hip, knee), strict=True):
         rows += [
             ("friction", name, symbol, joint, None, value, "N·m")
             for name, symbol, value in zip(("coulomb", "viscous"), ("Ks", "Km"), pair, strict=True)
+        ]
+    for term in causes:
+        effect = term.effect
+        rows += [
+            (effect.name, p.name, p.symbol, effect.joint, None, value, p.unit)
+            for p, value in zip(effect.parameters, effect.physical(term.values), strict=True)
         ]
     frame = pd.DataFrame(rows, columns=["effect", "name", "symbol", "joint", "run", "value", "unit"])
     return frame.assign(std_error=0.1, ci95_low=0.0, ci95_high=1.0, step="inertia")
@@ -57,9 +63,11 @@ def rows_of(values, run: str) -> pd.DataFrame:
 def parameters_file(tmp_path) -> Callable[..., Path]:
     """Write a parameters/1 file."""
 
-    def write(values=TABLE3, run="with_human") -> Path:
+    def write(values=TABLE3, run="with_human", causes=()) -> Path:
         path = tmp_path / "parameters.parquet"
-        PARAMETERS.write(path, rows_of(values, run), {"geometry": {"thigh_length_m": 0.38952, "gravity_m_s2": 9.8}})
+        PARAMETERS.write(
+            path, rows_of(values, run, causes), {"geometry": {"thigh_length_m": 0.38952, "gravity_m_s2": 9.8}}
+        )
         return path
 
     return write

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from pipelines.dynamics.tracking import track
 from pipelines.errors import InputError
+from pipelines.mechanics.gait import gait
 from pipelines.mechanics.sampled_trajectory import SampledTrajectory
 from pipelines.settings.simulate import SimulateSettings
-from pipelines.simulation.closed_loop import sweep, track
-from pipelines.simulation.gait import gait
+from pipelines.simulation.sweep import sweep
 
 SETTINGS = SimulateSettings()
 OVERPOWERED = SETTINGS.model_copy(update={"disturbance_nm": 400.0, "disturbance_rad_s": 1.0})

@@ -7,9 +7,11 @@ import pytest
 
 from exoid_cli.app import run
 from pipelines.contracts import SIMULATION
+from tests.effects.catalogue import TERMS
 
 LIGHT = ((2.6, 0.63, 1.78, 5.7), (3.0, 4.0), (2.0, 3.0))
 IMPOSSIBLE = ((2.6, 0.63, 4.0, 5.7), (3.0, 4.0), (2.0, 3.0))
+CAUSES = {term.effect.name: term for term in TERMS if term.effect.name not in ("rigid_body", "friction")}
 FIGURES = ("tracking", "error", "torque", "kv-sweep")
 
 
@@ -114,6 +116,37 @@ def test_replay_without_a_controller_skips_the_closed_loop_and_says_why(
     code, _, err = exoid("simulate", parameters_file(LIGHT), "--config", settings, "--replay", recording, "-o", made)
     assert (code, err) == (0, f"warning: no closed loop: {told}")
     assert made.exists() and not (tmp_path / "replay-closed-loop.parquet").exists()
+
+
+@pytest.mark.parametrize("cause", CAUSES.values(), ids=CAUSES)
+def test_a_model_with_any_cause_is_simulated_and_replayed(
+    exoid, parameters_file, recording_file, quick, tmp_path, cause
+):
+    parameters, config = parameters_file(LIGHT, causes=[cause]), quick("duration_s = 2.0", "settled_after_s = 1.0")
+    assert exoid("simulate", parameters, "--config", config, "-o", tmp_path)[0] == 0
+    tracked = SIMULATION.read(tmp_path / "rbf.parquet")
+    assert cause.effect.label in [told["effect"] for told in tracked.metadata["plant"]["effects"]]
+    # An angle sensor that is off lets the loop follow what it reads.
+    assert tracked.frame.filter(like="_error_rad")[1000:].abs().to_numpy().max() < 0.1
+    made = tmp_path / "replay.parquet"
+    code, out, _ = exoid("simulate", parameters, "--config", config, "--replay", recording_file(), "-o", made, "--json")
+    assert code == 0
+    # The recorded leg has no such cause: in its drives' loop the model is off, and stays beside it.
+    assert 1e-6 < max(json.loads(out)["closed_loop_rmse_nm"].values()) < 10.0
+
+
+def test_a_replay_tells_of_values_that_the_recording_need_not_share(
+    exoid, parameters_file, recording_file, quick, tmp_path
+):
+    parameters = parameters_file(LIGHT, causes=[CAUSES["payload_change"]])
+    code, _, err = exoid(
+        "simulate", parameters, "--config", quick(), "--replay", recording_file(), "-o", tmp_path / "replay.parquet"
+    )
+    assert (code, err) == (
+        0,
+        f"warning: payload_change@knee: each run has its own time, and {parameters} holds those of one run; "
+        "unless that is recording.parquet, the errors are more than the model's",
+    )
 
 
 def test_parameters_without_the_run_are_told_with_those_there_are(exoid, parameters_file, quick, tmp_path):

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from pipelines.dynamics.tracking import track
+from pipelines.mechanics.gait import gait
 from pipelines.mechanics.leg import coriolis_matrix, gravity_torque, mass_matrix
 from pipelines.settings.simulate import SimulateSettings
-from pipelines.simulation.closed_loop import sweep, track
-from pipelines.simulation.gait import gait
+from pipelines.simulation.sweep import sweep
 
 X = np.array([10.3016, 3.0157, 2.2664, 5.5354])
 LAMBDA = 10.0

@@ -1,6 +1,5 @@
-"""The leg under the adaptive controller: one run, and how the error falls with the feedback gain."""
+"""The leg under the adaptive controller: one run along a reference."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,11 +8,11 @@ from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
 from pipelines.dynamics.mobility import substeps_for
+from pipelines.dynamics.plant import Plant
 from pipelines.dynamics.rbf_loop import TURN, Encoder, RbfController, RbfRun, follow_with_rbf
 from pipelines.errors import InputError
 from pipelines.mechanics.trajectory import Trajectory
 from pipelines.settings.simulate import SimulateSettings
-from pipelines.simulation.plant import Plant
 
 NODES_REACH = 1.5
 """The centres lie between minus and plus this, on the diagonal."""
@@ -92,19 +91,6 @@ def track(
     )
     reached = len(run.angle)
     return ClosedLoop(np.arange(reached) * period, wanted[:: 2 * substeps, 0][:reached], run, plant.joints, n)
-
-
-def sweep(plant: Plant, settings: SimulateSettings, reference: Trajectory, gains: Iterable[float]) -> pd.DataFrame:
-    """Return the largest settled error for each feedback gain (the paper's Figure 3).
-
-    Columns ``feedback_gain_nm_s_rad`` and, for each joint, its error in rad; NaN where the loop ran away.
-    """
-    rows = []
-    for gain in gains:
-        worst = track(plant, settings, reference, gain).worst_error(settings.settled_after_s)
-        errors = {joint.column("error"): error for joint, error in zip(plant.joints, worst, strict=True)}
-        rows.append({"feedback_gain_nm_s_rad": gain, **errors})
-    return pd.DataFrame(rows)
 
 
 def _controller(settings: SimulateSettings, feedback_gain: float) -> RbfController:

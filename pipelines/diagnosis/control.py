@@ -1,0 +1,76 @@
+"""What naming the causes means for control: the adaptive loop on the model without and with them.
+
+The controller has no model of the leg, its network learns one. So what changes is the leg it is simulated on, and with
+that the tracking error and the torque that a simulation promises.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipelines.contracts.joints import joints_of
+from pipelines.diagnosis import tables
+from pipelines.diagnosis.diagnose import Diagnosis
+from pipelines.diagnosis.uncertainty import uncertainty
+from pipelines.dynamics.plant import make_plant
+from pipelines.dynamics.tracking import track
+from pipelines.errors import ExoidError, InputError
+from pipelines.mechanics.gait import gait
+from pipelines.model import Model, Term, model_from_parameters
+from pipelines.settings.simulate import SimulateSettings
+
+CASE = SimulateSettings()
+"""The reference case of docs/simulation.md: the same for every machine, so that numbers can be compared."""
+
+NOT_OF_THE_LOOP = {"sweep_nm_s_rad", "figures"}
+
+
+def control(d: Diagnosis) -> dict[str, Any]:
+    """Return tracking error and peak torque of the adaptive loop without and with the named causes, as JSON objects.
+
+    Both count from ``settled_after_s`` on: before, the drives are at their limit, whatever the leg.
+    """
+    run = "with_human" if "with_human" in d.baseline.kinds else d.baseline.kinds[0]
+    told: dict[str, Any] = {
+        "run": run,
+        "controller": {"type": "rbf", "reference": "gait", **CASE.model_dump(mode="json", exclude=NOT_OF_THE_LOOP)},
+        "without": None,
+        "with": None,
+        "reason": None,
+    }
+    if any(fault.samples is None for fault in d.faults):
+        return told | {"reason": "acquisition is at fault: no model of these recordings can be trusted"}
+    plain, _ = tables.parameters(d.before.fit, d.baseline, uncertainty(d.before.fit, d.train, d.baseline))
+    models = {"without": plain, "with": d.parameters} if d.causes else {"without": plain}
+    reasons = [] if d.causes else ["no cause is named"]
+    for which, frame in models.items():
+        try:
+            told[which] = _tracked(frame, run, d)
+        except ExoidError as error:
+            # What is wrong; its second sentence tells those who asked for a simulation what to do.
+            reasons.append(f"{which} the causes: {str(error).partition('. ')[0]}")
+    return told | {"reason": "; ".join(reasons) or None}
+
+
+def _tracked(frame: pd.DataFrame, run: str, d: Diagnosis) -> dict[str, dict[str, float]]:
+    motion = d.validate[0].motion
+    terms = tuple(_from_the_begin(term) for term in model_from_parameters(frame, run))
+    loop = track(make_plant(Model(terms), motion.geometry, joints_of(motion.metadata), run), CASE, gait())
+    if loop.ran_away:
+        raise InputError(loop.ran_away)
+    settled = loop.time >= CASE.settled_after_s
+    rms = np.sqrt(np.mean(loop.error[settled] ** 2, axis=0))
+    peak = np.abs(loop.run.torque[settled]).max(axis=0)
+    joints = d.baseline.joints
+    return {
+        "tracking_rmse_rad": dict(zip(joints, rms.tolist(), strict=True)),
+        "peak_torque_nm": dict(zip(joints, peak.tolist(), strict=True)),
+    }
+
+
+def _from_the_begin(term: Term) -> Term:
+    """Let what comes at some time of a run be there from its begin, or the loop might end before."""
+    onset = [p.per_run and p.unit == "s" for p in term.effect.fitted]
+    return replace(term, values=np.where(onset, 0.0, term.values))

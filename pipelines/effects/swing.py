@@ -1,0 +1,52 @@
+"""The motion behind a spring: a load that swings on it, driven by the motion before it.
+
+A soft or loose transmission follows its load only below its own frequency. Above it, and after every reversal,
+the load swings, and a twist of torque over stiffness is wrong in size and sign.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.effects.effect import Effect
+from pipelines.effects.kernel import swing_along
+from pipelines.mechanics.load import Load
+from pipelines.mechanics.motion import Motion
+from pipelines.signals.low_pass import derivative, low_pass, shortest
+
+
+def behind_spring(
+    motion: Motion, load: Load, direction: NDArray, effect: Effect, values: NDArray | tuple[float, ...], ratio: float
+) -> Motion:
+    """Return the motion behind an effect's spring.
+
+    Parameters
+    ----------
+    motion : Motion
+        Before the spring.
+    load : Load
+        What hangs behind it, along the motion before it.
+    direction : (n, J) array
+        How the joints turn per unit of twist.
+    effect : Effect
+        Whose ``spring`` it is.
+    values : sequence of float
+        The effect's.
+    ratio : float
+        Damping ratio added to the spring's own. The motion drives a copy of the load: undamped, the copy would
+        swing on with every error of the load for ever.
+    """
+    along = [np.ascontiguousarray(part) for part in load.along(direction)]
+    h, twist = 1.0 / motion.sample_rate_hz, np.zeros(len(motion))
+    moved = [state.copy() for state in (motion.q, motion.dq, motion.ddq)]
+    for stretch in motion.segments():
+        parts = (part[stretch] for part in along)
+        swing_along(effect.spring, np.array(values, dtype=float), ratio, h, *parts, twist[stretch])
+        if stretch.stop - stretch.start < shortest(motion.sample_rate_hz, motion.cutoff_hz):
+            continue
+        turned = twist[stretch, np.newaxis] * direction[stretch]
+        # Behind the filter that the measured motion is behind, or both would not be of the same moment.
+        turned = low_pass(turned, motion.sample_rate_hz, motion.cutoff_hz)
+        moved[0][stretch] -= turned
+        for order in (1, 2):
+            moved[order][stretch] -= derivative(turned, motion.sample_rate_hz, order)
+    return motion.with_state(*moved)

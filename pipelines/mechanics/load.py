@@ -1,0 +1,46 @@
+"""What a rigid body asks of its joints along a motion, and how that changes where it moves a little otherwise."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.mechanics.leg import Geometry, regressor
+
+STEP = 1e-4
+"""rad and rad/s of the difference quotients: the torque bends over tenths of a radian."""
+
+
+class Load(NamedTuple):
+    """Torque of a body along a motion, and its slopes there; n samples, J joints."""
+
+    torque: NDArray
+    """(n, J) N·m."""
+    inertia: NDArray
+    """(n, J, J) N·m per rad/s²: the mass matrix."""
+    damping: NDArray
+    """(n, J, J) N·m per rad/s: centrifugal and Coriolis torque."""
+    stiffness: NDArray
+    """(n, J, J) N·m per rad: gravity, and what turns with the body."""
+
+    def along(self, direction: NDArray) -> "Load":
+        """Return the load of one coordinate that turns the joints by ``direction`` (n, J): arrays (n,)."""
+        slopes = (np.einsum("ni,nij,nj->n", direction, slope, direction) for slope in self[1:])
+        return Load(np.sum(direction * self.torque, axis=1), *slopes)
+
+
+def load_along(q: NDArray, dq: NDArray, ddq: NDArray, X: NDArray, geometry: Geometry) -> Load:
+    """Return the load of a body with inertial parameters ``X`` (4,) along a motion (n, J)."""
+    n, J = q.shape
+    slopes = np.empty((3, n, J, J))
+
+    def torque(q: NDArray, dq: NDArray, ddq: NDArray) -> NDArray:
+        q, dq, ddq = (np.ascontiguousarray(state) for state in (q, dq, ddq))
+        return regressor(q, dq, ddq, geometry.thigh_length_m, geometry.gravity_m_s2) @ X
+
+    here = torque(q, dq, ddq)
+    for j, unit in enumerate(np.eye(J)):
+        slopes[0, :, :, j] = torque(q, dq, ddq + unit) - here
+        slopes[1, :, :, j] = (torque(q, dq + STEP * unit, ddq) - here) / STEP
+        slopes[2, :, :, j] = (torque(q + STEP * unit, dq, ddq) - here) / STEP
+    return Load(here, *slopes)

@@ -1,0 +1,23 @@
+"""The diagnosis' bench runs, and tells what it is asked."""
+
+from tests.bench.bench_diagnose import catalogue_rows, length_rows, recorded, search_rows
+
+
+def test_the_search_outruns_a_refit_of_every_combination():
+    searched, every, same, each = search_rows(recorded(20.0), sample=3)
+    assert "3 causes" in searched.name
+    assert every.ratio > same.ratio > 1.0
+    assert "scaled up from 3 sets" in each.name
+
+
+def test_a_smaller_catalogue_offers_fewer_shapes():
+    quarter, half = catalogue_rows(recorded(15.0), (8, 4))
+    assert "3 effects" in quarter.name and "6 effects" in half.name
+    shapes = [int(row.name.split(", ")[1].removesuffix(" shapes")) for row in (quarter, half)]
+    assert 0 < shapes[0] < shapes[1]
+
+
+def test_every_length_is_compared_with_the_first():
+    first, second = length_rows((12.0, 24.0))
+    assert first.value.endswith("1.0 times the first's")
+    assert float(second.value.split()[2]) > 0.5

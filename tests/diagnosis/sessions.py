@@ -1,0 +1,39 @@
+"""Sessions for the tests of the diagnosis: the embedded plant, recorded alone and with a wearer."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipelines.contracts.table import Table
+from pipelines.mechanics.fourier import FourierTrajectory
+from pipelines.mechanics.kinematics import motion_table
+from pipelines.mechanics.motion import motion_from_table
+from pipelines.model import effect_named, term_from
+from pipelines.rig.plant import Plant
+from pipelines.rig.record import record
+from pipelines.settings.filter import FilterSettings
+from pipelines.settings.plant import PlantSettings
+
+RICH = FourierTrajectory(
+    theta0=np.array([0.65, -0.93]),
+    a=np.array([[0.22, -0.16, 0.10], [0.12, 0.24, -0.11]]),
+    b=np.array([[0.10, 0.12, -0.07], [-0.22, 0.08, 0.10]]),
+    omega=0.2 * np.pi,
+)
+RUNS = [(run, purpose) for run in ("exo_alone", "with_human") for purpose in ("train", "validate")]
+
+
+def recordings(effect=None, joint=None, seed=1, seconds=40.0, **values):
+    """Return four recordings of a leg with an effect hidden in it."""
+    hidden = [term_from(effect_named(effect)(joint=joint), values)] if effect else []
+    made = []
+    for number, (run, purpose) in enumerate(RUNS):
+        plant = Plant(PlantSettings(), run, seed=10 * seed + number, effects=hidden)
+        made.append(Table(*record(plant, RICH, seconds, purpose)))
+    return made
+
+
+def session(*args, **values):
+    """Return the motions of these recordings, files named by their place."""
+    motions = [motion_from_table(motion_table(table, FilterSettings())) for table in recordings(*args, **values)]
+    return [replace(m, file=f"run_{i}.parquet") for i, m in enumerate(motions)]

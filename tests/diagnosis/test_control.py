@@ -1,0 +1,75 @@
+"""What a diagnosis says of control: the adaptive loop on the model without and with the named causes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.contracts import HIP_AND_KNEE
+from pipelines.diagnosis.control import CASE, control
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.faults import Fault
+from pipelines.dynamics.plant import make_plant
+from pipelines.dynamics.tracking import track
+from pipelines.effects.friction import Friction
+from pipelines.effects.parallel_spring import ParallelSpring
+from pipelines.effects.rigid_body import RigidBody
+from pipelines.mechanics.gait import gait
+from pipelines.mechanics.leg import Geometry
+from pipelines.model import Model, Term
+from pipelines.settings.plant import PlantSettings
+from tests.diagnosis.sessions import session
+
+SPRING = {"stiffness": 12.0, "rest_angle": -0.5}
+
+
+@pytest.fixture(scope="module")
+def sprung():
+    return diagnose(session("parallel_spring", "knee", seed=4, **SPRING))
+
+
+def true_loop():
+    """The leg that was recorded, under the same controller."""
+    leg = PlantSettings()
+    friction = zip(("hip", "knee"), leg.coulomb_nm, leg.viscous_nm_s_rad, strict=True)
+    spring = ParallelSpring("knee")
+    terms = (
+        Term(RigidBody(), np.add(leg.exo_inertial, leg.human_inertial)),
+        *(Term(Friction(joint), np.array([coulomb, viscous])) for joint, coulomb, viscous in friction),
+        Term(spring, spring.values_from(np.array(list(SPRING.values())))),
+    )
+    return track(make_plant(Model(terms), Geometry(), HIP_AND_KNEE, "with_human"), CASE, gait())
+
+
+def test_with_the_cause_named_the_loop_is_that_of_the_true_leg(sprung):
+    told, true = control(sprung), true_loop()
+    settled = true.time >= CASE.settled_after_s
+    rms = np.sqrt(np.mean(true.error[settled] ** 2, axis=0))
+    peak = np.abs(true.run.torque[settled]).max(axis=0)
+    assert (told["run"], told["reason"]) == ("with_human", None)
+    assert list(told["with"]["tracking_rmse_rad"].values()) == pytest.approx(rms.tolist(), rel=0.03)
+    assert list(told["with"]["peak_torque_nm"].values()) == pytest.approx(peak.tolist(), rel=0.03)
+    off = abs(told["without"]["peak_torque_nm"]["knee"] - peak[1])
+    assert off > 3 * abs(told["with"]["peak_torque_nm"]["knee"] - peak[1])
+
+
+def test_a_leg_that_cannot_exist_is_not_simulated_and_the_reason_is_told(sprung):
+    heavy = sprung.parameters.copy()
+    heavy.loc[heavy["name"] == "X3", "value"] = 9.0
+    told = control(replace(sprung, parameters=heavy))
+    assert told["with"] is None
+    assert told["without"] is not None
+    assert told["reason"].startswith("with the causes: the with_human parameters are no real leg: X2 (X1 - X2) = ")
+    assert told["reason"].endswith("the mass matrix is not positive definite")
+
+
+def test_where_no_cause_is_named_there_is_nothing_to_compare(sprung):
+    told = control(replace(sprung, status="unknown_cause"))
+    assert (told["with"], told["reason"]) == (None, "no cause is named")
+    assert told["without"] is not None
+
+
+def test_no_loop_is_simulated_on_what_faulty_recordings_tell(sprung):
+    told = control(replace(sprung, faults=(Fault("run_0.parquet", "hip_torque_nm", "stuck", None),)))
+    assert told["without"] is told["with"] is None
+    assert told["reason"].startswith("acquisition is at fault")

@@ -1,0 +1,109 @@
+"""A load that swings on a transmission's spring, driven by the motion before it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pipelines.dynamics.assembly import assemble
+from pipelines.dynamics.forward import DTHETA, THETA, Q, accelerations, resting_state, stages, step, workspace
+from pipelines.effects.cuff_compliance import CuffCompliance
+from pipelines.effects.joint_elasticity import JointElasticity
+from pipelines.effects.kernel import swing_along
+from pipelines.effects.rigid_body import RigidBody
+from pipelines.effects.swing import behind_spring
+from pipelines.mechanics.leg import Geometry
+from pipelines.mechanics.motion import Motion
+from pipelines.model import Model, Term
+
+X = np.array([2.6, 0.63, 1.78, 5.7])
+JOINTS = ("hip", "knee")
+
+
+def swung(stiffness, torque, inertia, ratio=0.0, h=0.005):
+    """Return the twist of a constant inertia on an elastic joint's spring."""
+    twist, zero = np.empty(len(torque)), np.zeros(len(torque))
+    spring = JointElasticity("hip").spring
+    swing_along(spring, np.array([stiffness]), ratio, h, torque, zero + inertia, zero, zero, twist)
+    return twist
+
+
+@pytest.mark.parametrize(("stiffness", "inertia"), [(300.0, 2.0), (800.0, 0.7), (3000.0, 0.3)])
+def test_a_load_let_go_swings_at_the_root_of_stiffness_over_inertia(stiffness, inertia):
+    torque = np.zeros(2000)
+    torque[0] = 10.0
+    twist = swung(stiffness, torque, inertia)
+    upward = np.flatnonzero((twist[:-1] < 0.0) & (twist[1:] >= 0.0))
+    crossings = upward + twist[upward] / (twist[upward] - twist[upward + 1])
+    period = np.mean(np.diff(crossings[:5])) * 0.005
+    assert_allclose(2.0 * np.pi / period, np.sqrt(stiffness / inertia), rtol=0.02)
+
+
+def test_a_slow_load_is_followed_at_once_by_any_spring():
+    torque = 20.0 * np.cos(0.5 * np.arange(0.0, 10.0, 0.005))
+    for stiffness in (300.0, 1e4, 1e7, 1e10):
+        assert_allclose(swung(stiffness, torque, 0.5), torque / stiffness, atol=0.02 * 20.0 / stiffness)
+
+
+def test_a_copy_that_is_damped_more_forgets_an_error_of_the_load_sooner():
+    steady, wrong = np.full(1000, 5.0), np.full(1000, 5.0)
+    wrong[:20] = 25.0
+    left = [
+        np.abs(swung(500.0, wrong, 1.0, ratio) - swung(500.0, steady, 1.0, ratio))[800:].max() for ratio in (0, 0.1)
+    ]
+    assert left[1] < 0.01 * left[0]
+
+
+@pytest.mark.parametrize("effect", [JointElasticity, CuffCompliance])
+@pytest.mark.parametrize("joint", JOINTS)
+def test_the_slower_the_motion_the_nearer_is_the_link_to_torque_over_stiffness(with_human, effect, joint):
+    bound, stiffness = effect(joint), 1500.0
+    errors = []
+    for slow in (2.0, 8.0):
+        m = with_human
+        motion = replace(m, time=slow * m.time, sample_rate_hz=m.sample_rate_hz / slow, cutoff_hz=12.0 / slow,
+                         dq=m.dq / slow, ddq=m.ddq / slow**2, body=X, limb_body=X)  # fmt: skip
+        load = Model((Term(RigidBody(), X),)).torque(motion)
+        swing = bound.corrected(motion, (stiffness,)).q
+        at_once = bound.corrected(replace(motion, body=None, limb_body=None, load=load, limb_load=load), (stiffness,)).q
+        inside = slice(200, -200)
+        errors.append(np.abs(swing - at_once)[inside].max() / np.abs(at_once - motion.q)[inside].max())
+    # Gravity pulls the twisted link a little further, at any speed.
+    assert errors[1] < errors[0]
+    assert errors[1] < 0.05
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+def test_the_link_behind_a_motor_is_where_forward_dynamics_puts_it(joint):
+    """Both from the same torque: one integrates motor and link, one the link behind the motor's motion."""
+    effect, stiffness = JointElasticity(joint), 300.0
+    model = Model((Term(RigidBody(), X), Term(effect, np.array([stiffness]))))
+    states, ddtheta = simulated(model, seconds=6.0)
+    n = len(states)
+    motion = Motion(
+        np.arange(n) * 0.005, states[:, THETA], states[:, DTHETA], ddtheta, np.zeros((n, 2)), np.zeros(n, np.int64),
+        np.ones(n, bool), cutoff_hz=60.0, body=X,
+    )  # fmt: skip
+    direction = np.zeros((n, 2))
+    direction[:, effect.column(motion)] = 1.0
+    link = behind_spring(motion, motion.link_swing, direction, effect, (stiffness,), 0.0)
+    twist, found = motion.q - states[:, Q], motion.q - link.q
+    assert np.abs(twist).max() > 0.02
+    assert np.std((found - twist)[100:-100]) < 0.05 * np.std(twist)
+
+
+def simulated(model, seconds):
+    """Swing a leg that hangs at rest: states (n, 4, 2) and the motors' accelerations (n, 2), every 5 ms."""
+    a, w, s = assemble(model, Geometry()), workspace(2), stages(2, 0)
+    state, memory, load, rates = resting_state(np.zeros(2)), np.zeros(0), np.zeros(2), np.zeros((4, 2))
+    states, accelerated = [], []
+    for i in range(round(seconds / 2.5e-4)):
+        t = 2.5e-4 * i
+        drive = np.array([30.0, 10.0]) * np.sin(4.0 * t) - 4.0 * state[DTHETA]
+        if i % 20 == 0:
+            accelerations(a, w, t, state, memory, np.sign(state[DTHETA]), load, drive, rates)
+            states.append(state.copy())
+            accelerated.append(rates[DTHETA].copy())
+        step(a, w, s, t, 2.5e-4, state, memory, load, drive)
+    return np.array(states), np.array(accelerated)
