@@ -40,6 +40,10 @@ class SlowError:
         """Systematic power in standard errors of the floor's, (J,)."""
         return ((self.rms / self.floor) ** 2 - 1.0) / np.sqrt(2.0 / np.maximum(self.independent, 1.0))
 
+    def over(self, other: "SlowError") -> "SlowError":
+        """Return the same error over another's floor: what does not repeat in itself is in one's own."""
+        return replace(self, floor=other.floor, independent=other.independent)
+
 
 def slow_error(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SlowError:
     """Return the error of residuals (m, O) in the slow band."""

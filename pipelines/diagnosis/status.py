@@ -49,8 +49,9 @@ class Standing:
     @property
     def held_up(self) -> bool:
         """Whether the named causes take away enough where there is most to take."""
-        worst = int(np.argmax(self.slow_before.sureness))
-        before, after = self.slow_before.excess[worst], self.slow_after.excess[worst]
+        error = self.slow_before.over(self.slow_after)
+        worst = int(np.argmax(error.sureness))
+        before, after = error.excess[worst], self.slow_after.excess[worst]
         return bool(before == 0 or after**2 < (1.0 - HELD_UP) * before**2)
 
     def systematic(self, slow: SlowError) -> NDArray:

@@ -1,5 +1,6 @@
 """A wearer who pushes."""
 
+from dataclasses import replace
 from math import cos, pi, sin
 
 import numpy as np
@@ -15,7 +16,7 @@ class VoluntaryTorque(Effect):
     name = "voluntary_torque"
     title = "Voluntary torque"
     side = Side.HUMAN
-    equation = "tau = A sin(2 pi f t) + B cos(2 pi f t)"
+    equation = "tau = A sin(2 pi f t) + B cos(2 pi f t) + c"
     source = "Hogan, Sternad (2007), Experimental Brain Research 181: rhythmic movement"
     looks_like = "a tone in residual and cuff forces, at a frequency that no period of the motion explains"
     confirm = "ask the wearer to relax, or put electrodes on the muscle; the empty machine must not show it"
@@ -23,27 +24,29 @@ class VoluntaryTorque(Effect):
     linear = (
         Parameter("sine", "N·m", "amplitude of the sine", "A", (-10.0, 10.0), per_run=True),
         Parameter("cosine", "N·m", "amplitude of the cosine", "B", (-10.0, 10.0), per_run=True),
+        Parameter("bias", "N·m", "mean of a wearer who pushes one way more than the other", "c", (-5.0, 5.0), True),
     )
     shape = (Parameter("frequency", "Hz", "of the rhythm", "f", (0.1, 3.0)),)
     reported = (
         Parameter("amplitude", "N·m", "half of peak to peak", "A", (0.5, 10.0)),
         *shape,
         Parameter("phase", "rad", "of the rhythm when the run begins", "phi", (-np.pi, np.pi), True, default=0.0),
+        replace(linear[2], default=0.0),
     )
     parity = Parity.EVEN
 
     @reaction
     def reaction(at, state, values, geometry, joint, out):
-        """Add A sin(2 pi f t) + B cos(2 pi f t) at the joint."""
-        angle = 2.0 * pi * values[2] * at.t
-        out[joint] += values[0] * sin(angle) + values[1] * cos(angle)
+        """Add A sin(2 pi f t) + B cos(2 pi f t) + c at the joint."""
+        angle = 2.0 * pi * values[3] * at.t
+        out[joint] += values[0] * sin(angle) + values[1] * cos(angle) + values[2]
 
     def physical(self, values: NDArray) -> NDArray:
-        """Return amplitude, frequency and phase of amplitude sin(2 pi f t + phase)."""
-        sine, cosine, frequency = values
-        return np.array([np.hypot(sine, cosine), frequency, np.arctan2(cosine, sine)])
+        """Return amplitude, frequency and phase of amplitude sin(2 pi f t + phase), and the bias."""
+        sine, cosine, bias, frequency = values
+        return np.array([np.hypot(sine, cosine), frequency, np.arctan2(cosine, sine), bias])
 
     def values_from(self, physical: NDArray) -> NDArray:
-        """Return the amplitudes of sine and cosine, and the frequency."""
-        amplitude, frequency, phase = physical
-        return np.array([amplitude * np.cos(phase), amplitude * np.sin(phase), frequency])
+        """Return the amplitudes of sine and cosine, the bias, and the frequency."""
+        amplitude, frequency, phase, bias = physical
+        return np.array([amplitude * np.cos(phase), amplitude * np.sin(phase), bias, frequency])

@@ -29,7 +29,7 @@ SIZES = {
     "encoder_offset": (0.06,),
     "time_delay": (0.0175,),
     "passive_joint_torque": (15.0, -0.9, -0.25),
-    "voluntary_torque": (3.0, 0.73, 0.4),
+    "voluntary_torque": (3.0, 0.73, 0.4, 0.8),
     "spasticity": (5.0, 0.3),
     "cuff_compliance": (600.0,),
 }

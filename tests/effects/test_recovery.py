@@ -75,8 +75,8 @@ def since_the_recording_began(term):
     if effect.name == "torque_drift":
         values[1] += BEGIN * values[0]
     if effect.name == "voluntary_torque":
-        amplitude, frequency, phase = effect.physical(values)
-        values = effect.values_from(np.array([amplitude, frequency, phase + 2 * np.pi * frequency * BEGIN]))
+        amplitude, frequency, phase, bias = effect.physical(values)
+        values = effect.values_from(np.array([amplitude, frequency, phase + 2 * np.pi * frequency * BEGIN, bias]))
     return Term(effect, values)
 
 
