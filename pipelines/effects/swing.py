@@ -37,16 +37,17 @@ def behind_spring(
     """
     along = [np.ascontiguousarray(part) for part in load.along(direction)]
     h, twist = 1.0 / motion.sample_rate_hz, np.zeros(len(motion))
+    joints = np.flatnonzero(direction.any(axis=0))
     moved = [state.copy() for state in (motion.q, motion.dq, motion.ddq)]
     for stretch in motion.segments():
         parts = (part[stretch] for part in along)
         swing_along(effect.spring, np.array(values, dtype=float), ratio, h, *parts, twist[stretch])
         if stretch.stop - stretch.start < shortest(motion.sample_rate_hz, motion.cutoff_hz):
             continue
-        turned = twist[stretch, np.newaxis] * direction[stretch]
+        turned = twist[stretch, np.newaxis] * direction[stretch, :][:, joints]
         # Behind the filter that the measured motion is behind, or both would not be of the same moment.
         turned = low_pass(turned, motion.sample_rate_hz, motion.cutoff_hz)
-        moved[0][stretch] -= turned
+        moved[0][stretch, joints] -= turned
         for order in (1, 2):
-            moved[order][stretch] -= derivative(turned, motion.sample_rate_hz, order)
+            moved[order][stretch, joints] -= derivative(turned, motion.sample_rate_hz, order)
     return motion.with_state(*moved)

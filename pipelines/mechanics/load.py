@@ -25,7 +25,11 @@ class Load(NamedTuple):
 
     def along(self, direction: NDArray) -> "Load":
         """Return the load of one coordinate that turns the joints by ``direction`` (n, J): arrays (n,)."""
-        slopes = (np.einsum("ni,nij,nj->n", direction, slope, direction) for slope in self[1:])
+        turned = np.flatnonzero(direction.any(axis=0))
+        slopes = (
+            sum(direction[:, i] * slope[:, i, j] * direction[:, j] for i in turned for j in turned)
+            for slope in self[1:]
+        )
         return Load(np.sum(direction * self.torque, axis=1), *slopes)
 
 
