@@ -47,6 +47,11 @@ class Choice:
     """By size of the set, the empty one first."""
     independent: NDArray
 
+    def alone(self, cause: str) -> float:
+        """Return what a cause gains in log likelihood with no other beside it."""
+        fine = self.refined[1].get((cause,))
+        return fine.score if fine else self.levels[0][(cause,)].score
+
 
 def nothing_chosen(empty: Fit) -> Choice:
     """Return the choice of no cause."""
@@ -70,7 +75,7 @@ def choose(bank: Bank, floor: Floor) -> Choice:
             break
         best = max(finalists, key=lambda r: r.score)
         freer = [_rank(bank, s, empty, independent) for s in _freer(level, named)]
-        if not all(_worth_it(best, before, len(bank.baseline.joints)) for before in (named, *freer)):
+        if not all(_worth_it(best, before, scorer.imperfect) for before in (named, *freer)):
             break
         named = best
     return Choice(named, levels, ranked, independent)
@@ -97,9 +102,16 @@ def _rank(bank: Bank, scored: Scored, empty: Fit, independent: NDArray) -> Ranke
     return Ranked(best, gain - cost(best.causes, columns, independent))
 
 
-def _worth_it(best: Ranked, before: Ranked, joints: int) -> bool:
-    drop = 1.0 - best.fit.rms[:joints] / before.fit.rms[:joints]
-    return best.score - before.score > NEEDED and bool(np.max(drop) > MATERIAL)
+def _worth_it(best: Ranked, before: Ranked, imperfect: NDArray) -> bool:
+    """Tell whether one more cause is likely, shows, and is more than what is always a little off on a good rig."""
+    return best.score - before.score > NEEDED and bool(np.any(_material(best.fit.rms, before.fit.rms, imperfect)))
+
+
+def _material(after: NDArray, before: NDArray, imperfect: NDArray) -> NDArray:
+    """Tell at which joints (J,) errors (O,) fall by enough."""
+    joints = len(after) // 2
+    taken = np.sqrt(np.maximum(before**2 - after**2, 0.0))
+    return ((1.0 - after / np.maximum(before, 1e-12) > MATERIAL) & (taken > imperfect))[:joints]
 
 
 def rivals(choice: Choice, bank: Bank, cause: str) -> dict[str, float]:

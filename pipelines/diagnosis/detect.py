@@ -3,7 +3,7 @@
 An effect of magnitude theta adds theta c to the measured torques; the baseline takes up its share P c and
 leaves theta (I - P) c. With each output's rows divided by its noise and multiplied by the root of the share
 of independent samples, the log likelihood that naming the effect gains is half a noncentral chi-square of
-noncentrality theta^2 |(I - P) c|^2. It is named where that gain exceeds its price, so
+noncentrality theta^2 |(I - P) c|^2. It is named where that gain exceeds its price (``search.cost``), so
 
     theta_min = (z_a + z_b) / |(I - P) c|
 
@@ -124,7 +124,11 @@ class Sight:
     root: NDArray
     """(O,) root of the independent share over the noise and what a good rig leaves; nought where there is no such output."""
     noise: NDArray
-    """(O,) N·m: noise and what a good rig leaves."""
+    """(O,) N·m."""
+    imperfect: NDArray
+    """(O,) N·m that even a good rig leaves."""
+    independent: float
+    """Independent samples of the output that has most."""
     basis: NDArray
     """(rows, size) orthonormal basis of the weighted baseline."""
     torque_rms: NDArray
@@ -136,14 +140,15 @@ class Sight:
         untouched = tuple(run.average(baseline.columns(run.motion, run.motion, run.motion)) for run in runs)
         plain = gram_of_runs(runs, untouched)
         there = np.isfinite(floor.rms) & (floor.rms > 0)
-        noise = np.where(there, np.hypot(floor.rms, imperfection(plain)), 1.0)
+        noise, imperfect = np.where(there, floor.rms, 1.0), imperfection(plain)
         share = np.minimum(floor.independent_share, MOST_INDEPENDENT)
-        root = np.where(there, np.sqrt(share) / noise, 0.0)
+        root = np.where(there, np.sqrt(share) / np.hypot(noise, imperfect), 0.0)
+        independent = float(np.max(share * plain.count.sum(axis=0)))
         values = solve(plain, root**2)
         loaded = tuple(with_load(run, baseline, values) for run in runs)
         torque = np.concatenate([(c @ values)[run.valid] for run, c in zip(runs, untouched, strict=True)])
         rms = np.sqrt(np.mean(torque**2, axis=0))
-        sight = cls(loaded, baseline, untouched, values, root, noise, np.zeros((0, 0)), rms)
+        sight = cls(loaded, baseline, untouched, values, root, noise, imperfect, independent, np.zeros((0, 0)), rms)
         return replace(sight, basis=np.linalg.qr(sight.rows(untouched))[0])
 
     def rows(self, columns: Sequence[NDArray]) -> NDArray:
@@ -393,20 +398,20 @@ def _growth(effect: Effect, left: NDArray, raw: NDArray, columns: int, sight: Si
     """Return the factor by which an effect's square must grow to be named, and what asks for it."""
     if _squared(left) <= NOTHING * _squared(raw):
         return np.inf, "noise"
-    linear = 0 if not effect.linear else columns
-    price = NEEDED + SHAPE_COST * len(effect.shape) + 0.5 * linear
+    price = NEEDED + SHAPE_COST * len(effect.shape) + 0.5 * columns * np.log(sight.independent)
     by_noise = needed_noncentrality(columns, price, power) / _squared(left)
     by_size = min(_material(left, sight))
     return (by_noise, "noise") if by_noise >= by_size else (by_size, "materiality")
 
 
 def _material(left: NDArray, sight: Sight) -> Iterator[float]:
-    """Yield for each joint the growth of the square that makes ``MATERIAL`` of the error the effect's."""
+    """Yield for each joint the growth of the square that makes an effect worth naming there."""
     outputs = sight.outputs()
     for j in range(len(sight.baseline.joints)):
         rows = outputs == j
         square = np.mean((left[rows] / sight.root[j]) ** 2) if sight.root[j] and rows.any() else 0.0
-        yield (sight.noise[j] ** 2 * (1.0 / (1.0 - MATERIAL) ** 2 - 1.0) / square) if square > 0 else np.inf
+        asked = max(sight.noise[j] ** 2 * (1.0 / (1.0 - MATERIAL) ** 2 - 1.0), sight.imperfect[j] ** 2)
+        yield asked / square if square > 0 else np.inf
 
 
 def _usual(looks: list[Look]) -> Look:

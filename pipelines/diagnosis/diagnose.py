@@ -68,13 +68,12 @@ class Diagnosis:
 
     @property
     def causes(self) -> tuple[str, ...]:
-        """Labels of the named causes, the most probable first, the more gainful first among equals."""
+        """Labels of the named causes, the most probable first; among equals that which explains most alone."""
         if self.status in ("unknown_cause", "nothing_missing"):
             return ()
 
         def order(label: str) -> tuple[float, float]:
-            worth = float(np.sum(self.without[label].errors.rms - self.after.errors.rms))
-            return (-round(sum(self.alike(label).values()), 1), -worth)
+            return (-round(sum(self.alike(label).values()), 1), -self.choice.alone(label))
 
         return tuple(sorted(self.likely, key=order))
 

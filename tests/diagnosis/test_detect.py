@@ -12,6 +12,7 @@ from pipelines.diagnosis.detect import POWER, detectability, needed_noncentralit
 from pipelines.diagnosis.floor import Floor
 from pipelines.diagnosis.observations import baseline_of, observe
 from pipelines.diagnosis.planned import planned_motions, planned_noise
+from pipelines.diagnosis.search import IMPERFECTION
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.trajectory import read_trajectory
 from pipelines.settings.datasets import datasets
@@ -93,7 +94,7 @@ def test_the_needed_noncentrality_is_the_square_of_two_quantiles():
     assert needed_noncentrality(1, 6.5, 0.9) == pytest.approx((np.sqrt(13.0) + 1.2816) ** 2, rel=1e-3)
 
 
-def test_what_is_material_takes_its_share_of_a_joints_error():
+def test_what_is_material_takes_its_share_of_a_joints_error_and_of_its_torque():
     rms = np.array([0.05, 0.05])
     runs = 3 * runs_on(RICH)  # so much data that anything would show
     floor = Floor(np.append(rms, [np.nan, np.nan]), np.ones(4), from_periods=False)
@@ -106,8 +107,9 @@ def test_what_is_material_takes_its_share_of_a_joints_error():
     y = np.concatenate([d[run.usable[:, :2]] for d, run in zip(drift, runs, strict=True)])
     left = y - plain @ np.linalg.lstsq(plain, y, rcond=1e-12)[0]
     at_knee = np.concatenate([np.nonzero(run.usable[:, :2])[1] for run in runs]) == 1
-    with_it = np.sqrt(rms[1] ** 2 + np.mean(left[at_knee] ** 2))
-    assert 1.0 - rms[1] / with_it == pytest.approx(MATERIAL, rel=0.02)
+    of_error = rms[1] * np.sqrt(1.0 / (1.0 - MATERIAL) ** 2 - 1.0)
+    of_torque = IMPERFECTION[0] * np.sqrt(np.mean(np.concatenate([r.measured[r.usable[:, 1], 1] for r in runs]) ** 2))
+    assert np.sqrt(np.mean(left[at_knee] ** 2)) == pytest.approx(max(of_error, of_torque), rel=0.02)
 
 
 @pytest.mark.parametrize(
