@@ -15,6 +15,7 @@ def diagnose(
     ],
     output: Annotated[Path, typer.Option("-o", "--out", "--output", help="Folder for verdict, tables and figures.")],
     config: Annotated[Path | None, typer.Option("--config", help="exoid.toml: geometry and [filter].")] = None,
+    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Whether to draw the figures.")] = True,
 ) -> None:
     """Name what rigid body and friction get wrong, extend the model with it, and measure the gain.
 
@@ -25,6 +26,7 @@ def diagnose(
     from pipelines.diagnosis.candidate_table import candidates
     from pipelines.diagnosis.detect import as_json, detectability
     from pipelines.diagnosis.diagnose import diagnose as find
+    from pipelines.diagnosis.figures import FIGURES, draw
     from pipelines.diagnosis.verdict import verdict
     from pipelines.mechanics.read import geometry_from, read_motions
     from pipelines.settings import Experiment
@@ -48,8 +50,12 @@ def diagnose(
     write_text(output / "verdict.json", json.dumps(said | {"provenance": shared}, indent=1, ensure_ascii=False) + "\n")
     visible = as_json(detectability(found.train, found.baseline, found.floor))
     write_text(output / "detectability.json", json.dumps(visible, indent=1, ensure_ascii=False) + "\n")
+    if figures:
+        draw(found, said, output)
     console.emit(said)
     _show(said, output)
+    if figures:
+        console.say(f"figures: {', '.join(FIGURES)} (.png and .pdf)")
 
 
 def _show(said: dict[str, Any], output: Path) -> None:

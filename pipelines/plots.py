@@ -28,7 +28,9 @@ STYLE: dict[Any, Any] = {
 
 def save(figure: Figure, stem: Path) -> None:
     """Write a figure as ``stem``.png and ``stem``.pdf, and close it."""
+    # Measured once for both: bbox_inches="tight" would lay out and measure every text anew for each.
+    box = figure.get_tightbbox().padded(plt.rcParams["savefig.pad_inches"])
     for kind in ("png", "pdf"):
         with whole_file(stem.with_name(f"{stem.name}.{kind}")) as path:
-            figure.savefig(path, format=kind, bbox_inches="tight")
+            figure.savefig(path, format=kind, bbox_inches=box)
     plt.close(figure)

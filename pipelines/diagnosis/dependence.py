@@ -42,6 +42,7 @@ class Variable:
     name: str
     words: str
     """As a sentence says it; ``{joint}`` and ``{other}`` are filled in."""
+    unit: str
     of: Callable[[Run, int], NDArray | None]
     """(m,) values in a run for a joint; None where the run does not know it."""
     by_direction: bool = False
@@ -82,18 +83,20 @@ def _phase(run: Run, j: int) -> NDArray | None:
 
 
 VARIABLES = (
-    Variable("angle", "the {joint}'s angle", lambda run, j: run.state[0][:, j]),
-    Variable("speed", "the {joint}'s speed", lambda run, j: run.state[1][:, j]),
-    Variable("acceleration", "the {joint}'s acceleration", lambda run, j: run.state[2][:, j]),
-    Variable("reversals", "the {joint}'s direction and the time since it reversed", _since_reversal, by_direction=True),
-    Variable("load", "the torque that the {joint} passes on", _load, by_direction=True),
-    Variable("other_angle", "the {other}'s angle", lambda run, j: run.state[0][:, _other(j)]),
-    Variable("other_speed", "the {other}'s speed", lambda run, j: run.state[1][:, _other(j)]),
-    Variable("other_load", "the torque that the {other} passes on", lambda run, j: _load(run, _other(j))),
-    Variable("cuff_force", "the cuffs' torque about the {joint}", _cuff),
-    Variable("temperature", "the {joint} motor's temperature", _temperature),
-    Variable("time", "the time since the run began", lambda run, j: run.time, lasting=False, knots=2),
-    Variable("phase", "the phase of the excitation and no single variable of the motion", _phase, lasting=False),
+    Variable("angle", "the {joint}'s angle", "rad", lambda run, j: run.state[0][:, j]),
+    Variable("speed", "the {joint}'s speed", "rad/s", lambda run, j: run.state[1][:, j]),
+    Variable("acceleration", "the {joint}'s acceleration", "rad/s²", lambda run, j: run.state[2][:, j]),
+    Variable(
+        "reversals", "the {joint}'s direction and the time since it reversed", "s", _since_reversal, by_direction=True
+    ),
+    Variable("load", "the torque that the {joint} passes on", "N·m", _load, by_direction=True),
+    Variable("other_angle", "the {other}'s angle", "rad", lambda run, j: run.state[0][:, _other(j)]),
+    Variable("other_speed", "the {other}'s speed", "rad/s", lambda run, j: run.state[1][:, _other(j)]),
+    Variable("other_load", "the torque that the {other} passes on", "N·m", lambda run, j: _load(run, _other(j))),
+    Variable("cuff_force", "the cuffs' torque about the {joint}", "N·m", _cuff),
+    Variable("temperature", "the {joint} motor's temperature", "°C", _temperature),
+    Variable("time", "the time since the run began", "s", lambda run, j: run.time, lasting=False, knots=2),
+    Variable("phase", "the phase of the excitation and no single variable of the motion", "s", _phase, lasting=False),
 )
 
 

@@ -5,7 +5,9 @@ from typing import Any
 import pandas as pd
 
 from pipelines.diagnosis.control import control
+from pipelines.diagnosis.dependence import dependences
 from pipelines.diagnosis.diagnose import Diagnosis, summary_numbers
+from pipelines.diagnosis.error_budget import error_budget
 from pipelines.diagnosis.gain import gain
 from pipelines.diagnosis.ties import tie_between
 from pipelines.diagnosis.unknown import Unknown, unknown
@@ -34,11 +36,28 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         },
         **summary_numbers(d),
         "control": control(d),
+        "error_budget": error_budget(d),
+        "depends_on": _depends_on(d),
         "causes": causes,
         "data_faults": [{"file": f.file, "channel": f.channel, "what": f.what} for f in d.faults],
         "residual": left.as_json() if left else None,
         "runs": sorted({run.motion.run for run in d.validate}),
         "noise_floor_from": "periods" if d.floor.from_periods else "the band above the motion",
+    }
+
+
+def _depends_on(d: Diagnosis) -> dict[str, list[dict[str, Any]]]:
+    """Return what each joint's residual goes with, most first, as the baseline and as the extended model leave it."""
+    before = dependences(d.validate, d.before.residuals)
+    after = dependences(d.validate, d.after.residuals) if d.causes else before
+    left = {(one.joint, one.variable): one.share for one in after}
+    return {
+        joint: [
+            {"variable": one.variable, "share_before": one.share, "share_after": left[joint, one.variable]}
+            for one in before
+            if one.joint == joint
+        ]
+        for joint in d.baseline.joints
     }
 
 

@@ -35,7 +35,7 @@ class CuffCompliance(Effect):
     confirm = "clamp the exoskeleton, push the limb with a force gauge, and measure how far it moves"
     acts_in = ("with_human",)
     shape = (
-        Parameter("stiffness", "N·m/rad", "torque between machine and limb per angle", "k", (80.0, 3000.0)),
+        Parameter("stiffness", "N·m/rad", "torque between machine and limb per angle", "k", (30.0, 2000.0)),
         Parameter(
             "shank_held", "1", "1 where the shank's own cuff holds it while the thigh moves", "e", (0.0, 1.0),
             default=0.0, forms=(1.0, 0.0),

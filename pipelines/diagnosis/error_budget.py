@@ -1,0 +1,98 @@
+"""The error budget: what the baseline's squared error on validation runs is made of, joint by joint.
+
+Mean squares of independent parts add up, root mean squares do not: every share is a mean square, (N·m)².
+"""
+
+from collections.abc import Callable, Sequence
+from itertools import combinations
+from math import factorial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.diagnose import Diagnosis
+from pipelines.diagnosis.evaluate import evaluate
+from pipelines.diagnosis.fit import fit
+from pipelines.diagnosis.gain import errors_of, scored
+from pipelines.diagnosis.observations import Run
+
+FLOOR, REPEATS, WANDERS, LEFT = "noise_floor", "repeatable_unexplained", "not_repeatable", "unexplained"
+"""Shares beside the causes'; ``LEFT`` stands for the two before it where no period tells them apart."""
+
+
+def error_budget(d: Diagnosis) -> dict[str, dict[str, float]]:
+    """Return each joint's shares, (N·m)²; they add up to the square of ``baseline_rmse_nm``.
+
+    A cause's share, by its label, is below zero at a joint whose error it raises.
+    """
+    left = d.after.errors.rms**2
+    floor = np.minimum(d.standing.floor**2, left)
+    causes = shares_of_causes(tuple(d.likely), lambda labels: _mean_square(d, labels))
+    scatter = scatter_between_periods(d.validate, d.after.residuals)
+    budget = {}
+    for j, joint in enumerate(d.baseline.joints):
+        shares = {FLOOR: float(floor[j])} | {label: float(share[j]) for label, share in causes.items()}
+        above = float(left[j] - floor[j])
+        if scatter is None:
+            shares[LEFT] = above
+        else:
+            shares[REPEATS] = float(np.clip(left[j] - scatter[j], 0.0, above))
+            shares[WANDERS] = above - shares[REPEATS]
+        budget[joint] = shares
+    return budget
+
+
+def shares_of_causes(labels: Sequence[str], left_by: Callable[[frozenset[str]], NDArray]) -> dict[str, NDArray]:
+    """Return what each cause takes away, averaged over all orders in which they can be named (Shapley 1953).
+
+    Causes overlap: what the first of two takes, the second cannot. The average is fair to both, and adds up.
+
+    Parameters
+    ----------
+    labels : sequence of str
+    left_by : callable
+        Mean squares (J,) that the model with a set of causes leaves.
+    """
+    sets = [frozenset(s) for size in range(len(labels) + 1) for s in combinations(labels, size)]
+    left = {s: left_by(s) for s in sets} if labels else {}
+    orders = factorial(len(labels))
+    return {
+        label: sum(
+            (factorial(len(s)) * factorial(len(labels) - len(s) - 1) / orders * (left[s] - left[s | {label}])
+             for s in sets if label not in s),
+            start=np.zeros(1),
+        )
+        for label in labels
+    }  # fmt: skip
+
+
+def _mean_square(d: Diagnosis, labels: frozenset[str]) -> NDArray:
+    named = frozenset(d.likely)
+    if labels == named:
+        return d.after.errors.rms**2
+    if not labels:
+        return d.before.errors.rms**2
+    if len(labels) == len(named) - 1:
+        return d.without[next(iter(named - labels))].errors.rms ** 2
+    made = fit([c for c in d.after.fit.causes if c.label in labels], d.train, d.baseline, d.bank.weights)
+    return errors_of(d.validate, evaluate(made, d.validate, d.baseline)).rms ** 2
+
+
+def scatter_between_periods(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray | None:
+    """Return the variance of residuals (m, O) about their means at the same phase, (J,) (N·m)²; None without periods.
+
+    Noise and all that moves from period to period, drift included: what is left above it repeats.
+    """
+    squares, freedom = np.zeros(len(runs[0].motion.joints)), 0
+    for run, residual in zip(runs, residuals, strict=True):
+        if not run.motion.period_s:
+            continue
+        width = run.block.decimation / run.motion.sample_rate_hz
+        chosen = scored(run)
+        place = np.round(run.time[chosen] % run.motion.period_s / width).astype(int)
+        own = residual[chosen, : len(run.motion.joints)]
+        count = np.bincount(place)
+        mean = np.stack([np.bincount(place, e) for e in own.T], axis=1) / np.maximum(count, 1)[:, np.newaxis]
+        squares = squares + np.sum((own - mean[place]) ** 2, axis=0)
+        freedom += int(np.sum(np.maximum(count - 1, 0)))
+    return squares / freedom if freedom else None

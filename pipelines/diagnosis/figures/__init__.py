@@ -1,0 +1,25 @@
+"""The figures of a diagnosis: what the simulation gets wrong, and what naming the cause makes of it."""
+
+from pathlib import Path
+from typing import Any
+
+from matplotlib import pyplot as plt
+
+from pipelines.diagnosis.diagnose import Diagnosis
+from pipelines.diagnosis.figures import budget, dependence, simulation, verdict
+from pipelines.plots import STYLE, save
+
+FIGURES = {
+    "verdict": verdict.figure,
+    "error-budget": budget.figure,
+    "simulation": simulation.figure,
+    "dependence": dependence.figure,
+}
+"""By file name: what draws it from a diagnosis and what is said of it."""
+
+
+def draw(d: Diagnosis, said: dict[str, Any], folder: Path) -> None:
+    """Write every figure as PNG and PDF; ``said`` is the diagnosis's verdict."""
+    with plt.rc_context(STYLE):
+        for name, figure in FIGURES.items():
+            save(figure(d, said), folder / name)

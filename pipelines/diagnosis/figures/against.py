@@ -1,0 +1,129 @@
+"""A joint's residual against one variable: dots, and the mean of what stands above the same value."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import cycle
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.dependence import VARIABLES, Variable, knows, pooled, tone
+from pipelines.diagnosis.diagnose import Diagnosis
+from pipelines.diagnosis.figures.palette import AFTER, BEFORE, NOISE
+from pipelines.diagnosis.observations import Run
+
+BINS, FEWEST = 40, 8
+"""Of a running mean, and the blocks that a bin needs to have one."""
+DOTS = 2000
+"""At most, or a cloud hides its shape (and takes long to draw)."""
+LINES = ("-", "--", ":", "-.")
+"""Of the parts' means."""
+TALLEST = 99.0
+"""Percentile of the residual's size that a panel must show."""
+
+
+@dataclass(frozen=True)
+class Against:
+    """Where one joint's residuals stand along a variable, n usable blocks of some runs together."""
+
+    label: str
+    x: NDArray
+    """(n,)."""
+    parts: tuple[NDArray, ...]
+    """(n,) bool each: what has a mean of its own, as the two directions of motion, or each run over time."""
+    before: NDArray
+    """(n,) N·m that the baseline leaves."""
+    after: NDArray
+    """(n,) N·m that the extended model leaves."""
+
+
+def against(name: str, d: Diagnosis, joint: str, kinds: Sequence[str]) -> Against:
+    """Return a joint's residuals of the validation runs of some kinds along the variable of a name, or ``tone``."""
+    j = d.baseline.joints.index(joint)
+    variable = next((v for v in VARIABLES if v.name == name), None)
+    chosen = [i for i, run in enumerate(d.validate)
+              if run.motion.run in kinds and (variable is None or knows(variable, [run], j))]  # fmt: skip
+    runs = [d.validate[i] for i in chosen]
+    before, after = ([e.residuals[i][:, j] for i in chosen] for e in (d.before, d.after))
+    if variable is None:
+        label, x = _along_tone(runs, [b - a if d.causes else b for b, a in zip(before, after, strict=True)], j)
+    else:
+        label = f"{_title(variable, d.baseline.joints, j)}, {variable.unit}"
+        x = [np.asarray(variable.of(run, j)) for run in runs]
+    return Against(
+        label=label,
+        x=pooled(runs, x, j),
+        parts=_parts(variable, runs, j),
+        before=pooled(runs, before, j),
+        after=pooled(runs, after, j),
+    )
+
+
+def _parts(variable: Variable | None, runs: Sequence[Run], j: int) -> tuple[NDArray, ...]:
+    if variable is not None and variable.by_direction:
+        forward = pooled(runs, [run.state[1][:, j] > 0 for run in runs], j)
+        return forward, ~forward
+    if variable is not None and variable.name == "time":
+        number = pooled(runs, [np.full(len(run.time), i) for i, run in enumerate(runs)], j)
+        return tuple(number == i for i in range(len(runs)))
+    return (np.ones(int(sum(run.usable[:, j].sum() for run in runs)), dtype=bool),)
+
+
+def _title(variable: Variable, joints: Sequence[str], j: int) -> str:
+    joint = joints[1 - j if variable.name.startswith("other_") else j]
+    titles = {
+        "reversals": f"time since the {joint} reversed",
+        "cuff_force": f"{joint} cuff torque",
+        "temperature": f"{joint} motor's temperature",
+        "time": "time since the run began",
+        "phase": "phase of the excitation",
+    }
+    return titles.get(variable.name, f"{joint} {variable.name.removeprefix('other_')}")
+
+
+def _along_tone(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> tuple[str, list[NDArray]]:
+    """Fold time at the frequency of the strongest tone in residuals (m,), each run from its own tone's crest."""
+    wide = [np.repeat(e[:, np.newaxis], j + 1, axis=1) for e in residuals]
+    frequency, _ = tone(runs, wide, j)
+    x = []
+    for run, residual in zip(runs, residuals, strict=True):
+        known = run.usable[:, j]
+        turned = np.exp(-2j * np.pi * frequency * run.time)
+        crest = np.angle(residual[known] @ turned[known]) / (2 * np.pi)
+        x.append((frequency * run.time + crest + 0.5) % 1.0 - 0.5)
+    return f"cycles of a tone of {frequency:.2f} Hz", x
+
+
+def reach(*residuals: NDArray) -> float:
+    """Return how tall a panel must be to show residuals, N·m either side of nought."""
+    return 1.1 * max((float(np.percentile(np.abs(e), TALLEST)) for e in residuals if len(e)), default=1.0)
+
+
+def draw(axis: Axes, seen: Against, floor: float, height: float, changed: bool) -> None:
+    """Draw before (grey) and, where a cause was named, after (blue), on the band of the noise floor."""
+    axis.axhspan(-floor, floor, color=NOISE, alpha=0.5, lw=0)
+    axis.axhline(0, color="black", lw=0.6)
+    step = max(1, len(seen.x) // DOTS)
+    if len(seen.x):
+        low, high = np.percentile(seen.x, [0.2, 99.8])
+        axis.set_xlim(low - 0.02 * (high - low) - 1e-9, high + 0.02 * (high - low) + 1e-9)
+    kinds = [(seen.before, BEFORE, 0.6)] + [(seen.after, AFTER, 0.4)] * changed
+    for residual, colour, alpha in kinds:
+        axis.plot(seen.x[::step], residual[::step], ".", ms=1.8, mew=0, color=colour, alpha=alpha, rasterized=True)
+    for residual, colour, _ in kinds:
+        for part, line in zip(seen.parts, cycle(LINES)):
+            axis.plot(*binned_mean(seen.x[part], residual[part]), line, color=colour, lw=2)
+    axis.set_ylim(-height, height)
+    axis.set_xlabel(seen.label)
+
+
+def binned_mean(x: NDArray, y: NDArray) -> tuple[NDArray, NDArray]:
+    """Return the middles of equally wide bins along ``x`` (n,) and the mean of ``y`` in each; NaN where few are."""
+    if not len(x):
+        return x, y
+    edges = np.linspace(x.min(), x.max(), BINS + 1)
+    number = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, BINS - 1)
+    count = np.bincount(number, minlength=BINS)
+    mean = np.bincount(number, y, BINS) / np.maximum(count, 1)
+    return 0.5 * (edges[1:] + edges[:-1]), np.where(count >= FEWEST, mean, np.nan)

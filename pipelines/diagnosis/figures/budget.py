@@ -1,0 +1,99 @@
+"""The error budget: one bar for each joint, as long as its mean square error, cut into what it is made of."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from pipelines.diagnosis.diagnose import Diagnosis
+from pipelines.diagnosis.error_budget import FLOOR, LEFT, REPEATS, WANDERS
+from pipelines.diagnosis.figures.palette import AFTER, CAUSE, NOISE, in_words
+
+WORDS = {
+    FLOOR: "noise floor",
+    REPEATS: "unexplained, repeats every period",
+    WANDERS: "unexplained, does not repeat",
+    LEFT: "unexplained",
+}
+COLOURS = {FLOOR: NOISE, REPEATS: AFTER, WANDERS: "#93b4f5", LEFT: AFTER}
+CAUSES = (CAUSE, "#f59e0b", "#7c2d12")
+ROOM = 0.07
+"""Share of a bar that a number needs to stand in it."""
+NEGLIGIBLE = 0.005
+"""Share of a bar that is not worth a line."""
+
+
+def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
+    """Draw a bar for each joint, and beside it every share in N·m."""
+    budget = said["error_budget"]
+    drawn, axes = plt.subplots(len(budget), 1, figsize=(9, 0.6 + 1.5 * len(budget)), squeeze=False)
+    colours = colours_of(budget)
+    for axis, (joint, shares) in zip(axes[:, 0], budget.items(), strict=True):
+        total = sum(shares.values())
+        stack(axis, 0.0, shares, colours)
+        axis.set_yticks([])
+        axis.set_xlim(min(lowest(shares), 0.0) * 1.05, 1.02 * highest(shares))
+        axis.set_title(f"{joint}: {np.sqrt(total):.2f} N·m rms with rigid body and friction", loc="left", fontsize=9)
+        axis.legend(
+            [Patch(color=colours[key]) for key in shares], [_line(key, share, total) for key, share in shares.items()],
+            loc="center left", bbox_to_anchor=(1.01, 0.5),
+        )  # fmt: skip
+    axes[-1, 0].set_xlabel("mean square of the torque error on runs no fit has seen, (N·m)²")
+    drawn.suptitle("What the torque error is made of", x=0.02, ha="left", fontweight="bold")
+    drawn.tight_layout()
+    return drawn
+
+
+def colours_of(budget: Mapping[str, Mapping[str, float]]) -> dict[str, str]:
+    """Return the colour of every share."""
+    labels = [key for key in next(iter(budget.values())) if key not in COLOURS]
+    return COLOURS | dict(zip(labels, CAUSES, strict=False))
+
+
+def words_of(key: str) -> str:
+    """Say what a share is."""
+    return WORDS.get(key) or in_words(key)
+
+
+def stack(axis: Axes, row: float, shares: Mapping[str, float], colours: Mapping[str, str], scale: float = 1.0) -> None:
+    """Lay the shares end to end; those below zero, of causes that raise a joint's error, go to the left."""
+    right = left = 0.0
+    whole = highest(shares) * scale
+    for key, share in shares.items():
+        width = share * scale
+        start = right if width >= 0 else left
+        axis.barh(row, width, left=start, color=colours[key], height=0.7, edgecolor="white", lw=0.5)
+        if abs(width) > ROOM * whole:
+            axis.text(
+                start + 0.5 * width, row, rms(share), ha="center", va="center", fontsize=8,
+                color="black" if key in (FLOOR, WANDERS) else "white",
+            )  # fmt: skip
+        right, left = (right + width, left) if width >= 0 else (right, left + width)
+    axis.grid(axis="y", visible=False)
+
+
+def highest(shares: Mapping[str, float]) -> float:
+    """Return how far a bar goes to the right."""
+    return sum(share for share in shares.values() if share > 0)
+
+
+def lowest(shares: Mapping[str, float]) -> float:
+    """Return how far a bar goes to the left of zero."""
+    return sum(share for share in shares.values() if share < 0)
+
+
+def rms(share: float) -> str:
+    """Return a mean square as root mean square, in N·m; minus where it is taken from the others."""
+    return f"{'−' if share < 0 else ''}{np.sqrt(abs(share)):.2f}"
+
+
+def _line(key: str, share: float, total: float) -> str:
+    if abs(share) < NEGLIGIBLE * total:
+        return f"{words_of(key)}: none"
+    if share < 0:
+        return f"{words_of(key)}: makes it worse by {rms(-share)} N·m rms, {-share / total:.0%} of the square"
+    return f"{words_of(key)}: {rms(share)} N·m rms, {share / total:.0%} of the square"

@@ -1,0 +1,102 @@
+"""The replayed simulation against what was measured, where the baseline gets it most wrong."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pipelines.diagnosis.diagnose import Diagnosis, Extended
+from pipelines.diagnosis.figures.palette import AFTER, BEFORE, MEASURED, NOISE
+from pipelines.diagnosis.replayed import Stretch, simulated_error, worst_stretch
+
+FAR_MRAD = 500.0
+"""Error beyond which a window has nothing more to show."""
+
+
+def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
+    """Draw angle, angle error, torque and torque error of each joint, a column each."""
+    joints, stretch = d.baseline.joints, worst_stretch(d)
+    drawn, axes = plt.subplots(
+        4, len(joints), figsize=(5.2 * len(joints), 7.6), sharex=True, squeeze=False, height_ratios=[2, 1.3, 2, 1.3]
+    )
+    models = [("rigid body and friction", BEFORE, d.before)]
+    models += [("with the causes", AFTER, d.after)] if d.causes else []
+    for j, (joint, column) in enumerate(zip(joints, axes.T, strict=True)):
+        _measured(column[0], column[2], d, stretch, j)
+        column[1].axhline(0, color="black", lw=0.6)
+        column[3].axhspan(-d.floor.rms[j], d.floor.rms[j], color=NOISE, alpha=0.6, lw=0, label="noise floor")
+        column[0].set_title(f"{joint}: 1 s simulations stray {_strayed(said, joint)}", loc="left", fontsize=9)
+        column[2].set_title(f"{joint}: torque is off by {_off(said, joint)}", loc="left", fontsize=9)
+        column[-1].set_xlabel("time, s")
+    for name, colour, made in models:
+        _angles(axes[0], axes[1], made, d, stretch, name, colour)
+        _torques(axes[2], axes[3], made, d, stretch, colour)
+    for row, words in zip(axes, ("angle, rad", "angle error, mrad", "torque, N·m", "torque error, N·m"), strict=True):
+        row[0].set_ylabel(words)
+    lines = [axis.get_legend_handles_labels() for axis in (axes[0, 0], axes[3, 0])]
+    drawn.legend([h for some, _ in lines for h in some], [w for _, some in lines for w in some],
+                 loc="upper left", bbox_to_anchor=(0.01, 0.965), ncols=4)  # fmt: skip
+    drawn.suptitle(
+        f"Simulated and measured where the baseline is furthest off ({d.validate[stretch.run].motion.file})",
+        x=0.02, ha="left", fontweight="bold",
+    )  # fmt: skip
+    axes[0, 0].set_xlim(stretch.begin, stretch.end)
+    drawn.align_ylabels()
+    drawn.tight_layout(rect=(0, 0, 1, 0.96))
+    return drawn
+
+
+def _strayed(said: dict[str, Any], joint: str) -> str:
+    before, after = (said[f"{model}_simulation_rmse_rad"][joint] for model in ("baseline", "extended"))
+    if before is None:
+        return "no one can tell: these parameters move no leg"
+    words = f"{1e3 * before:.1f}"
+    if said["causes"]:
+        words += f" → {1e3 * after:.1f}" if after is not None else " → not to be simulated, and so by"
+    return f"{words} mrad rms"
+
+
+def _off(said: dict[str, Any], joint: str) -> str:
+    words = f"{said['baseline_rmse_nm'][joint]:.2f}"
+    if said["causes"]:
+        words += f" → {said['extended_rmse_nm'][joint]:.2f}"
+    return f"{words} N·m rms, noise floor {said['noise_floor_nm'][joint]:.2f}"
+
+
+def _measured(angle: Axes, torque: Axes, d: Diagnosis, stretch: Stretch, j: int) -> None:
+    run = d.validate[stretch.run]
+    motion, blocks = run.motion, stretch.within(run.time)
+    samples = stretch.within(motion.time)
+    angle.plot(motion.time[samples], motion.q[samples, j], color=MEASURED, lw=0.8, zorder=3, label="measured")
+    torque.plot(run.time[blocks], run.measured[blocks, j], color=MEASURED, lw=0.8, zorder=3)
+
+
+def _angles(
+    angles: list[Axes], errors: list[Axes], made: Extended, d: Diagnosis, stretch: Stretch, name: str, colour: str
+) -> None:
+    simulated = simulated_error(made, d, stretch)
+    motion = d.validate[stretch.run].motion
+    for j, (angle, error) in enumerate(zip(angles, errors, strict=True)):
+        if simulated is None:
+            angle.plot([], [], color=colour, lw=2, label=f"{name} (cannot be simulated)")
+            continue
+        time, strayed = simulated
+        recorded = np.interp(time, motion.time, motion.q[:, j])
+        angle.plot(time, recorded - strayed[:, j], color=colour, lw=2, label=name)
+        error.plot(time, 1e3 * strayed[:, j], color=colour, lw=1.4)
+        low, high = error.get_ylim()
+        error.set_ylim(max(low, -FAR_MRAD), min(high, FAR_MRAD))
+
+
+def _torques(
+    torques: list[Axes], errors: list[Axes], made: Extended, d: Diagnosis, stretch: Stretch, colour: str
+) -> None:
+    run = d.validate[stretch.run]
+    blocks = stretch.within(run.time)
+    for j, (torque, error) in enumerate(zip(torques, errors, strict=True)):
+        known = run.usable[blocks, j]
+        left = np.where(known, made.residuals[stretch.run][blocks, j], np.nan)
+        torque.plot(run.time[blocks], run.measured[blocks, j] - left, color=colour, lw=2)
+        error.plot(run.time[blocks], left, color=colour, lw=1.1)

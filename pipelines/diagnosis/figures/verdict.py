@@ -1,0 +1,94 @@
+"""The one figure beside the summary: what the torque error is made of, and what the cause made of it."""
+
+import textwrap
+from typing import Any
+
+import numpy as np
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from pipelines.diagnosis.dependence import VARIABLES, knows, tone, variable_share
+from pipelines.diagnosis.diagnose import Diagnosis
+from pipelines.diagnosis.figures.against import against, draw, reach
+from pipelines.diagnosis.figures.budget import colours_of, highest, lowest, stack, words_of
+from pipelines.diagnosis.figures.palette import AFTER, BEFORE, NOISE, in_words
+from pipelines.effects import RUNS
+from pipelines.model import effect_named
+
+WIDTH = 125
+"""Characters of the summary in a line."""
+LINE_IN, BODY_IN = 0.19, 3.5
+"""Heights of a line of the summary and of what is beneath it."""
+
+
+def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
+    """Draw the error budget, and the residual against the variable that shows best what is wrong."""
+    summary = textwrap.wrap(said["summary"], WIDTH)
+    head = 0.1 + LINE_IN * len(summary)
+    height = head + BODY_IN
+    drawn, (left, right) = plt.subplots(1, 2, figsize=(10, height), width_ratios=[1, 1.1])
+    _budget(left, said)
+    _shape(right, d, said)
+    drawn.text(0.01, 1.0, "\n".join(summary), ha="left", va="top", fontsize=9.5, fontweight="bold")
+    drawn.tight_layout(rect=(0, 0, 1, 1 - head / height))
+    return drawn
+
+
+def _budget(axis: Axes, said: dict[str, Any]) -> None:
+    """Draw each joint's bar to its own scale: its baseline's mean square is 100 %."""
+    budget = said["error_budget"]
+    colours = colours_of(budget)
+    totals = {joint: sum(shares.values()) for joint, shares in budget.items()}
+    for row, (joint, shares) in enumerate(budget.items()):
+        stack(axis, row, shares, colours, scale=100.0 / totals[joint])
+    axis.set_yticks(
+        range(len(budget)), [f"{joint}\n{np.sqrt(total):.2f} N·m" for joint, total in totals.items()], fontsize=9
+    )
+    axis.set_ylim(len(budget) - 0.5, -0.5)
+    ends = [(lowest(shares) * 100 / totals[joint], highest(shares) * 100 / totals[joint])
+            for joint, shares in budget.items()]  # fmt: skip
+    axis.set_xlim(min(low for low, _ in ends), max(high for _, high in ends))
+    axis.set_xlabel("share of the mean square torque error, %; numbers: N·m rms")
+    there = [key for key in next(iter(budget.values()))
+             if any(abs(shares[key]) > 0.01 * totals[joint] for joint, shares in budget.items())]  # fmt: skip
+    axis.legend(
+        [Patch(color=colours[key]) for key in there], [words_of(key) for key in there],
+        loc="upper left", bbox_to_anchor=(-0.02, -0.2), fontsize=8, ncols=2,
+    )  # fmt: skip
+
+
+def _shape(axis: Axes, d: Diagnosis, said: dict[str, Any]) -> None:
+    """Draw the residual where the first cause shows best, or where the unexplained does."""
+    if d.causes:
+        joint, variable, kinds = _shown_best(d, said)
+    else:
+        joint = max(said["noise_floor_nm"], key=lambda j: said["baseline_rmse_nm"][j] / said["noise_floor_nm"][j])
+        # When a fault of acquisition sets in tells more than what it goes with.
+        spoilt = any(fault.samples is None for fault in d.faults)
+        variable, kinds = "time" if spoilt else said["depends_on"][joint][0]["variable"], RUNS
+    j = d.baseline.joints.index(joint)
+    floor = float(d.floor.rms[j])
+    seen = against(variable, d, joint, kinds)
+    draw(axis, seen, floor, max(reach(seen.before, seen.after), 2 * floor), bool(d.causes))
+    axis.set_ylabel(f"{joint} torque error, N·m")
+    lines = [("rigid body and friction", BEFORE)]
+    lines += [("with " + " and ".join(in_words(label) for label in d.causes), AFTER)] if d.causes else []
+    handles = [Line2D([], [], color=colour, lw=2) for _, colour in lines] + [Patch(color=NOISE, alpha=0.5)]
+    axis.legend(handles, [words for words, _ in lines] + ["noise floor"], loc="upper left",
+                bbox_to_anchor=(-0.02, -0.2), fontsize=8)  # fmt: skip
+
+
+def _shown_best(d: Diagnosis, said: dict[str, Any]) -> tuple[str, str, tuple[str, ...]]:
+    """Return joint, variable and kinds of run: what the first cause adds goes with the variable most."""
+    first = said["causes"][0]
+    joint, effect = first["gain"]["joint"], effect_named(first["effect"])(joint=first["joint"])
+    runs = [(run, b - a) for run, b, a in zip(d.validate, d.before.residuals, d.after.residuals, strict=True)
+            if effect.explains(run.motion)]  # fmt: skip
+    j = d.baseline.joints.index(joint)
+    moved, by = [run for run, _ in runs], [change for _, change in runs]
+    known = [v for v in VARIABLES if v.name != "phase" and knows(v, moved, j)]
+    shares = {v.name: variable_share(v, moved, by, j) for v in known} | {"tone": tone(moved, by, j)[1]}
+    return joint, max(shares, key=lambda name: shares[name]), effect.acts_in

@@ -1,0 +1,90 @@
+"""The diagnosed models beside the recording they get most wrong: torque, and 1 s simulations under that torque."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis import tables
+from pipelines.diagnosis.diagnose import Diagnosis, Extended
+from pipelines.diagnosis.evaluate import settled
+from pipelines.diagnosis.gain import scored
+from pipelines.diagnosis.observations import Run
+from pipelines.diagnosis.uncertainty import Uncertainty
+from pipelines.dynamics.replay import ReplayResult, replay
+from pipelines.errors import ExoidError
+from pipelines.model import Model, model_from_parameters
+
+STRETCH_S = 6.0
+STEP_S = 0.5
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A stretch of a validation run."""
+
+    run: int
+    begin: float
+    """s."""
+    end: float
+
+    def within(self, time: NDArray) -> slice:
+        """Return the stretch's place among times (n,) s."""
+        first, last = np.searchsorted(time, [self.begin, self.end])
+        return slice(int(first), int(last))
+
+
+def worst_stretch(d: Diagnosis) -> Stretch:
+    """Return where the baseline leaves most of the torque, in units of each joint's noise floor."""
+    return max(_stretches(d), key=lambda found: found[0])[1]
+
+
+def _stretches(d: Diagnosis) -> Iterator[tuple[float, Stretch]]:
+    for number, (run, residual) in enumerate(zip(d.validate, d.before.residuals, strict=True)):
+        square = np.sum((residual[:, : len(d.standing.floor)] / d.standing.floor) ** 2, axis=1) * scored(run)
+        total = np.concatenate([[0.0], np.cumsum(square)])
+        last = max(run.time[-1] - STRETCH_S, run.time[0])
+        for begin in np.arange(run.time[0], last + STEP_S, STEP_S):
+            inside = np.searchsorted(run.time, [begin, begin + STRETCH_S])
+            yield float(np.diff(total[inside])[0]), Stretch(number, float(begin), float(begin + STRETCH_S))
+
+
+def simulated_error(made: Extended, d: Diagnosis, stretch: Stretch) -> tuple[NDArray, NDArray] | None:
+    """Return times (k,) s and angle errors (k, J) rad of 1 s windows one after the other, NaN between two.
+
+    None where the model cannot be simulated: causes that the forward dynamics cannot hold together, or a mass matrix
+    that no leg has.
+    """
+    run = d.validate[stretch.run]
+    try:
+        result = replay(model_for(made, d, run), run.motion)
+    except (ExoidError, ZeroDivisionError):
+        return None
+    if not np.all(np.isfinite(result.error)):
+        return None
+    windows = _without_overlap(result, run.motion.time, stretch)
+    rows = result.first[windows, np.newaxis] + np.arange(result.error.shape[1])
+    time = np.pad(run.motion.time[rows], ((0, 0), (0, 1)), constant_values=np.nan)
+    error = np.pad(result.error[windows], ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
+    return time.ravel(), error.reshape(-1, error.shape[2])
+
+
+def _without_overlap(result: ReplayResult, time: NDArray, stretch: Stretch) -> list[int]:
+    length = result.error.shape[1] - 1
+    chosen: list[int] = []
+    for number, first in enumerate(result.first):
+        inside = stretch.begin < time[first + length] and time[first] < stretch.end
+        if inside and (not chosen or first >= result.first[chosen[-1]] + length):
+            chosen.append(number)
+    return chosen
+
+
+def model_for(made: Extended, d: Diagnosis, run: Run) -> Model:
+    """Return a fitted model with the onsets and phases that a run has for itself."""
+    # Nobody asks how sure the values are.
+    size = len(made.fit.values)
+    frame, _ = tables.parameters(made.fit, d.baseline, Uncertainty(np.zeros((size, size)), 1.0, ()))
+    own = {term.effect.label: term for term in settled(made.fit, run, d.baseline)[0]}
+    model = model_from_parameters(frame, run.motion.run)
+    return Model(tuple(own.get(term.effect.label, term) for term in model))

@@ -1,0 +1,187 @@
+"""The error budget adds up, and the figures of a diagnosis show what the verdict says."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
+
+from pipelines.diagnosis import figures, replayed
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.error_budget import scatter_between_periods, shares_of_causes
+from pipelines.diagnosis.figures.against import against, binned_mean
+from pipelines.diagnosis.observations import observe
+from pipelines.diagnosis.verdict import verdict
+from pipelines.dynamics.replay import replay
+from pipelines.errors import InputError
+from tests.diagnosis.sessions import session
+
+
+def humming(motion):
+    """Add a hum at the knee that comes 54 degrees later in each period, of a phase of its own: in no catalogue."""
+    extra = np.zeros_like(motion.torque)
+    extra[:, 1] = 1.2 * np.sin(2 * np.pi * 7.615 * motion.time + len(motion.file + motion.run + motion.purpose))
+    return replace(motion, torque=motion.torque + extra)
+
+
+MADE = {
+    "explained": lambda: session("parallel_spring", "knee", seed=4, stiffness=6.0, rest_angle=-0.5),
+    "one kind, no periods": lambda: [
+        replace(m, period_s=None)
+        for m in session("parallel_spring", "knee", seed=4, stiffness=6.0, rest_angle=-0.5)
+        if m.run == "exo_alone"
+    ],
+    "unknown": lambda: [humming(m) for m in session(seed=7)],
+    "spoilt": lambda: [replace(m, torque=m.torque * [1.0, -1.0]) for m in session(seed=8)],
+    "nothing": session,
+}
+
+
+@pytest.fixture(scope="module")
+def diagnosed():
+    """Return a diagnosis by its name in ``MADE``, and what is said of it, each made once."""
+    made = {}
+
+    def of(name):
+        if name not in made:
+            found = diagnose(MADE[name]())
+            made[name] = found, verdict(found)
+        return made[name]
+
+    return of
+
+
+@pytest.fixture(autouse=True)
+def no_figure_stays():
+    yield
+    plt.close("all")
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_the_shares_of_the_error_add_up_to_the_baselines_mean_square(diagnosed, name):
+    _, said = diagnosed(name)
+    for joint, shares in said["error_budget"].items():
+        assert sum(shares.values()) == pytest.approx(said["baseline_rmse_nm"][joint] ** 2, rel=1e-9)
+        assert all(share >= 0 for key, share in shares.items() if "@" not in key)
+
+
+def test_a_spring_takes_the_error_at_its_joint_down_to_the_floor(diagnosed):
+    found, said = diagnosed("explained")
+    assert found.causes == ("parallel_spring@knee",)
+    knee = said["error_budget"]["knee"]
+    assert list(knee) == ["noise_floor", "parallel_spring@knee", "repeatable_unexplained", "not_repeatable"]
+    assert knee["parallel_spring@knee"] > 0.9 * said["baseline_rmse_nm"]["knee"] ** 2
+    assert knee["repeatable_unexplained"] < 0.1 * knee["noise_floor"]
+
+
+def test_a_hum_beside_the_harmonics_is_said_not_to_repeat(diagnosed):
+    _, said = diagnosed("unknown")
+    assert said["status"] == "unknown_cause"
+    knee = said["error_budget"]["knee"]
+    assert knee["not_repeatable"] > 3 * knee["repeatable_unexplained"]
+    assert "tone of 7.6" in figures.FIGURES["verdict"](*diagnosed("unknown")).axes[1].get_xlabel()
+
+
+def test_without_periods_no_share_claims_to_repeat(diagnosed):
+    knee = diagnosed("one kind, no periods")[1]["error_budget"]["knee"]
+    assert list(knee) == ["noise_floor", "parallel_spring@knee", "unexplained"]
+
+
+def test_what_repeats_is_no_scatter_and_what_wanders_is():
+    run = observe(session(seed=2)[1])
+    rng = np.random.default_rng(0)
+    noise = 0.3 * rng.normal(size=(len(run.time), 4))
+    repeats = 2.0 * np.sin(2 * np.pi * 3 * run.time / run.motion.period_s)[:, np.newaxis]
+    np.testing.assert_allclose(scatter_between_periods([run], [noise + repeats]), 0.3**2, rtol=0.1)
+    steps = 0.5 * (-1.0) ** np.floor(run.time / run.motion.period_s)[:, np.newaxis]
+    # Four periods of +0.5, -0.5, ...: variance 0.25 x 4 / 3.
+    np.testing.assert_allclose(scatter_between_periods([run], [noise + steps]), 0.3**2 + 0.25 * 4 / 3, rtol=0.1)
+
+
+def test_two_causes_that_overlap_share_what_either_would_take():
+    # Alone a takes 6 and b takes 5 of 10; together 8.
+    left = {(): 10.0, ("a",): 4.0, ("b",): 5.0, ("a", "b"): 2.0}
+    shares = shares_of_causes(("a", "b"), lambda labels: np.array([left[tuple(sorted(labels))]]))
+    np.testing.assert_allclose([shares["a"], shares["b"]], [[4.5], [3.5]])
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_every_figure_is_drawn_whatever_the_verdict(diagnosed, name, tmp_path):
+    figures.draw(*diagnosed(name), tmp_path)
+    written = {path.name: path.read_bytes()[:4] for path in tmp_path.iterdir()}
+    assert written == {f"{stem}.png": b"\x89PNG" for stem in figures.FIGURES} | {
+        f"{stem}.pdf": b"%PDF" for stem in figures.FIGURES
+    }
+
+
+@pytest.mark.parametrize("name", ["explained", "unknown", "nothing"])
+def test_the_verdicts_bars_are_as_long_as_their_shares(diagnosed, name):
+    found, said = diagnosed(name)
+    bars = figures.FIGURES["verdict"](found, said).axes[0].patches
+    drawn = [bar.get_width() for bar in bars]
+    wanted = [100 * s / sum(shares.values()) for shares in said["error_budget"].values() for s in shares.values()]
+    np.testing.assert_allclose(drawn, wanted)
+
+
+def test_a_spring_is_shown_against_its_joints_angle(diagnosed):
+    shape = figures.FIGURES["verdict"](*diagnosed("explained")).axes[1]
+    assert shape.get_xlabel() == "knee angle, rad"
+    assert shape.get_ylabel() == "knee torque error, N·m"
+
+
+def test_what_the_residual_goes_with_most_is_drawn_first(diagnosed):
+    found, said = diagnosed("explained")
+    ranking = said["depends_on"]["knee"]
+    drawn = figures.FIGURES["dependence"](found, said)
+    first = next(axis for axis in drawn.axes if axis.get_ylabel() == "knee residual, N·m")
+    assert first.get_xlabel().startswith(f"knee {ranking[0]['variable']}, ")
+    assert first.get_title() == f"{ranking[0]['share_before']:.0%} → {ranking[0]['share_after']:.0%}"
+
+
+def test_a_named_cause_leaves_nothing_that_goes_with_its_variable(diagnosed):
+    ranking = {one["variable"]: one for one in diagnosed("explained")[1]["depends_on"]["knee"]}
+    assert ranking["angle"]["share_before"] > 0.5
+    assert ranking["angle"]["share_after"] < 0.1
+
+
+def test_a_tone_is_folded_onto_its_crest(diagnosed):
+    found, _ = diagnosed("nothing")
+    humming = [
+        e + 2.0 * np.cos(2 * np.pi * 3.137 * run.time + phase)[:, np.newaxis]
+        for phase, (run, e) in enumerate(zip(found.validate, found.before.residuals, strict=True))
+    ]
+    seen = against("tone", replace(found, before=replace(found.before, residuals=humming)), "knee", ("with_human",))
+    assert "3.14 Hz" in seen.label
+    x, mean = binned_mean(seen.x, seen.before)
+    np.testing.assert_allclose(mean, 2.0 * np.cos(2 * np.pi * x), atol=0.35)
+
+
+def test_the_figures_models_stray_as_far_as_the_verdict_says(diagnosed):
+    found, _ = diagnosed("explained")
+    errors = [replay(replayed.model_for(found.after, found, run), run.motion).error for run in found.validate]
+    pooled = np.concatenate([error.reshape(-1, 2) for error in errors])
+    np.testing.assert_allclose(np.sqrt(np.mean(pooled**2, axis=0)), found.strayed["extended"], rtol=1e-6)
+
+
+def test_a_model_that_no_leg_has_is_said_not_to_be_simulated(diagnosed, monkeypatch):
+    def impossible(model, motion):
+        raise InputError("no such leg")
+
+    found, said = diagnosed("explained")
+    monkeypatch.setattr(replayed, "replay", impossible)
+    nowhere = dict.fromkeys(found.baseline.joints)
+    drawn = figures.FIGURES["simulation"](found, said | {"baseline_simulation_rmse_rad": nowhere})
+    words = [text.get_text() for text in drawn.legends[0].get_texts()]
+    assert "rigid body and friction (cannot be simulated)" in words
+
+
+def test_a_figure_that_fails_leaves_no_half_of_it(diagnosed, tmp_path, monkeypatch):
+    def full(figure, path, **kwargs):
+        path.write_bytes(b"half")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Figure, "savefig", full)
+    with pytest.raises(OSError, match="No space left"):
+        figures.draw(*diagnosed("nothing"), tmp_path)
+    assert list(tmp_path.iterdir()) == []
