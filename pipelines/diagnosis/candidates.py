@@ -70,7 +70,7 @@ def columns_under(terms: Sequence[Term], run: Run, baseline: Baseline) -> tuple[
     """Return the columns of the baseline and of some terms in one run, and what was measured.
 
     Terms bend the motion that everything is computed at, add their own torque, and stand between torque and reading.
-    The cuffs' forces make another torque where the limb stands at another angle.
+    The force sensors sit on the links: their forces make another torque where those stand at another angle.
 
     Returns
     -------
@@ -88,7 +88,7 @@ def columns_under(terms: Sequence[Term], run: Run, baseline: Baseline) -> tuple[
         at = limb if effect.on_limb else motor if effect.side is Side.DRIVE else link
         own = effect.columns(at, term.shape)
         parts.append(np.concatenate([own, own if effect.on_limb else np.zeros_like(own)], axis=1))
-    return run.average(np.concatenate(parts, axis=2)), run.measured_at(limb)
+    return run.average(np.concatenate(parts, axis=2)), run.measured_at(link)
 
 
 def gram_of_runs(runs: Sequence[Run], columns: Sequence[NDArray], measured: Sequence[NDArray] | None = None) -> Gram:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates import Candidate, columns_under
-from pipelines.diagnosis.fit import Fit
+from pipelines.diagnosis.fit import Fit, laden
 from pipelines.diagnosis.observations import Baseline, Run
 from pipelines.diagnosis.scan import NEVER, ONSETS
 from pipelines.model import Term
@@ -22,7 +22,7 @@ ALIKE = 4.0
 
 def evaluate(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> list[NDArray]:
     """Return the residuals (m, O) of each run under a model fitted elsewhere."""
-    return [_residual(fit, run, baseline) for run in runs]
+    return [_residual(fit, run, baseline) for run in laden(runs, fit, baseline)]
 
 
 def _residual(fit: Fit, run: Run, baseline: Baseline) -> NDArray:
@@ -63,7 +63,7 @@ def _shared_values(fit: Fit, baseline: Baseline) -> tuple[NDArray, NDArray]:
 
 def settled(fit: Fit, run: Run, baseline: Baseline) -> tuple[list[Term], NDArray]:
     """Return the causes as terms of a run's model with its own onsets and phases, and the baseline's values."""
-    values, _, terms = _learn(fit, run, baseline, run.usable)
+    values, _, terms = _learn(fit, *laden([run], fit, baseline), baseline, run.usable)
     at = baseline.size
     filled = []
     for term in terms:

@@ -9,7 +9,7 @@ from scipy.optimize import minimize_scalar
 
 from pipelines.diagnosis.candidates import Candidate, columns_under, expanded, gram_of_runs
 from pipelines.diagnosis.gram import Gram, error, solve
-from pipelines.diagnosis.observations import Baseline, Run
+from pipelines.diagnosis.observations import Baseline, Run, with_load
 from pipelines.effects import Parameter, Side
 
 SWEEPS = 2
@@ -34,6 +34,8 @@ class Fit:
     """Sum over outputs of samples times log rms: what refinement lowers."""
     kinds: tuple[str, ...]
     """The kind of each run fitted."""
+    loads: NDArray | None = None
+    """Values (size + ...,) whose bodies the loads in the runs are computed from, where not those the runs came with."""
 
     def acting(self, cause: Candidate) -> int:
         """Return in how many of the runs a cause acts."""
@@ -48,6 +50,11 @@ def fit(causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline, we
     return Fit(
         tuple(sorted(causes, key=_last_sensors)), values, *_errors(gram, values), tuple(r.motion.run for r in runs)
     )
+
+
+def laden(runs: Sequence[Run], made: Fit, baseline: Baseline) -> list[Run]:
+    """Return runs with the loads that a fit is for."""
+    return list(runs) if made.loads is None else [with_load(run, baseline, made.loads) for run in runs]
 
 
 def _last_sensors(cause: Candidate) -> bool:
@@ -83,7 +90,12 @@ def _errors(gram: Gram, values: NDArray) -> tuple[NDArray, NDArray, float]:
 def refined(causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline, weights: NDArray) -> Fit:
     """Fit with every shape parameter at its best, one after the other."""
     best = fit(causes, runs, baseline, weights)
-    for _ in range(SWEEPS):
+    for sweep in range(SWEEPS):
+        if sweep and best.causes:
+            # The bodies of the fit before were biased by what is missing, and so were the loads that bend and rub.
+            loads = best.values
+            runs = [with_load(run, baseline, loads) for run in runs]
+            best = replace(fit(best.causes, runs, baseline, weights), loads=loads)
         before = best.cost
         for number, cause in enumerate(best.causes):
             for i, parameter in enumerate(cause.effect.shape):
@@ -91,8 +103,6 @@ def refined(causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline
                     continue
                 for which in _together(parameter, len(runs)):
                     best = _along(best, number, i, which, runs, baseline, weights)
-        if before - best.cost < 0.1:
-            break
     return best
 
 
@@ -116,7 +126,7 @@ def _along(
             for r, shape in enumerate(cause.shapes)
         )
         causes = [replace(c, shapes=shapes) if k == number else c for k, c in enumerate(best.causes)]
-        tried.append(fit(causes, runs, baseline, weights))
+        tried.append(replace(fit(causes, runs, baseline, weights), loads=best.loads))
         return tried[-1].cost
 
     minimize_scalar(
@@ -126,10 +136,11 @@ def _along(
 
 
 def _scale(parameter: Parameter, now: float) -> tuple[Callable[[float], float], float, float]:
-    """Return how a search coordinate becomes a value, and the coordinate's range."""
+    """Return how a search coordinate becomes a value, and the coordinate's range: near by, and hardly beyond typical."""
     low, high = parameter.typical
     if low > 0 and high / low > 4:
         reach = np.log(REACH) * 2
-        return lambda x: float(np.exp(x)), np.log(now) - reach, np.log(now) + reach
+        bottom = min(max(np.log(now) - reach, np.log(low / REACH)), np.log(now))
+        return lambda x: float(np.exp(x)), bottom, max(min(np.log(now) + reach, np.log(high * REACH)), np.log(now))
     reach = 0.25 * (high - low)
-    return float, now - reach, now + reach
+    return float, min(max(now - reach, low - reach), now), max(min(now + reach, high + reach), now)

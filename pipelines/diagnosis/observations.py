@@ -56,11 +56,11 @@ class Run:
         """Put (n, ...) at full rate behind the regression filter: (m, ...)."""
         return self.block.mean(full_rate, self.starts)
 
-    def measured_at(self, limb: Motion) -> NDArray:
-        """Return what was measured where the limb moves otherwise than the encoders say, (m, O) N·m."""
-        if limb.q is self.motion.q or not self.has_cuffs:
+    def measured_at(self, link: Motion) -> NDArray:
+        """Return what was measured where the links move otherwise than the encoders say, (m, O) N·m."""
+        if link.q is self.motion.q or not self.has_cuffs:
             return self.measured
-        cuffs = cuff_torque_of(self.motion, limb.q)
+        cuffs = cuff_torque_of(self.motion, link.q)
         assert cuffs is not None, "a run that has cuffs has their forces"
         joints = len(self.motion.joints)
         return np.hstack([self.measured[:, :joints], np.nan_to_num(self.average(cuffs))])

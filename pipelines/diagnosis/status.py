@@ -13,6 +13,10 @@ EXPLAINED = 0.2
 """Share of the systematic power that may be left of an explained joint."""
 HELD_UP = 0.2
 """Share of the systematic power that the named causes must take away on validation runs to stay named."""
+FOREIGN = 0.3
+"""Share of the systematic power from which what is left, if it is plain, is not a form of the named causes."""
+PLAIN = 10.0
+"""Standard errors of the floor's power by which what is left must exceed it to be plain."""
 SIGNIFICANT = 3.5
 """Standard errors of the floor's power by which slow error must exceed it to be systematic."""
 MATERIAL = 0.25
@@ -52,7 +56,9 @@ class Standing:
         error = self.slow_before.over(self.slow_after)
         worst = int(np.argmax(error.sureness))
         before, after = error.excess[worst], self.slow_after.excess[worst]
-        return bool(before == 0 or after**2 < (1.0 - HELD_UP) * before**2)
+        left = (after / before) ** 2 if before > 0 else 0.0
+        plain = self.systematic(self.slow_after)[worst] and self.slow_after.sureness[worst] > PLAIN
+        return bool(left < (FOREIGN if plain else 1.0 - HELD_UP))
 
     def systematic(self, slow: SlowError) -> NDArray:
         """Tell at which joints an error is beyond chance, beyond the floor and beyond a good rig's, (J,) bool."""

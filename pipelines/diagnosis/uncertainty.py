@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates import Candidate
-from pipelines.diagnosis.fit import Fit, stacked_columns
+from pipelines.diagnosis.fit import Fit, laden, stacked_columns
 from pipelines.diagnosis.observations import Baseline, Run
 from pipelines.estimation.least_squares import long_run_covariance
 
@@ -27,6 +27,7 @@ class Uncertainty:
 
 def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> Uncertainty:
     """Linearise about a fit: its columns, and what a step in each free shape does to the prediction."""
+    runs = laden(runs, fit, baseline)
     plain = stacked_columns(fit.causes, runs, baseline)
     columns = [c for c, _ in plain]
     left = [y - c @ fit.values for c, y in plain]

@@ -29,16 +29,20 @@ class CuffCompliance(Effect):
     name = "cuff_compliance"
     title = "Cuff compliance"
     side = Side.HUMAN
-    equation = "limb angle = exoskeleton angle - torque on the limb / k"
+    equation = "torque on the limb = k twist (1 + h twist²); limb angle = exoskeleton angle - twist"
     source = "Yandell, Quinlivan, Popov, Walsh, Zelik (2017), J. NeuroEngineering and Rehabilitation 14:40"
     looks_like = "with the human only, gravity and inertia torques off in step with the cuff forces"
     confirm = "clamp the exoskeleton, push the limb with a force gauge, and measure how far it moves"
     acts_in = ("with_human",)
     shape = (
-        Parameter("stiffness", "N·m/rad", "torque between machine and limb per angle", "k", (30.0, 2000.0)),
+        Parameter("stiffness", "N·m/rad", "torque between machine and limb per small angle", "k", (30.0, 2000.0)),
         Parameter(
             "shank_held", "1", "1 where the shank's own cuff holds it while the thigh moves", "e", (0.0, 1.0),
             default=0.0, forms=(1.0, 0.0),
+        ),
+        Parameter(
+            "hardening", "1/rad²", "growth of the stiffness with the angle's square", "h", (0.0, 200.0), default=0.0,
+            forms=(0.0, 60.0),
         ),
     )  # fmt: skip
     at_cuff = True
@@ -46,15 +50,15 @@ class CuffCompliance(Effect):
 
     @spring
     def spring(twist, twist_rate, values):
-        """Return k (twist + relaxation twist_rate)."""
-        return values[0] * (twist + RELAXATION_S * twist_rate)
+        """Return k (twist (1 + h twist²) + relaxation twist_rate)."""
+        return values[0] * (twist * (1.0 + values[2] * twist * twist) + RELAXATION_S * twist_rate)
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
         """Return the motion of the limb; it follows its torque at once where its mass is unknown."""
-        stiffness, held = self.completed(shape)
+        stiffness, held, hardening = self.completed(shape)
         direction = self._direction(motion, held > 0.0)
         if motion.limb_swing is not None:
-            return behind_spring(motion, motion.limb_swing, direction, self, (stiffness, held), 0.0)
+            return behind_spring(motion, motion.limb_swing, direction, self, (stiffness, held, hardening), 0.0)
         q, dq, ddq = (
             state - direction * np.sum(direction * torque, axis=1, keepdims=True) / stiffness
             for state, torque in zip((motion.q, motion.dq, motion.ddq), motion.on_limb, strict=True)

@@ -26,18 +26,24 @@ class JointElasticity(Effect):
     name = "joint_elasticity"
     title = "Joint elasticity"
     side = Side.DRIVE
-    equation = "load angle = motor angle - torque / k"
-    source = "Spong (1987), ASME J. Dyn. Sys. Meas. Control 109(4), eq. 8"
+    equation = "torque = k twist (1 + h twist²); load angle = motor angle - twist"
+    source = "Spong (1987), ASME J. Dyn. Sys. Meas. Control 109(4), eq. 8; hardening: Tuttle, Seering (1996), IEEE T-RA 12(3)"
     looks_like = "gravity and inertia torques too small or too large in step with the load itself"
     confirm = "clamp the link, raise the motor's torque slowly and read the encoder"
-    shape = (Parameter("stiffness", "N·m/rad", "torque per angle of twist", "k", (100.0, 10000.0)),)
+    shape = (
+        Parameter("stiffness", "N·m/rad", "torque per angle of small twist", "k", (100.0, 10000.0)),
+        Parameter(
+            "hardening", "1/rad²", "growth of the stiffness with the twist's square", "h", (0.0, 1000.0), default=0.0,
+            forms=(0.0, 100.0, 600.0),
+        ),
+    )  # fmt: skip
     motor_inertia = MOTOR_INERTIA
 
     @spring
     def spring(twist, twist_rate, values):
-        """Return k twist + d twist_rate, d from the damping ratio."""
+        """Return k twist (1 + h twist²) + d twist_rate, d from the damping ratio."""
         damping = 2.0 * DAMPING_RATIO * sqrt(values[0] * MOTOR_INERTIA)
-        return values[0] * twist + damping * twist_rate
+        return values[0] * twist * (1.0 + values[1] * twist * twist) + damping * twist_rate
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
         """Return the motion of the link behind the spring; it follows its torque at once where its mass is unknown."""
@@ -45,7 +51,7 @@ class JointElasticity(Effect):
         if motion.link_swing is not None:
             direction = np.zeros_like(motion.q)
             direction[:, j] = 1.0
-            return behind_spring(motion, motion.link_swing, direction, self, shape, SWING_RATIO)
+            return behind_spring(motion, motion.link_swing, direction, self, self.completed(shape), SWING_RATIO)
         q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
         for state, load_rate in zip((q, dq, ddq), motion.transmitted, strict=True):
             state[:, j] -= load_rate[:, j] / shape[0]
