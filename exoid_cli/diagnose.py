@@ -55,7 +55,7 @@ def diagnose(
     console.emit(said)
     _show(said, output)
     if figures:
-        console.say(f"figures: {', '.join(FIGURES)} (.png and .pdf)")
+        console.say(f"figures: {', '.join(f'{name}.png' for name in FIGURES)}")
 
 
 def _show(said: dict[str, Any], output: Path) -> None:

@@ -1,5 +1,6 @@
 """How exoid's figures look, and how they are written."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,11 +27,11 @@ STYLE: dict[Any, Any] = {
 }
 
 
-def save(figure: Figure, stem: Path) -> None:
-    """Write a figure as ``stem``.png and ``stem``.pdf, and close it."""
+def save(figure: Figure, stem: Path, kinds: Sequence[str] = ("png", "pdf")) -> None:
+    """Write a figure as ``stem``.png and ``stem``.pdf, or the one of them, and close it."""
     # Measured once for both: bbox_inches="tight" would lay out and measure every text anew for each.
     box = figure.get_tightbbox().padded(plt.rcParams["savefig.pad_inches"])
-    for kind in ("png", "pdf"):
+    for kind in kinds:
         with whole_file(stem.with_name(f"{stem.name}.{kind}")) as path:
             figure.savefig(path, format=kind, bbox_inches=box)
     plt.close(figure)

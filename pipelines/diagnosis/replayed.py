@@ -12,7 +12,7 @@ from pipelines.diagnosis.evaluate import settled
 from pipelines.diagnosis.gain import scored
 from pipelines.diagnosis.observations import Run
 from pipelines.diagnosis.uncertainty import Uncertainty
-from pipelines.dynamics.replay import ReplayResult, replay
+from pipelines.dynamics.replay import WINDOW_S, replay
 from pipelines.errors import ExoidError
 from pipelines.model import Model, model_from_parameters
 
@@ -58,26 +58,18 @@ def simulated_error(made: Extended, d: Diagnosis, stretch: Stretch) -> tuple[NDA
     """
     run = d.validate[stretch.run]
     try:
-        result = replay(model_for(made, d, run), run.motion)
+        result = replay(model_for(made, d, run), run.motion, every_s=WINDOW_S)
     except (ExoidError, ZeroDivisionError):
         return None
     if not np.all(np.isfinite(result.error)):
         return None
-    windows = _without_overlap(result, run.motion.time, stretch)
-    rows = result.first[windows, np.newaxis] + np.arange(result.error.shape[1])
-    time = np.pad(run.motion.time[rows], ((0, 0), (0, 1)), constant_values=np.nan)
-    error = np.pad(result.error[windows], ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
+    length = result.error.shape[1]
+    first, last = result.first, result.first + length - 1
+    times = run.motion.time
+    shown = (times[last] > stretch.begin) & (times[first] < stretch.end)
+    time = np.pad(times[first[shown, np.newaxis] + np.arange(length)], ((0, 0), (0, 1)), constant_values=np.nan)
+    error = np.pad(result.error[shown], ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
     return time.ravel(), error.reshape(-1, error.shape[2])
-
-
-def _without_overlap(result: ReplayResult, time: NDArray, stretch: Stretch) -> list[int]:
-    length = result.error.shape[1] - 1
-    chosen: list[int] = []
-    for number, first in enumerate(result.first):
-        inside = stretch.begin < time[first + length] and time[first] < stretch.end
-        if inside and (not chosen or first >= result.first[chosen[-1]] + length):
-            chosen.append(number)
-    return chosen
 
 
 def model_for(made: Extended, d: Diagnosis, run: Run) -> Model:

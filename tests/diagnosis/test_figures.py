@@ -111,7 +111,7 @@ def test_every_figure_is_drawn_whatever_the_verdict(diagnosed, name, tmp_path):
     figures.draw(*diagnosed(name), tmp_path)
     written = {path.name: path.read_bytes()[:4] for path in tmp_path.iterdir()}
     assert written == {f"{stem}.png": b"\x89PNG" for stem in figures.FIGURES} | {
-        f"{stem}.pdf": b"%PDF" for stem in figures.FIGURES
+        f"{stem}.pdf": b"%PDF" for stem in ("verdict", "error-budget")
     }
 
 
@@ -165,7 +165,7 @@ def test_the_figures_models_stray_as_far_as_the_verdict_says(diagnosed):
 
 
 def test_a_model_that_no_leg_has_is_said_not_to_be_simulated(diagnosed, monkeypatch):
-    def impossible(model, motion):
+    def impossible(model, motion, every_s):
         raise InputError("no such leg")
 
     found, said = diagnosed("explained")

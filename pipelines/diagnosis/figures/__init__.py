@@ -16,10 +16,12 @@ FIGURES = {
     "dependence": dependence.figure,
 }
 """By file name: what draws it from a diagnosis and what is said of it."""
+ON_SCREEN = ("simulation", "dependence")
+"""Many panels to look at, not to print: a PDF of each would take as long as all the rest."""
 
 
 def draw(d: Diagnosis, said: dict[str, Any], folder: Path) -> None:
-    """Write every figure as PNG and PDF; ``said`` is the diagnosis's verdict."""
+    """Write every figure as PNG, and what is to be printed as PDF too; ``said`` is the diagnosis's verdict."""
     with plt.rc_context(STYLE):
         for name, figure in FIGURES.items():
-            save(figure(d, said), folder / name)
+            save(figure(d, said), folder / name, ("png",) if name in ON_SCREEN else ("png", "pdf"))
