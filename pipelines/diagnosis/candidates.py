@@ -113,7 +113,11 @@ def signatures(
     """
     if not candidate.bends:
         return [torque_columns(candidate, r, run) for r, run in enumerate(runs)]
-    under = [columns_under([candidate.term(r)], run, baseline) for r, run in enumerate(runs)]
+    under = [
+        columns_under([candidate.term(r)], run, baseline) if candidate.effect.explains(run.motion)
+        else (untouched[r], run.measured)
+        for r, run in enumerate(runs)
+    ]  # fmt: skip
     values = solve(gram_of_runs(runs, *zip(*under, strict=True)), weights)
     size = baseline.size
     return [

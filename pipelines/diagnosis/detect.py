@@ -122,7 +122,7 @@ class Sight:
     values: NDArray
     """The baseline's values, that effects which bend the motion bend."""
     root: NDArray
-    """(O,) root of the independent share over the noise and what a good rig leaves; nought where there is no such output."""
+    """(O,) root of the independent share over the noise and what a good rig leaves; nought without such an output."""
     noise: NDArray
     """(O,) N·m."""
     imperfect: NDArray

@@ -20,6 +20,7 @@ from pipelines.diagnosis.observations import Baseline, Run, baseline_of, observe
 from pipelines.diagnosis.second_look import rings, slower
 from pipelines.diagnosis.slow import slow_error
 from pipelines.diagnosis.status import WANDERING, Standing, status_of
+from pipelines.diagnosis.tone import strongest_tone
 from pipelines.diagnosis.uncertainty import Uncertainty, uncertainty
 from pipelines.dynamics.replay import replay
 from pipelines.errors import ExoidError, InputError
@@ -128,7 +129,8 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
     after = _extended(choice.named.fit, validate, baseline)
     floor = noise_floor(validate, after.residuals)
     standing = _standing(before, after, floor, validate)
-    if choice.named.fit.causes and not standing.held_up:
+    swings = any(cause.effect.spring is not None for cause in choice.named.fit.causes)
+    if choice.named.fit.causes and not standing.held_up(swings):
         # What the training runs promised does not hold on others: nothing is named.
         choice = replace(choice, named=nothing_chosen(empty).named)
         after, floor = before, noise_floor(validate, before.residuals)
@@ -136,7 +138,8 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
     report(0.95, "intervals")
     named = choice.named.labels
     scatter = slow_scatter(validate, after.residuals)[: len(baseline.joints)]
-    wandering = bool(np.any(scatter > WANDERING))
+    tone = strongest_tone(validate, after.residuals)[: len(baseline.joints)]
+    wandering = bool(np.any(scatter > WANDERING)) or standing.hums(tone)
     status = "unknown_cause" if spoilt else status_of(standing, bool(named), wandering)
     sure = uncertainty(choice.named.fit, bank.runs, baseline)
     frame, covariance = tables.parameters(choice.named.fit, baseline, sure)
@@ -188,9 +191,9 @@ def _less(named: Ranked, label: str, bank: Bank, validate: Sequence[Run]) -> Ext
 def _standing(before: Extended, after: Extended, floor: Floor, validate: Sequence[Run]) -> Standing:
     J = len(validate[0].motion.joints)
     torque = np.concatenate([run.measured[scored(run), :J] for run in validate])
-    slow = [slow_error(validate, extended.residuals) for extended in (before, after)]
+    slow, left = (slow_error(validate, extended.residuals) for extended in (before, after))
     rms = np.sqrt(np.mean(torque**2, axis=0))
-    return Standing(floor.rms[:J], before.errors.rms, after.errors.rms, *slow, rms)
+    return Standing(floor.rms[:J], before.errors.rms, after.errors.rms, slow, left, rms)
 
 
 def _strayed(frame: pd.DataFrame, made: Fit, validate: Sequence[Run], baseline: Baseline) -> NDArray | None:

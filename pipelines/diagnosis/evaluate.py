@@ -63,7 +63,7 @@ def _shared_values(fit: Fit, baseline: Baseline) -> tuple[NDArray, NDArray]:
 
 def settled(fit: Fit, run: Run, baseline: Baseline) -> tuple[list[Term], NDArray]:
     """Return the causes as terms of a run's model with its own onsets and phases, and the baseline's values."""
-    values, _, terms = _learn(fit, *laden([run], fit, baseline), baseline, run.usable)
+    values, _, terms = _learn(fit, laden([run], fit, baseline)[0], baseline, run.usable)
     at = baseline.size
     filled = []
     for term in terms:

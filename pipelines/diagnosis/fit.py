@@ -96,9 +96,10 @@ def refined(causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline
             loads = best.values
             runs = [with_load(run, baseline, loads) for run in runs]
             best = replace(fit(best.causes, runs, baseline, weights), loads=loads)
-        before = best.cost
         for number, cause in enumerate(best.causes):
             for i, parameter in enumerate(cause.effect.shape):
+                if parameter.forms and cause.bends and cause.effect.swings:
+                    best = _best_form(best, number, i, runs, baseline, weights)
                 if parameter.forms or parameter.default is not None:
                     continue
                 for which in _together(parameter, len(runs)):
@@ -109,6 +110,19 @@ def refined(causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline
 def _together(parameter: Parameter, runs: int) -> list[list[int]]:
     """Return the runs that share a value of the parameter."""
     return [[r] for r in range(runs)] if parameter.per_run else [list(range(runs))]
+
+
+def _best_form(best: Fit, number: int, i: int, runs: Sequence[Run], baseline: Baseline, weights: NDArray) -> Fit:
+    """Try the other forms of one cause."""
+    cause = best.causes[number]
+    tried = [best]
+    for form in cause.effect.shape[i].forms:
+        if form == cause.shapes[0][i]:
+            continue
+        shapes = tuple(tuple(form if k == i else v for k, v in enumerate(shape)) for shape in cause.shapes)
+        causes = [replace(c, shapes=shapes) if k == number else c for k, c in enumerate(best.causes)]
+        tried.append(replace(fit(causes, runs, baseline, weights), loads=best.loads))
+    return min(tried, key=lambda f: f.cost)
 
 
 def _along(
@@ -136,7 +150,7 @@ def _along(
 
 
 def _scale(parameter: Parameter, now: float) -> tuple[Callable[[float], float], float, float]:
-    """Return how a search coordinate becomes a value, and the coordinate's range: near by, and hardly beyond typical."""
+    """Return how a search coordinate becomes a value, and its range: near by, and hardly beyond typical."""
     low, high = parameter.typical
     if low > 0 and high / low > 4:
         reach = np.log(REACH) * 2

@@ -18,8 +18,9 @@ from pipelines.mechanics.motion import Motion
 
 KEPT = 3
 """Shapes of an effect that go on."""
-FEW, BENDING = 16, 3
-"""Values of a shape parameter, and of one that bends the motion: its effect is nearly in proportion to it."""
+FEW, BENDING, SPRINGS = 16, 3, 8
+"""Values of a shape parameter; of one that bends the motion, for its effect is nearly in proportion to it; of a
+stiffness, for a load that swings on it does so at another frequency."""
 ONSETS = 40
 """Instants tried for what begins at a time of its own in each run."""
 OSCILLATING = {"Hz", "1/turn"}
@@ -107,7 +108,11 @@ def worth_a_look(effect: Effect, scan: Scan) -> list[Candidate]:
 
 
 def _grid(effect: Effect, bends: bool) -> Iterator[tuple[float, ...]]:
-    yield from itertools.product(*(values_of(parameter, BENDING if bends else FEW) for parameter in effect.shape))
+    """Yield the shapes to try; where each is dear, forms that only bend a spring are left to the refinement."""
+    few = FEW if not bends else SPRINGS if effect.swings else BENDING
+    yield from itertools.product(*(
+        values_of(p, few) if not (effect.swings and p.unit == "1/rad²") else (p.default,) for p in effect.shape
+    ))  # fmt: skip
 
 
 def values_of(parameter: Parameter, count: int) -> NDArray:
@@ -123,8 +128,8 @@ def values_of(parameter: Parameter, count: int) -> NDArray:
         return np.arange(low, high, 1.0)
     if low > 0 and high / low > 4:
         # Away from the ends, where an effect that bends the motion does nothing or tears it apart.
-        return np.geomspace(low, high, count + 2)[1:-1] if count == BENDING else np.geomspace(low, high, count)
-    values = np.linspace(low, high, count + 2)[1:-1] if count == BENDING else np.linspace(low, high, count)
+        return np.geomspace(low, high, count + 2)[1:-1] if count < FEW else np.geomspace(low, high, count)
+    values = np.linspace(low, high, count + 2)[1:-1] if count < FEW else np.linspace(low, high, count)
     neutral = 1.0 if parameter.unit == "1" and low > 0 else 0.0
     return values[np.abs(values - neutral) > 0.02 * (high - low)]
 

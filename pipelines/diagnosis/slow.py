@@ -21,7 +21,7 @@ SLOW_S = 0.1
 
 @dataclass(frozen=True)
 class SlowError:
-    """Of each joint, (J,) each."""
+    """Of each output, (O,) each; outputs that were not measured have an infinite floor."""
 
     rms: NDArray
     """N·m."""
@@ -32,12 +32,12 @@ class SlowError:
 
     @property
     def excess(self) -> NDArray:
-        """Systematic error, (J,) N·m."""
+        """Systematic error, (O,) N·m."""
         return np.sqrt(np.maximum(self.rms**2 - self.floor**2, 0.0))
 
     @property
     def sureness(self) -> NDArray:
-        """Systematic power in standard errors of the floor's, (J,)."""
+        """Systematic power in standard errors of the floor's, (O,)."""
         return ((self.rms / self.floor) ** 2 - 1.0) / np.sqrt(2.0 / np.maximum(self.independent, 1.0))
 
     def over(self, other: "SlowError") -> "SlowError":
@@ -48,7 +48,6 @@ class SlowError:
 def slow_error(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SlowError:
     """Return the error of residuals (m, O) in the slow band."""
     slow = [_slowed(run, residual) for run, residual in zip(runs, residuals, strict=True)]
-    joints = len(runs[0].motion.joints)
     longer = [run for run, _ in slow]
     floor = noise_floor(longer, [residual for _, residual in slow])
     squares = [np.sum(np.where(run.usable, r, 0.0) ** 2, axis=0) for run, r in slow]
@@ -57,7 +56,7 @@ def slow_error(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SlowError:
     independent = count * floor.independent_share
     # Where not even a second's worth of samples could be compared the floor is unknown: nothing is systematic.
     known = np.where(np.isfinite(floor.rms), floor.rms, np.inf)
-    return SlowError(rms[:joints], known[:joints], independent[:joints])
+    return SlowError(rms, known, independent)
 
 
 def _slowed(run: Run, residual: NDArray) -> tuple[Run, NDArray]:

@@ -23,6 +23,8 @@ MATERIAL = 0.25
 """Share of the noise floor from which slow error is worth an alarm: 3 % of the error that a user sees."""
 IMPERFECT = 0.015
 """Share of a joint's torque up to which slow error is that of a good rig: several things off by half a percent each."""
+HUM = 0.35
+"""Share of the noise floor from which a tone is none of the noise's own lines: those reach 0.25."""
 WANDERING = 3.0
 """Slow over fast scatter between periods from which something moves that does not repeat."""
 
@@ -50,20 +52,33 @@ class Standing:
                 shares.append(float(max(after**2 - floor**2, 0.0) / (before**2 - floor**2)))
         return shares
 
-    @property
-    def held_up(self) -> bool:
-        """Whether the named causes take away enough where there is most to take."""
-        error = self.slow_before.over(self.slow_after)
-        worst = int(np.argmax(error.sureness))
-        before, after = error.excess[worst], self.slow_after.excess[worst]
-        left = (after / before) ** 2 if before > 0 else 0.0
+    def held_up(self, swings: bool) -> bool:
+        """Tell whether the named causes take away enough, in drives and cuffs together and at the worst joint.
+
+        ``swings`` where one of them is a transmission: its ringing no model follows to the end.
+        """
+        before = self.slow_before.over(self.slow_after)
+        if np.sum(self._power(self.slow_after)) > (1.0 - HELD_UP) * np.sum(self._power(before)):
+            return False
+        worst = int(np.argmax(before.sureness[: len(self.floor)]))
         plain = self.systematic(self.slow_after)[worst] and self.slow_after.sureness[worst] > PLAIN
-        return bool(left < (FOREIGN if plain else 1.0 - HELD_UP))
+        left = self._power(self.slow_after)[worst] / max(self._power(before)[worst], 1e-12)
+        return swings or not plain or bool(left < FOREIGN)
+
+    @staticmethod
+    def _power(slow: SlowError) -> NDArray:
+        """Return the systematic power in units of the floor's, (O,)."""
+        return np.asarray((slow.excess / slow.floor) ** 2)
 
     def systematic(self, slow: SlowError) -> NDArray:
         """Tell at which joints an error is beyond chance, beyond the floor and beyond a good rig's, (J,) bool."""
-        large = slow.excess > np.maximum(MATERIAL * self.floor, IMPERFECT * self.torque)
-        return np.asarray(large & (slow.sureness > SIGNIFICANT))
+        J = len(self.floor)
+        large = slow.excess[:J] > np.maximum(MATERIAL * self.floor, IMPERFECT * self.torque)
+        return np.asarray(large & (slow.sureness[:J] > SIGNIFICANT))
+
+    def hums(self, tone: NDArray) -> bool:
+        """Tell whether a tone (J,) N·m is beyond the floor and beyond a good rig's at some joint."""
+        return bool(np.any(tone > np.maximum(HUM * self.floor, IMPERFECT * self.torque)))
 
 
 def status_of(standing: Standing, named: bool, wandering: bool) -> str:

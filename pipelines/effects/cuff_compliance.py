@@ -47,6 +47,7 @@ class CuffCompliance(Effect):
     )  # fmt: skip
     at_cuff = True
     motor_inertia = MACHINE_INERTIA
+    swings = True
 
     @spring
     def spring(twist, twist_rate, values):

@@ -109,6 +109,8 @@ class Effect(ABC):
     """kg·m² on the motor's side of ``spring``."""
     at_cuff: ClassVar[bool] = False
     """True where ``spring`` stands between machine and limb, not between motor and link."""
+    swings: ClassVar[bool] = False
+    """True where ``corrected`` lets the load swing on the spring: what it does then depends on its frequency."""
     reading_states: ClassVar[int] = 0
     reaction: ClassVar[Callable[..., Any] | None] = None
     derivative: ClassVar[Callable[..., Any] | None] = None

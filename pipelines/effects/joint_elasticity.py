@@ -31,13 +31,14 @@ class JointElasticity(Effect):
     looks_like = "gravity and inertia torques too small or too large in step with the load itself"
     confirm = "clamp the link, raise the motor's torque slowly and read the encoder"
     shape = (
-        Parameter("stiffness", "N·m/rad", "torque per angle of small twist", "k", (100.0, 10000.0)),
+        Parameter("stiffness", "N·m/rad", "torque per angle of small twist", "k", (60.0, 8000.0)),
         Parameter(
             "hardening", "1/rad²", "growth of the stiffness with the twist's square", "h", (0.0, 1000.0), default=0.0,
             forms=(0.0, 100.0, 600.0),
         ),
     )  # fmt: skip
     motor_inertia = MOTOR_INERTIA
+    swings = True
 
     @spring
     def spring(twist, twist_rate, values):

@@ -1,0 +1,39 @@
+"""Tones in a residual: a hum that knows nothing of the motion, and that no average over periods shows."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.observations import Run
+
+LOWEST_HZ = 1.2
+"""Below it the motion itself has its lines."""
+SHORTEST = 256
+"""Blocks in which a line stands out."""
+WIDTH = 2
+"""Bins on each side of a line that a Hann window spreads it over."""
+
+
+def strongest_tone(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray:
+    """Return the rms (N·m) of the strongest line in any run's residual (m, O), for each output, (O,).
+
+    A line is the power within ``WIDTH`` bins of the highest; of noise alone that is some 0.1 of its rms over a run.
+    """
+    tones = np.zeros(residuals[0].shape[1])
+    for run, residual in zip(runs, residuals, strict=True):
+        spacing = run.block.decimation / run.motion.sample_rate_hz
+        slots = np.round((run.time - run.time[0]) / spacing).astype(int)
+        if len(slots) < SHORTEST:
+            continue
+        filled = np.zeros((slots[-1] + 1, residual.shape[1]))
+        filled[slots] = np.where(run.usable, residual, 0.0)
+        there = np.maximum(run.usable.mean(axis=0) * len(slots) / len(filled), 1e-3)
+        window = np.hanning(len(filled))
+        power = np.abs(np.fft.rfft(filled * window[:, np.newaxis], axis=0)) ** 2
+        power *= 2.0 / (np.sum(window**2) * len(filled)) / there**2
+        power[np.fft.rfftfreq(len(filled), spacing) < LOWEST_HZ] = 0.0
+        peak = np.argmax(power, axis=0)
+        for o, at in enumerate(peak):
+            tones[o] = max(tones[o], np.sqrt(power[max(at - WIDTH, 0) : at + WIDTH + 1, o].sum()))
+    return tones
