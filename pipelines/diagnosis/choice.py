@@ -6,16 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.bank import Bank
-from pipelines.diagnosis.fit import Fit, fit, refined
-from pipelines.diagnosis.floor import Floor
+from pipelines.diagnosis.fit import Fit, fit, laden, refined, stacked_columns
+from pipelines.diagnosis.floor import Floor, independent_share
 from pipelines.diagnosis.search import Scored, Scorer, cost, imperfection, log_likelihood, search
 
 MOST_INDEPENDENT = 1 / 6
 """Of 25 ms blocks: what a model leaves of a leg is never white (DESIGN section 5)."""
 NEEDED = 6.0
 """Log likelihood that one more cause must gain."""
-MATERIAL = 0.02
-"""Share of a joint's error that one more cause must take away."""
+MATERIAL, MATERIAL_IN_CUFFS = 0.02, 0.1
+"""Share of a drive's error, or else of that of the cuffs' torque, that one more cause must take away."""
 FINALISTS = 3
 """Sets of each size whose shapes are refined before they are compared."""
 BEHIND = 30.0
@@ -108,10 +108,23 @@ def _worth_it(best: Ranked, before: Ranked, imperfect: NDArray) -> bool:
 
 
 def _material(after: NDArray, before: NDArray, imperfect: NDArray) -> NDArray:
-    """Tell at which joints (J,) errors (O,) fall by enough."""
-    joints = len(after) // 2
+    """Tell at which outputs errors (O,) fall by enough."""
     taken = np.sqrt(np.maximum(before**2 - after**2, 0.0))
-    return ((1.0 - after / np.maximum(before, 1e-12) > MATERIAL) & (taken > imperfect))[:joints]
+    asked = np.repeat([MATERIAL, MATERIAL_IN_CUFFS], len(after) // 2)
+    return np.asarray((1.0 - after / np.maximum(before, 1e-12) > asked) & (taken > imperfect))
+
+
+def dilution(choice: Choice, bank: Bank) -> float:
+    """Return how much less the data say between two causes than noise alone would let them, 0 to 1.
+
+    Where the named causes leave more than noise, that is their form's misfit, and it is much alike from sample to
+    sample: a likelihood that counts it as noise is sure of the wrong cause.
+    """
+    made = choice.named.fit
+    runs = laden(bank.runs, made, bank.baseline)
+    left = [y - c @ made.values for c, y in stacked_columns(made.causes, runs, bank.baseline)]
+    independent = bank.gram.count.sum(axis=0) * independent_share(runs, left)
+    return float(min(1.0, independent.sum() / choice.independent.sum()))
 
 
 def rivals(choice: Choice, bank: Bank, cause: str) -> dict[str, float]:
@@ -132,8 +145,8 @@ def rivals(choice: Choice, bank: Bank, cause: str) -> dict[str, float]:
     return behind
 
 
-def probabilities(behind: dict[str, float]) -> dict[str, float]:
-    """Turn log likelihoods behind the best into probabilities, softened for misspecification."""
-    odds = {label: float(np.exp(-SOFTENING * gap)) for label, gap in behind.items()}
+def probabilities(behind: dict[str, float], diluted: float) -> dict[str, float]:
+    """Turn log likelihoods behind the best into probabilities, softened for misspecification and ``diluted``."""
+    odds = {label: float(np.exp(-SOFTENING * diluted * gap)) for label, gap in behind.items()}
     total = sum(odds.values())
     return {label: odd / total for label, odd in odds.items()}

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis import tables
 from pipelines.diagnosis.bank import Bank, fill, silent
-from pipelines.diagnosis.choice import Choice, Ranked, choose, nothing_chosen, probabilities, rivals
+from pipelines.diagnosis.choice import Choice, Ranked, choose, dilution, nothing_chosen, probabilities, rivals
 from pipelines.diagnosis.evaluate import evaluate, settled
 from pipelines.diagnosis.faults import Fault, excluding, find_faults
 from pipelines.diagnosis.fit import Fit, fit, stacked_columns
@@ -129,25 +129,26 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
     after = _extended(choice.named.fit, validate, baseline)
     floor = noise_floor(validate, after.residuals)
     standing = _standing(before, after, floor, validate)
-    swings = any(cause.effect.spring is not None for cause in choice.named.fit.causes)
-    if choice.named.fit.causes and not standing.held_up(swings):
-        # What the training runs promised does not hold on others: nothing is named.
+    effects = [cause.effect for cause in choice.named.fit.causes]
+    hums = standing.hums(strongest_tone(validate, after.residuals)[: len(baseline.joints)])
+    wanders = bool(np.any(slow_scatter(validate, after.residuals)[: len(baseline.joints)] > WANDERING))
+    foreign = hums or (wanders and not any(p.per_run for effect in effects for p in effect.fitted))
+    if effects and (foreign or not standing.held_up(effects)):
+        # What the training runs promised does not hold on others, or it is none of this: nothing is named.
         choice = replace(choice, named=nothing_chosen(empty).named)
         after, floor = before, noise_floor(validate, before.residuals)
         standing = _standing(before, before, floor, validate)
     report(0.95, "intervals")
     named = choice.named.labels
-    scatter = slow_scatter(validate, after.residuals)[: len(baseline.joints)]
-    tone = strongest_tone(validate, after.residuals)[: len(baseline.joints)]
-    wandering = bool(np.any(scatter > WANDERING)) or standing.hums(tone)
-    status = "unknown_cause" if spoilt else status_of(standing, bool(named), wandering)
+    status = "unknown_cause" if spoilt else status_of(standing, bool(named), wanders or hums)
+    diluted = dilution(choice, bank) if named else 1.0
     sure = uncertainty(choice.named.fit, bank.runs, baseline)
     frame, covariance = tables.parameters(choice.named.fit, baseline, sure)
     plain, _ = tables.parameters(empty, baseline, uncertainty(empty, bank.runs, baseline))
     return Diagnosis(
         baseline=baseline, bank=bank, choice=choice, status=status, before=before, after=after,
         without={label: _less(choice.named, label, bank, validate) for label in named},
-        likely={label: probabilities(rivals(choice, bank, label)) for label in named},
+        likely={label: probabilities(rivals(choice, bank, label), diluted) for label in named},
         standing=standing, floor=floor, sure=sure, parameters=frame, covariance=covariance,
         residuals=tables.residual_table(validate, {"baseline": before.residuals, "extended": after.residuals}),
         train=bank.runs, validate=validate, faults=faults,

@@ -45,6 +45,16 @@ def noise_floor(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Floor:
     return Floor(rms, share, from_periods)
 
 
+def independent_share(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray:
+    """Return how many independent samples there are for each sample of a model's own residual (m, O), (O,).
+
+    What a model gets wrong resembles itself for longer than noise does.
+    """
+    series = [np.where(run.usable, residual, np.nan) for run, residual in zip(runs, residuals, strict=True)]
+    there = [any(np.isfinite(s[:, o]).sum() > 40 for s in series) for o in range(residuals[0].shape[1])]
+    return np.array([1.0 / _correlation_time([s[:, o] for s in series]) if t else 1.0 for o, t in enumerate(there)])
+
+
 def slow_scatter(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray:
     """Return the scatter's power density below 1 Hz over that between 2 and 6 Hz, for each output, (O,).
 

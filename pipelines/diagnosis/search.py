@@ -22,7 +22,7 @@ MOST = 3
 """Causes in a set."""
 SHAPE_COST = 2.0
 """What a shape parameter must gain, in units of log likelihood, for having been searched."""
-IMPERFECTION = (0.01, 0.02)
+IMPERFECTION = (0.009, 0.02)
 """Share of a drive's and of a cuff's torque that even a good model of a good machine leaves."""
 
 

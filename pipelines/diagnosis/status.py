@@ -1,11 +1,13 @@
 """What is left: explained, partly, unknown, or nothing missing to begin with."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.slow import SlowError
+from pipelines.effects import Effect
 
 AT_FLOOR = 1.03
 """RMSE over floor up to which a joint has no systematic error (CONTRACTS, verdict/1)."""
@@ -14,7 +16,10 @@ EXPLAINED = 0.2
 HELD_UP = 0.2
 """Share of the systematic power that the named causes must take away on validation runs to stay named."""
 FOREIGN = 0.3
-"""Share of the systematic power from which what is left, if it is plain, is not a form of the named causes."""
+"""Share of the systematic power from which what is left, if it is plain, is not a form of a named cause.
+
+Two or three causes together imitate more: of them a half or a third of that.
+"""
 PLAIN = 10.0
 """Standard errors of the floor's power by which what is left must exceed it to be plain."""
 SIGNIFICANT = 3.5
@@ -52,10 +57,10 @@ class Standing:
                 shares.append(float(max(after**2 - floor**2, 0.0) / (before**2 - floor**2)))
         return shares
 
-    def held_up(self, swings: bool) -> bool:
-        """Tell whether the named causes take away enough, in drives and cuffs together and at the worst joint.
+    def held_up(self, effects: Sequence[Effect]) -> bool:
+        """Tell whether the named effects take away enough, in drives and cuffs together and at the worst joint.
 
-        ``swings`` where one of them is a transmission: its ringing no model follows to the end.
+        The ringing of a transmission no model follows to the end.
         """
         before = self.slow_before.over(self.slow_after)
         if np.sum(self._power(self.slow_after)) > (1.0 - HELD_UP) * np.sum(self._power(before)):
@@ -63,7 +68,8 @@ class Standing:
         worst = int(np.argmax(before.sureness[: len(self.floor)]))
         plain = self.systematic(self.slow_after)[worst] and self.slow_after.sureness[worst] > PLAIN
         left = self._power(self.slow_after)[worst] / max(self._power(before)[worst], 1e-12)
-        return swings or not plain or bool(left < FOREIGN)
+        rings = any(effect.spring is not None for effect in effects)
+        return rings or not plain or bool(left < FOREIGN / len(effects))
 
     @staticmethod
     def _power(slow: SlowError) -> NDArray:

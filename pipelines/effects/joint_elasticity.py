@@ -27,7 +27,7 @@ class JointElasticity(Effect):
     title = "Joint elasticity"
     side = Side.DRIVE
     equation = "torque = k twist (1 + h twist²); load angle = motor angle - twist"
-    source = "Spong (1987), ASME J. Dyn. Sys. Meas. Control 109(4), eq. 8; hardening: Tuttle, Seering (1996), IEEE T-RA 12(3)"
+    source = "Spong (1987), ASME J. Dyn. Sys. Meas. Control 109(4), eq. 8; Tuttle, Seering (1996), IEEE T-RA 12(3)"
     looks_like = "gravity and inertia torques too small or too large in step with the load itself"
     confirm = "clamp the link, raise the motor's torque slowly and read the encoder"
     shape = (
