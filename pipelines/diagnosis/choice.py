@@ -1,5 +1,6 @@
 """Which set of causes is named, how likely each is, and what cannot be told from it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.bank import Bank
 from pipelines.diagnosis.fit import Fit, fit, laden, refined, stacked_columns
 from pipelines.diagnosis.floor import Floor, independent_share
-from pipelines.diagnosis.search import Scored, Scorer, cost, imperfection, log_likelihood, search
+from pipelines.diagnosis.search import Scored, Scorer, cost, known_besides, log_likelihood, search
 
 MOST_INDEPENDENT = 1 / 6
 """Of 25 ms blocks: what a model leaves of a leg is never white (DESIGN section 5)."""
@@ -59,23 +60,26 @@ def nothing_chosen(empty: Fit) -> Choice:
     return Choice(nothing, [], [{nothing.labels: nothing}], np.zeros(len(empty.rms)))
 
 
-def choose(bank: Bank, floor: Floor) -> Choice:
-    """Search, refine the finalists, and stop at the smallest set that nothing improves enough."""
+def choose(bank: Bank, floor: Floor, evidence: Mapping[str, float]) -> Choice:
+    """Search, refine the finalists, and stop at the smallest set that nothing improves enough.
+
+    ``evidence`` is what is known of some causes besides what they do to the mean torque, by label.
+    """
     count = bank.gram.count.sum(axis=0)
     independent = count * np.minimum(floor.independent_share, MOST_INDEPENDENT)
-    scorer = Scorer(bank, independent)
+    scorer = Scorer(bank, independent, evidence)
     levels = search(scorer)
     empty = fit((), bank.runs, bank.baseline, bank.weights)
     named = Ranked(empty, 0.0)
     ranked = [{named.labels: named}]
     for level in levels:
-        finalists = [_rank(bank, s, empty, independent) for s in _finalists(level)]
+        finalists = [_rank(scorer, s, empty) for s in _finalists(level)]
         ranked.append({r.labels: r for r in finalists})
         if not finalists:
             break
         best = max(finalists, key=lambda r: r.score)
-        freer = [_rank(bank, s, empty, independent) for s in _freer(level, named)]
-        if not all(_worth_it(best, before, scorer.imperfect) for before in (named, *freer)):
+        freer = [_rank(scorer, s, empty) for s in _freer(level, named)]
+        if not all(_worth_it(best, before, scorer) for before in (named, *freer)):
             break
         named = best
     return Choice(named, levels, ranked, independent)
@@ -93,18 +97,22 @@ def _finalists(level: dict[tuple[str, ...], Scored]) -> list[Scored]:
     return [s for s in ordered[:FINALISTS] if s.score > ordered[0].score - BEHIND]
 
 
-def _rank(bank: Bank, scored: Scored, empty: Fit, independent: NDArray) -> Ranked:
+def _rank(scorer: Scorer, scored: Scored, empty: Fit) -> Ranked:
     """Refine a set's shapes and score it on what it was fitted to, less a price for every parameter."""
+    bank, independent = scorer.bank, scorer.independent
     best = refined([bank.candidates[i] for i in scored.chosen], bank.runs, bank.baseline, bank.weights)
-    gain = log_likelihood(best.rms, empty.rms, independent, imperfection(bank.gram))
+    gain = log_likelihood(best.rms, empty.rms, independent, scorer.imperfect)
     # One that bends the motion has no amplitude of its own, but its shape is as free as one.
     columns = len(best.values) - len(empty.values) + sum(c.bends for c in best.causes)
-    return Ranked(best, gain - cost(best.causes, columns, independent))
+    besides = known_besides(best.causes, scorer.evidence)
+    return Ranked(best, gain + besides - cost(best.causes, columns, independent))
 
 
-def _worth_it(best: Ranked, before: Ranked, imperfect: NDArray) -> bool:
+def _worth_it(best: Ranked, before: Ranked, scorer: Scorer) -> bool:
     """Tell whether one more cause is likely, shows, and is more than what is always a little off on a good rig."""
-    return best.score - before.score > NEEDED and bool(np.any(_material(best.fit.rms, before.fit.rms, imperfect)))
+    shows = np.any(_material(best.fit.rms, before.fit.rms, scorer.imperfect))
+    seen_otherwise = known_besides(best.fit.causes, scorer.evidence) - known_besides(before.fit.causes, scorer.evidence)
+    return best.score - before.score > NEEDED and bool(shows or seen_otherwise > NEEDED)
 
 
 def _material(after: NDArray, before: NDArray, imperfect: NDArray) -> NDArray:

@@ -10,19 +10,32 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis import tables
 from pipelines.diagnosis.bank import Bank, fill, silent
-from pipelines.diagnosis.choice import Choice, Ranked, choose, dilution, nothing_chosen, probabilities, rivals
+from pipelines.diagnosis.choice import (
+    MOST_INDEPENDENT,
+    NEEDED,
+    Choice,
+    Ranked,
+    choose,
+    dilution,
+    nothing_chosen,
+    probabilities,
+    rivals,
+)
 from pipelines.diagnosis.evaluate import evaluate, settled
 from pipelines.diagnosis.faults import Fault, excluding, find_faults
 from pipelines.diagnosis.fit import Fit, fit, stacked_columns
 from pipelines.diagnosis.floor import Floor, noise_floor, slow_scatter
 from pipelines.diagnosis.gain import Errors, errors_of, scored
+from pipelines.diagnosis.impacts import evidence_of_play
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, observe, with_load
+from pipelines.diagnosis.search import known_besides
 from pipelines.diagnosis.second_look import rings, slower
 from pipelines.diagnosis.slow import slow_error
 from pipelines.diagnosis.status import WANDERING, Standing, status_of
 from pipelines.diagnosis.tone import strongest_tone
 from pipelines.diagnosis.uncertainty import Uncertainty, uncertainty
 from pipelines.dynamics.replay import replay
+from pipelines.effects import Backlash
 from pipelines.errors import ExoidError, InputError
 from pipelines.mechanics.motion import Motion
 from pipelines.model import Model, effect_named, model_from_parameters
@@ -124,7 +137,8 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
     left = [y - c @ empty.values for c, y in stacked_columns((), bank.runs, baseline)]
     # Where masking does not help, physics would be blamed for what acquisition did.
     spoilt = any(fault.samples is None for fault in faults)
-    choice = nothing_chosen(empty) if spoilt else choose(bank, noise_floor(bank.runs, left))
+    heard = _heard(bank.runs, left)
+    choice = nothing_chosen(empty) if spoilt else choose(bank, noise_floor(bank.runs, left), heard)
     before = _extended(empty, validate, baseline)
     after = _extended(choice.named.fit, validate, baseline)
     floor = noise_floor(validate, after.residuals)
@@ -133,7 +147,8 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
     hums = standing.hums(strongest_tone(validate, after.residuals)[: len(baseline.joints)])
     wanders = bool(np.any(slow_scatter(validate, after.residuals)[: len(baseline.joints)] > WANDERING))
     foreign = hums or (wanders and not any(p.per_run for effect in effects for p in effect.fitted))
-    if effects and (foreign or not standing.held_up(effects)):
+    named_by_ear = known_besides(choice.named.fit.causes, _heard(validate, before.residuals)) > NEEDED
+    if effects and (foreign or not (named_by_ear or standing.held_up(effects))):
         # What the training runs promised does not hold on others, or it is none of this: nothing is named.
         choice = replace(choice, named=nothing_chosen(empty).named)
         after, floor = before, noise_floor(validate, before.residuals)
@@ -155,6 +170,13 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
         strayed={"baseline": _strayed(plain, empty, validate, baseline),
                  "extended": _strayed(frame, choice.named.fit, validate, baseline)},
     )  # fmt: skip
+
+
+def _heard(runs: Sequence[Run], residuals: Sequence[NDArray]) -> dict[str, float]:
+    """Return the evidence of play at each joint, by label."""
+    joints = runs[0].motion.joints
+    gains = evidence_of_play(runs, residuals, MOST_INDEPENDENT)
+    return {Backlash(joint=joint).label: float(gain) for joint, gain in zip(joints, gains, strict=True)}
 
 
 def _dealt(motions: Sequence[Motion]) -> tuple[tuple[Run, ...], tuple[Run, ...]]:

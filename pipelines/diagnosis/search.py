@@ -6,7 +6,7 @@ only together explain the residual are found even where neither comes first alon
 itself in another shape: what a freer form of one cause explains as well needs no second one.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,12 +56,23 @@ def cost(causes: Sequence[Candidate], columns: int, independent: NDArray) -> flo
     return SHAPE_COST * shapes + 0.5 * columns * float(np.log(np.max(independent)))
 
 
+def known_besides(causes: Sequence[Candidate], evidence: Mapping[str, float]) -> float:
+    """Return the log likelihood known of causes besides what they do to the mean torque."""
+    return sum(evidence.get(label, 0.0) for label in {cause.label for cause in causes})
+
+
 class Scorer:
     """Scores sets of candidates against the baseline."""
 
-    def __init__(self, bank: Bank, independent: NDArray) -> None:
-        """Prepare; ``independent`` (O,) is how many of each output's samples are independent."""
-        self.bank, self.independent = bank, independent
+    def __init__(self, bank: Bank, independent: NDArray, evidence: Mapping[str, float]) -> None:
+        """Prepare.
+
+        Parameters
+        ----------
+        independent : (O,) how many of each output's samples are independent
+        evidence : log likelihood that is known of some causes besides what they do to the mean torque, by label
+        """
+        self.bank, self.independent, self.evidence = bank, independent, evidence
         self.count = bank.gram.count.sum(axis=0)
         self.imperfect = imperfection(bank.gram)
         plain = self._held_out(())
@@ -76,7 +87,8 @@ class Scorer:
         columns = len(self.bank.columns_of(chosen)) - self.bank.baseline.size
         causes = [self.bank.candidates[i] for i in chosen]
         gain = log_likelihood(rms, self.plain, self.independent, self.imperfect)
-        return Scored(tuple(chosen), gain - cost(causes, columns, self.independent), rms)
+        besides = known_besides(causes, self.evidence)
+        return Scored(tuple(chosen), gain + besides - cost(causes, columns, self.independent), rms)
 
     def _held_out(self, chosen: Sequence[int]) -> NDArray | None:
         gram = self.bank.gram.select(self.bank.columns_of(chosen))
@@ -90,7 +102,8 @@ class Scorer:
         at = 0
         for i in chosen:
             candidate, width = self.bank.candidates[i], self.bank.where[i].stop - self.bank.where[i].start
-            if np.any(values[at : at + width][one_way(candidate, width)] < 0):
+            seen_otherwise = self.evidence.get(candidate.label, 0.0) > 0
+            if not seen_otherwise and np.any(values[at : at + width][one_way(candidate, width)] < 0):
                 return False
             at += width
         return True
