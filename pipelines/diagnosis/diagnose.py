@@ -137,8 +137,8 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
     left = [y - c @ empty.values for c, y in stacked_columns((), bank.runs, baseline)]
     # Where masking does not help, physics would be blamed for what acquisition did.
     spoilt = any(fault.samples is None for fault in faults)
-    heard = _heard(bank.runs, left)
-    choice = nothing_chosen(empty) if spoilt else choose(bank, noise_floor(bank.runs, left), heard)
+    evidence = _heard(bank.runs, left)
+    choice = nothing_chosen(empty) if spoilt else choose(bank, noise_floor(bank.runs, left), evidence)
     before = _extended(empty, validate, baseline)
     after = _extended(choice.named.fit, validate, baseline)
     floor = noise_floor(validate, after.residuals)
@@ -147,8 +147,9 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
     hums = standing.hums(strongest_tone(validate, after.residuals)[: len(baseline.joints)])
     wanders = bool(np.any(slow_scatter(validate, after.residuals)[: len(baseline.joints)] > WANDERING))
     foreign = hums or (wanders and not any(p.per_run for effect in effects for p in effect.fitted))
-    named_by_ear = known_besides(choice.named.fit.causes, _heard(validate, before.residuals)) > NEEDED
-    if effects and (foreign or not (named_by_ear or standing.held_up(effects))):
+    # Play rings on as it likes: what no model follows there is no reason to doubt what was heard in these runs too.
+    heard = known_besides(choice.named.fit.causes, _heard(validate, before.residuals)) > NEEDED
+    if effects and not heard and (foreign or not standing.held_up(effects)):
         # What the training runs promised does not hold on others, or it is none of this: nothing is named.
         choice = replace(choice, named=nothing_chosen(empty).named)
         after, floor = before, noise_floor(validate, before.residuals)

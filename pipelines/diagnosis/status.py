@@ -63,9 +63,12 @@ class Standing:
         The ringing of a transmission no model follows to the end.
         """
         before = self.slow_before.over(self.slow_after)
+        J = len(self.floor)
         if np.sum(self._power(self.slow_after)) > (1.0 - HELD_UP) * np.sum(self._power(before)):
             return False
-        worst = int(np.argmax(before.sureness[: len(self.floor)]))
+        if np.sum((self.extended / self.floor) ** 2) > np.sum((self.baseline / self.floor) ** 2):
+            return False
+        worst = int(np.argmax(before.sureness[:J]))
         plain = self.systematic(self.slow_after)[worst] and self.slow_after.sureness[worst] > PLAIN
         left = self._power(self.slow_after)[worst] / max(self._power(before)[worst], 1e-12)
         rings = any(effect.spring is not None for effect in effects)
