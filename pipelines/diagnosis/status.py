@@ -18,7 +18,7 @@ HELD_UP = 0.2
 FOREIGN = 0.3
 """Share of the systematic power from which what is left, if it is plain, is not a form of a named cause.
 
-Two or three causes together imitate more: of them a half or a third of that.
+Three causes together can imitate nearly anything: of them a third of that.
 """
 PLAIN = 10.0
 """Standard errors of the floor's power by which what is left must exceed it to be plain."""
@@ -72,7 +72,7 @@ class Standing:
         plain = self.systematic(self.slow_after)[worst] and self.slow_after.sureness[worst] > PLAIN
         left = self._power(self.slow_after)[worst] / max(self._power(before)[worst], 1e-12)
         rings = any(effect.spring is not None for effect in effects)
-        return rings or not plain or bool(left < FOREIGN / len(effects))
+        return rings or not plain or bool(left < (FOREIGN if len(effects) < 3 else FOREIGN / 3))
 
     @staticmethod
     def _power(slow: SlowError) -> NDArray:
