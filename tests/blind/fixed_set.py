@@ -68,8 +68,8 @@ def complaints(recorded: Sequence[Outcome], found: Sequence[Outcome]) -> list[st
 
     Rounding differs between machines, and where two causes or a threshold are close it decides. So of the cases at
     most two may differ in whether they are right or in the first cause, and at most one right answer may be lost. Two
-    things are never rounding's: a false alarm more than recorded, and a case that has become right: that one belongs
-    into the record, lest it be lost again unnoticed.
+    things are never allowed: a new false alarm, and a case that has become right, which belongs into the record lest it
+    be lost again unnoticed. Once recorded, a machine whose rounding makes it wrong is within what is allowed.
     """
     if [(o.seed, o.hidden) for o in recorded] != [(o.seed, o.hidden) for o in found]:
         return [f"{RECORD.name} tells of other cases than the fixed set has: rewrite it by `{REWRITE}`"]
