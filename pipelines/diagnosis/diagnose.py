@@ -18,6 +18,7 @@ from pipelines.diagnosis.floor import Floor, noise_floor, slow_scatter
 from pipelines.diagnosis.gain import Errors, errors_of
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, observe, with_load
 from pipelines.diagnosis.second_look import rings, slower
+from pipelines.diagnosis.session import refuse_unfit
 from pipelines.diagnosis.status import WANDERING, Standing, status_of
 from pipelines.diagnosis.uncertainty import Uncertainty, uncertainty
 from pipelines.dynamics.replay import replay
@@ -102,6 +103,7 @@ def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = s
     InputError
         Where there is no run to train or none to validate on.
     """
+    refuse_unfit(motions)
     faults = tuple(find_faults(motions))
     sound = excluding(motions, faults)
     first = _look(sound, faults, report)
