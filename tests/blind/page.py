@@ -40,7 +40,7 @@ OF_EACH: tuple[tuple[Table, str], ...] = (
     (tables.probabilities, f"Of every named cause, whether it or what it is tied with was there.\n\n"
      f"![Probability said against how often it was so]({PICTURE})\n\n*Drawn from examination 1.*"),
     (tables.coverage, "Of rightly named causes, parameters that the plant's form has in common with the catalogue's."),
-    (tables.seconds, "Wall time of the whole command, beside another session on the other core; quantiles."),
+    (tables.seconds, "Quantiles of wall time, beside whatever else ran; `make bench` measures speed."),
 )  # fmt: skip
 """What every examination tells that has such cases."""
 
