@@ -12,7 +12,7 @@ EXPERIMENT := $(MAKE) --no-print-directory -f datasets/experiments/experiment.mk
 SEEDS ?= tuning
 
 .DEFAULT_GOAL := help
-.PHONY: help all test test-slow check format bench blind blind-full docs lock clean install
+.PHONY: help all test test-slow check format bench blind blind-full blind-fixed blind-page docs lock clean install
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | sort | expand -t 12
@@ -44,6 +44,12 @@ blind: $(INSTALLED) ## examine `exoid diagnose` on 300 sessions whose truth it c
 
 blind-full: $(INSTALLED) ## the same on 300 sessions with nothing hidden and 30 of each cause and joint; takes hours
 	$(BIN)/python -m tests.blind --full --seeds $(SEEDS) --out build/blind-full
+
+blind-fixed: $(INSTALLED) ## record anew how the fixed set of CI comes out, in tests/blind/fixed_set.json
+	$(BIN)/python -m tests.blind --fixed --write --out build/blind-fixed
+
+blind-page: $(INSTALLED) ## write docs/blind.md from the examinations that were made
+	$(BIN)/python -m tests.blind.page $(wildcard build/blind/report.json build/blind-full/report.json) docs/blind.md
 
 docs: $(INSTALLED) ## bring the generated pages up to date
 	$(BIN)/python -m pipelines.settings.reference > docs/settings.md

@@ -32,7 +32,11 @@ def diagnose(
     from pipelines.settings import Experiment
 
     settings = Experiment.load(config) if config else Experiment()
+    tables = {"parameters": PARAMETERS, "residuals": RESIDUALS, "candidates": CANDIDATES}
+    for name, contract in tables.items():
+        contract.refuse_place(output / f"{name}.parquet")
     motions = read_motions(files, settings.filter, geometry_from(settings.mechanism))
+    output.mkdir(parents=True, exist_ok=True)
     with console.progress("diagnosing", 1.0) as report:
         found = find(motions, report)
     said = verdict(found)
@@ -44,14 +48,18 @@ def diagnose(
         "geometry": motions[0].geometry.metadata(),
         "method": {"name": "joint fit of baseline and named causes", "status": found.status},
     }
-    PARAMETERS.write(output / "parameters.parquet", found.parameters, shared | model)
-    RESIDUALS.write(output / "residuals.parquet", found.residuals, shared)
-    CANDIDATES.write(output / "candidates.parquet", candidates(found), shared)
-    write_text(output / "verdict.json", json.dumps(said | {"provenance": shared}, indent=1, ensure_ascii=False) + "\n")
+    frames = {"parameters": found.parameters, "residuals": found.residuals, "candidates": candidates(found)}
     visible = as_json(detectability(found.train, found.baseline, found.floor))
+    # The verdict goes first and comes last: it never stands beside tables of another diagnosis.
+    (output / "verdict.json").unlink(missing_ok=True)
+    for name, contract in tables.items():
+        contract.write(output / f"{name}.parquet", frames[name], shared | (model if name == "parameters" else {}))
     write_text(output / "detectability.json", json.dumps(visible, indent=1, ensure_ascii=False) + "\n")
+    for old in (output / f"{name}.{kind}" for name in FIGURES for kind in ("png", "pdf")):
+        old.unlink(missing_ok=True)
     if figures:
         draw(found, said, output)
+    write_text(output / "verdict.json", json.dumps(said | {"provenance": shared}, indent=1, ensure_ascii=False) + "\n")
     console.emit(said)
     _show(said, output)
     if figures:
@@ -98,4 +106,7 @@ def _control(said: dict[str, Any]) -> str:
         f"peak torque {before['peak_torque_nm'][joint]:.1f} -> {after['peak_torque_nm'][joint]:.1f} N·m"
         for joint, error in after["tracking_rmse_rad"].items()
     ]
-    return "under adaptive control, without -> with the causes: " + "; ".join(of_joints)
+    return (
+        "under adaptive control, without -> with the causes: " + "; ".join(of_joints)
+        + " (what each model promises; the one with the causes may well promise worse)"
+    )  # fmt: skip

@@ -30,6 +30,7 @@ from pipelines.diagnosis.impacts import evidence_of_play
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, observe, with_load
 from pipelines.diagnosis.search import known_besides
 from pipelines.diagnosis.second_look import rings, slower
+from pipelines.diagnosis.session import refuse_unfit
 from pipelines.diagnosis.slow import slow_error
 from pipelines.diagnosis.status import WANDERING, Standing, status_of
 from pipelines.diagnosis.tone import strongest_tone
@@ -116,6 +117,7 @@ def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = s
     InputError
         Where there is no run to train or none to validate on.
     """
+    refuse_unfit(motions)
     faults = tuple(find_faults(motions))
     sound = excluding(motions, faults)
     first = _look(sound, faults, report)

@@ -102,6 +102,8 @@ def observe(motion: Motion) -> Run:
         usable = np.hstack([usable, valid[:, np.newaxis] & known])
     length = motion.period_s or FOLD_S
     number = np.floor(time / length + 1e-9).astype(int)
+    # A short run has no whole period for each fold: its stretches are dealt out instead.
+    part = min(length, (time[-1] - time[0]) / FOLDS + 1e-6)
     return Run(
         motion=motion,
         block=block,
@@ -111,7 +113,7 @@ def observe(motion: Motion) -> Run:
         measured=np.nan_to_num(measured),
         usable=usable,
         valid=valid,
-        fold=number % FOLDS,
+        fold=np.floor((time - time[0]) / part).astype(int) % FOLDS if part < length else number % FOLDS,
         period=number if motion.period_s else np.full(len(time), -1),
     )
 

@@ -79,6 +79,15 @@ class Standing:
         """Return the systematic power in units of the floor's, (O,)."""
         return np.asarray((slow.excess / slow.floor) ** 2)
 
+    @property
+    def trust(self) -> float:
+        """Share of the systematic power that is explained at the worst joint, doubtful power counted in part."""
+        before = self.slow_before.over(self.slow_after)
+        worst = int(np.argmax(before.sureness[: len(self.floor)]))
+        left = self._power(self.slow_after)[worst] / max(self._power(before)[worst], 1e-12)
+        sure = np.clip(self.slow_after.sureness[worst] / PLAIN, 0.0, 1.0)
+        return float(1.0 - min(left, 1.0) * sure)
+
     def systematic(self, slow: SlowError) -> NDArray:
         """Tell at which joints an error is beyond chance, beyond the floor and beyond a good rig's, (J,) bool."""
         J = len(self.floor)

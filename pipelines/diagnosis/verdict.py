@@ -1,5 +1,6 @@
 """``verdict.json``: the diagnosis in the words of its contract."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import pandas as pd
@@ -8,15 +9,25 @@ from pipelines.diagnosis.control import control
 from pipelines.diagnosis.dependence import dependences
 from pipelines.diagnosis.diagnose import Diagnosis, summary_numbers
 from pipelines.diagnosis.error_budget import error_budget
+from pipelines.diagnosis.faults import Fault
 from pipelines.diagnosis.gain import gain
+from pipelines.diagnosis.status import AT_FLOOR, EXPLAINED
 from pipelines.diagnosis.ties import tie_between
 from pipelines.diagnosis.unknown import Unknown, unknown
 from pipelines.effects import Effect
 from pipelines.estimation.regression import MASK
 from pipelines.model import effect_named
 
-HIGHEST = 0.99
-"""A probability never claims more than the calibration has shown."""
+HIGHEST = 0.97
+"""A probability never claims more than calibration has shown: some causes that nobody lists look like a listed one."""
+OF_THREE = 0.5
+"""Three causes together can imitate nearly anything: each is as likely there as not."""
+
+
+MENTIONED = 3
+"""Causes that could stand for each other, in the summary; ``indistinguishable_from`` has all."""
+CERTAIN = 1000.0
+"""Odds from which more is not told."""
 
 
 def verdict(d: Diagnosis) -> dict[str, Any]:
@@ -80,7 +91,7 @@ def _cause(d: Diagnosis, label: str) -> dict[str, Any]:
         "effect": name,
         "joint": joint,
         "side": str(effect.side),
-        "probability": min(sum(alike.values()), HIGHEST),
+        "probability": _probability(d, sum(alike.values())),
         "parameters": [
             {"name": r["name"], "value": r["value"], "unit": r["unit"], "ci95": [r["ci95_low"], r["ci95_high"]]}
             for r in rows
@@ -111,6 +122,12 @@ def _rows(frame: pd.DataFrame, name: str, joint: str | None) -> list[dict[str, A
     ]
 
 
+def _probability(d: Diagnosis, among_rivals: float) -> float:
+    """Return how likely a named cause is: among its rivals, and that what is missing is of this kind at all."""
+    crowded = OF_THREE if len(d.causes) > 2 else 1.0
+    return HIGHEST * crowded * d.standing.trust * min(among_rivals, 1.0)
+
+
 def _tie(effect: Effect, other: str, probability: float, d: Diagnosis) -> dict[str, Any]:
     name, joint = _split(other)
     tie = tie_between(effect.name, name, effect.confirm, effect_named(name).confirm)
@@ -130,43 +147,76 @@ def _evidence(d: Diagnosis, label: str, effect: Effect, worth: float, joint: str
     if others:
         rival = max(others, key=lambda k: others[k])
         sentences.append(
-            f"the next explanation, {rival}, is {d.likely[label][label] / others[rival]:.3g} times less likely"
+            f"the next explanation, {rival}, is {_times(d.likely[label][label], others[rival])} less likely"
         )
     sentences.append(f"it looks like {effect.looks_like}")
     sentences.append(f"to make sure: {effect.confirm}")
     return sentences
 
 
+def _times(likely: float, other: float) -> str:
+    """Return the odds in words; beyond a thousand no calibration could vouch for a figure."""
+    return f"{likely / other:.3g} times" if likely < CERTAIN * other else f"over {CERTAIN:g} times"
+
+
 def _summary(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -> str:
-    floor = d.standing.floor
-    error = d.before.errors.rms
-    worst = int((error / floor).argmax())
-    joint = d.baseline.joints[worst]
-    size = f"{error[worst]:.2f} N·m at the {joint}, {error[worst] / floor[worst]:.2f} times the noise floor"
     spoilt = [fault for fault in d.faults if fault.samples is None]
     if spoilt:
-        more = f" (and {len(spoilt) - 1} more)" if len(spoilt) > 1 else ""
-        return f"Acquisition, not physics: {spoilt[0].file}, {spoilt[0].channel}: {spoilt[0].what}{more}."
+        return f"Acquisition, not physics: {_first_of(spoilt)}."
+    said = _finding(d, causes, left)
+    return f"{said} Left out as faults of acquisition: {_first_of(d.faults)}." if d.faults else said
+
+
+def _first_of(faults: Sequence[Fault]) -> str:
+    more = f" (and {len(faults) - 1} more in data_faults)" if len(faults) > 1 else ""
+    return f"{faults[0].file}, {faults[0].channel}: {faults[0].what}{more}"
+
+
+def _finding(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -> str:
+    floor, before, after = d.standing.floor, d.standing.baseline, d.standing.extended
+    worst = int((before / floor).argmax())
+    joint = d.baseline.joints[worst]
+    size = f"{before[worst]:.2f} N·m, {before[worst] / floor[worst]:.2f} times the noise floor"
     if d.status == "nothing_missing":
-        return f"Nothing is missing that these data could show: the torque error is {size}."
+        return f"Nothing is missing that these data could show: the largest torque error, at the {joint}, is {size}."
     if d.status == "unknown_cause":
-        return (
-            f"The model misses something that no known cause explains: the torque error is {size}. "
-            f"{left.description if left else ''}"
-        )
-    said = " and ".join(_in_words(cause) for cause in causes)
-    after = d.after.errors.rms[worst]
-    ending = "which explains it" if d.status == "explained" else "and more is left that they do not explain"
-    return f"The simulation misses {said}. With it the torque error falls from {size}, to {after:.2f} N·m, {ending}."
+        described = f" {left.description}" if left else ""
+        return f"Something is missing that no known cause explains: the {joint}'s torque error is {size}.{described}"
+    named = "; and ".join(_in_words(cause) for cause in causes)
+    return (
+        f"Missing from the simulation: {named}. With {'it' if len(causes) == 1 else 'them'} the {joint}'s torque error "
+        f"falls from {size}, to {after[worst]:.2f} N·m, {_remains(d, worst)}."
+    )
+
+
+def _remains(d: Diagnosis, worst: int) -> str:
+    """Say how far the worst joint is from the floor, and at which other joints something stays unexplained."""
+    ratio = d.standing.extended / d.standing.floor
+    left = [
+        share is not None and share > EXPLAINED and times > AT_FLOOR
+        for share, times in zip(d.standing.unexplained, ratio, strict=True)
+    ]
+    said = f"{'still ' if left[worst] else ''}{ratio[worst]:.2f} times the floor"
+    others = [
+        f"; the {d.baseline.joints[j]}'s stays at {d.standing.extended[j]:.2f} N·m, {times:.2f} times its floor"
+        for j, times in enumerate(ratio)
+        if left[j] and j != worst
+    ]
+    return (said if ratio[worst] > AT_FLOOR else "which is noise") + "".join(others)
 
 
 def _in_words(cause: dict[str, Any]) -> str:
-    title = effect_named(cause["effect"]).title.lower()
-    where = f" at the {cause['joint']}" if cause["joint"] else ""
-    ties = cause["indistinguishable_from"]
-    if not ties:
-        return f"{title}{where}"
-    others = ", ".join(
-        effect_named(t["effect"]).title.lower() + (f" at the {t['joint']}" if t["joint"] else "") for t in ties[:2]
-    )
-    return f"{title}{where} (or, as these data cannot tell, {others})"
+    """Return a cause, those that could stand in its place, and how probable all of these are together."""
+    alike = [_named(one["effect"], one["joint"]) for one in (cause, *cause["indistinguishable_from"])]
+    likely = f"{cause['probability']:.2f}"
+    if len(alike) == 1:
+        return f"{alike[0]} (probability {likely})"
+    *most, last = [*alike[:MENTIONED], *([f"{len(alike) - MENTIONED} more"] if len(alike) > MENTIONED else [])]
+    return f"{', '.join(most)} or {last}, which these data cannot tell apart (together {likely})"
+
+
+def _named(effect: str, joint: str | None) -> str:
+    title = effect_named(effect).title
+    # Names of people keep their capital.
+    title = title if title.startswith(("Coulomb", "Stribeck")) else title.lower()
+    return f"{title} at the {joint}" if joint else title

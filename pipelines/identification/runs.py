@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from pipelines.errors import InputError
 from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.one_machine import refuse_several_machines
 
 REMEDY = "record it with `exoid acquire`, or correct the metadata of the file"
 
@@ -38,18 +39,5 @@ def checked(motions: Sequence[Motion]) -> Runs:
         raise InputError(
             f"found no run to validate on among: {listed}; a fit is judged on data it has not seen: {REMEDY}"
         )
-    first = motions[0]
-    for other in motions[1:]:
-        if other.joints != first.joints:
-            raise InputError(
-                f"{other.file} has joints {', '.join(other.joints)}, {first.file} has {', '.join(first.joints)}; "
-                "give runs of one machine"
-            )
-        for key in ("thigh_length_m", "gravity_m_s2"):
-            ours, theirs = getattr(first.geometry, key), getattr(other.geometry, key)
-            if ours != theirs:
-                raise InputError(
-                    f"{other.file} has {key} {theirs:g}, {first.file} has {ours:g}; give runs of one machine, "
-                    "or correct the metadata"
-                )
+    refuse_several_machines(motions)
     return runs

@@ -1,6 +1,7 @@
 """Motions from files: a ``motion/1`` as it is, a ``recording/1`` filtered on the way."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from pipelines.contracts import MOTION, RECORDING, contract_of
@@ -30,11 +31,19 @@ def read_motion(path: Path, settings: FilterSettings | None = None, default_geom
 def read_motions(
     paths: Sequence[Path], settings: FilterSettings | None = None, default_geometry: Geometry | None = None
 ) -> list[Motion]:
-    """Return the motions in several files; the same data twice is refused, whatever the names."""
+    """Return the motions in several files; the same data twice is refused, whatever the names.
+
+    Files of one name in several folders are told apart by their paths.
+    """
     seen: dict[str, Path] = {}
     for path in paths:
         if path.is_file():
             twin = seen.setdefault(sha256(path), path)
             if twin is not path:
                 raise InputError(f"{path} holds the same data as {twin}; give each run once")
-    return [read_motion(path, settings, default_geometry) for path in paths]
+    motions = [read_motion(path, settings, default_geometry) for path in paths]
+    names = [path.name for path in paths]
+    return [
+        motion if names.count(path.name) == 1 else replace(motion, file=str(path))
+        for path, motion in zip(paths, motions, strict=True)
+    ]

@@ -1,5 +1,6 @@
 """``python -m tests.blind``: hide effects, let ``exoid diagnose`` find them, count."""
 
+import sys
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -8,10 +9,11 @@ import typer
 from rich.console import Console
 from rich.progress import track
 
-from tests.blind import report
+from tests.blind import fixed_set, report
 from tests.blind.cases import MIX, SINGLES, Case, case, full, mixed
 from tests.blind.examine import Folders, examine, prepare
 from tests.blind.plan import JOINTS
+from tests.blind.seeds import RANGES
 
 
 class Seeds(StrEnum):
@@ -19,10 +21,6 @@ class Seeds(StrEnum):
 
     tuning = "tuning"
     reporting = "reporting"
-
-
-BASE = {Seeds.tuning: 100_000, Seeds.reporting: 500_000}
-"""First seeds; the two never meet: see README.md."""
 
 
 def main(
@@ -34,21 +32,30 @@ def main(
     only: Annotated[str, typer.Option(help="Singles of this cause only, such as backlash@knee.")] = "",
     out: Annotated[Path, typer.Option(help="Folder of sessions, answers and report.")] = Path("build/blind"),
     workers: Annotated[int, typer.Option(min=1, help="Sessions at a time.")] = 2,
+    fixed: Annotated[bool, typer.Option("--fixed", help="The fixed set that CI examines.")] = False,
+    write: Annotated[
+        bool, typer.Option("--write", help="With --fixed: diagnose anew, record how it came out.")
+    ] = False,
     again: Annotated[bool, typer.Option(help="Diagnose anew, on the sessions that are there.")] = False,
     simulate_only: Annotated[bool, typer.Option(help="Make the sessions and stop.")] = False,
 ) -> None:
     """Examine ``exoid diagnose`` on simulated sessions whose truth it cannot see."""
-    base = BASE[seeds] if seed_base is None else seed_base
-    planned = _planned(cases, base, mix, every, only)
+    if write and not fixed:
+        raise typer.BadParameter("only the fixed set has a record: add --fixed", param_hint="--write")
+    base = RANGES[seeds].start if seed_base is None else seed_base
+    planned = fixed_set.fixed_set() if fixed else _planned(cases, base, mix, every, only)
     console = Console()
     if simulate_only:
         for one in track(planned, "simulating", console=console):
             prepare(one, Folders(out.resolve()))
         return
-    progress = track(examine(planned, out, workers, again), "examining", total=len(planned), console=console)
+    progress = track(examine(planned, out, workers, again or write), "examining", total=len(planned), console=console)
     scores = list(progress)
     report.show(console, scores)
-    report.write(out, scores, f"seeds {base} to {base + len(planned) - 1} ({seeds.value})")
+    command = " ".join(["python -m tests.blind", *sys.argv[1:]])
+    report.write(out, report.Examination(command, scores))
+    if write:
+        fixed_set.write(fixed_set.outcomes(planned, scores))
 
 
 def _planned(cases: int, base: int, mix: str, every: bool, only: str) -> list[Case]:

@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -72,7 +73,8 @@ def examine(cases: Sequence[Case], root: Path, workers: int = 2, again: bool = F
     again : bool
         Diagnose anew what has an answer already: the sessions stay, the program has changed.
     """
-    with ProcessPoolExecutor(workers) as pool:
+    # Spawned, not forked: who calls may have threads, as pytest's workers do.
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         pending = [pool.submit(examine_one, case, Folders(root.resolve()), again) for case in cases]
         for done in as_completed(pending):
             yield done.result()
@@ -108,8 +110,8 @@ def diagnose(recordings: Path, out: Path, program: Sequence[str | Path] = EXOID)
     begin = time.perf_counter()
     try:
         ended = subprocess.run(
-            [*program, "diagnose", *files, "--out", out], cwd=recordings, env=os.environ | ONE_THREAD, text=True,
-            capture_output=True, timeout=TIME_LIMIT_S,
+            [*program, "diagnose", *files, "--out", out, "--no-figures"], cwd=recordings, env=os.environ | ONE_THREAD,
+            text=True, capture_output=True, timeout=TIME_LIMIT_S,
         )  # fmt: skip
         exit_code, message = ended.returncode, ended.stderr[-2000:]
     except subprocess.TimeoutExpired:

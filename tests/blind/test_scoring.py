@@ -141,7 +141,7 @@ def test_the_report_counts_what_was_scored():
     tables = {page.title: page for page in pages(scores)}
     assert tables["Summary"].rows[0][1].startswith("50.0 % of 2")
     confusion = tables["Confusion: hidden against named first"]
-    assert confusion.rows == [("1 backlash", "1", "1", "")]
+    assert confusion.rows == [("1 backlash", "1", "1", ""), ("2 cogging", "", "", "")]
     assert tables["Wrong answers"].rows[0][-1] == "cogging@knee"
 
 
@@ -162,7 +162,7 @@ def test_the_diagnosis_gets_the_recordings_and_nothing_else(tmp_path):
     answer = diagnose(tmp_path / "sessions" / "s", tmp_path / "answers", (sys.executable, "-c", FAKE))
     files = ["run_1.parquet", "run_2.parquet"]
     assert answer["verdict"] == {
-        "argv": ["diagnose", *files, "--out", str(tmp_path / "answers")], "there": files,
+        "argv": ["diagnose", *files, "--out", str(tmp_path / "answers"), "--no-figures"], "there": files,
     }  # fmt: skip
     assert answer["message"] == "a warning"
     assert answer["exit_code"] == 0

@@ -19,6 +19,9 @@ from pipelines.diagnosis.faults.units import angle_unit_faults, torque_unit_faul
 from pipelines.diagnosis.faults.wiring import angle_faults, cuff_faults, wiring_faults
 from pipelines.mechanics.motion import Motion
 
+LEAST_S = 5.0
+"""Of a run that faults must leave, or it is not worth its place."""
+
 __all__ = ["Fault", "excluding", "find_faults"]
 
 
@@ -31,6 +34,7 @@ def find_faults(motions: Sequence[Motion]) -> list[Fault]:
         All runs of one leg, made from recordings, so that the measured angles are there.
     """
     found = [fault for motion in motions for fault in (*timing_faults(motion), *channel_faults(motion))]
+    found = _hopeless(motions, found)
     rightly_wired = []
     for motion in excluding(motions, found):
         found += sampling_faults(motion)
@@ -43,6 +47,12 @@ def find_faults(motions: Sequence[Motion]) -> list[Fault]:
     found += torque_unit_faults(rightly_wired)
     files = [motion.file for motion in motions]
     return sorted(found, key=lambda fault: files.index(fault.file))
+
+
+def _hopeless(motions: Sequence[Motion], faults: Iterable[Fault]) -> list[Fault]:
+    """Return the faults, those of runs of which too little is left without them as such that masking does not help."""
+    left = {m.file: m.valid.sum() / m.sample_rate_hz for m in excluding(motions, faults)}
+    return [replace(fault, samples=None) if left[fault.file] < LEAST_S else fault for fault in faults]
 
 
 def excluding(motions: Sequence[Motion], faults: Iterable[Fault]) -> list[Motion]:

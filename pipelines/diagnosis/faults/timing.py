@@ -45,12 +45,21 @@ def missing_samples(motion: Motion, late: NDArray) -> NDArray:
         Time in sample periods, less the sample's number.
     """
     if motion.sequence is not None:
-        return np.maximum(np.diff(motion.sequence) - 1, 0)
+        return np.maximum(_counted(motion.sequence) - 1, 0)
     ahead = minimum_filter1d(late, HORIZON, origin=-(HORIZON // 2), mode="nearest")
     return np.maximum(np.rint(np.diff(ahead)), 0.0).astype(np.int64)
 
 
+def _counted(sequence: NDArray) -> NDArray:
+    """Return by how many samples the counter advances, (n - 1,): who keeps each tenth row leaves a counter by tens."""
+    step = np.diff(sequence)
+    usual = max(int(np.median(step)), 1) if len(step) else 1
+    return np.asarray(np.rint(step / usual).astype(np.int64))
+
+
 def _missing(motion: Motion, missing: NDArray) -> Iterator[Fault]:
+    # What is missing is left out already; the samples around it are as good as any.
+    nothing_to_mask = np.zeros(len(motion), dtype=bool)
     long, few = missing > SINGLE, (missing > 0) & (missing <= SINGLE)
     if long.any():
         k = int(np.argmax(missing))
@@ -60,6 +69,7 @@ def _missing(motion: Motion, missing: NDArray) -> Iterator[Fault]:
             f"{_count(long.sum(), 'gap')} in the recording, the longest of {missing[k]} missing samples "
             f"({missing[k] / motion.sample_rate_hz:.2f} s) after {motion.time[k]:.2f} s: the fit leaves them out; "
             "record the run again if it repeats",
+            nothing_to_mask,
         )
     if few.any():
         first, last = motion.time[:-1][few][[0, -1]]
@@ -70,6 +80,7 @@ def _missing(motion: Motion, missing: NDArray) -> Iterator[Fault]:
             f"{_count(lost, 'dropped sample')} ({100 * lost / (len(motion) + lost):.2g} %) "
             f"missing one by one between {first:.2f} s and {last:.2f} s: "
             "look for a bus that is too busy or a buffer that runs over",
+            nothing_to_mask,
         )
 
 
@@ -81,7 +92,7 @@ def _counter(motion: Motion) -> Iterator[Fault]:
     """Report a sample counter that goes back, stands still, or jumps where time does not."""
     if motion.sequence is None:
         return
-    step, time_step = np.diff(motion.sequence), np.diff(motion.time) * motion.sample_rate_hz
+    step, time_step = _counted(motion.sequence), np.diff(motion.time) * motion.sample_rate_hz
     back, stands = step < 0, step == 0
     # A late stamp disagrees too, but by less than it takes to lose several samples.
     disagrees = (step > 0) & (np.abs(time_step - step) > SINGLE)

@@ -1,0 +1,55 @@
+"""The runs that a diagnosis is given: of one hip and knee, whose joints move for long enough to say anything."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.contracts.joints import joints_of
+from pipelines.errors import InputError
+from pipelines.estimation.regression import REVERSAL_SPEED, away_from_reversals
+from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.one_machine import refuse_several_machines
+
+JOINTS = ("hip", "knee")
+"""Both revolute: what the rigid body of the baseline and the effects of the catalogue are written for."""
+LEAST_S = 5.0
+"""Of motion, all runs of a purpose together; below, gravity, inertia and friction are not told apart."""
+
+
+def refuse_unfit(motions: Sequence[Motion]) -> None:
+    """Refuse motions that no diagnosis can be made of, or it would be one of noise."""
+    for motion in motions:
+        found = [f"{joint.name} ({joint.kind})" for joint in joints_of(motion.metadata)]
+        if found != [f"{joint} (revolute)" for joint in JOINTS]:
+            raise InputError(
+                f"{motion.file} has joints {', '.join(found)}, expected hip and knee, both revolute: "
+                "the causes are written for a leg of these two; use `exoid identify` for other machines"
+            )
+    refuse_several_machines(motions)
+    for purpose in ("train", "validate"):
+        _refuse_standstill([m for m in motions if m.purpose == purpose])
+
+
+def _refuse_standstill(motions: Sequence[Motion]) -> None:
+    """Refuse runs of one purpose, if there are any, in which a joint hardly moves or both hardly move at once."""
+    if not motions:
+        return
+    files = ", ".join(m.file for m in motions)
+    moving = [away_from_reversals(m) & m.valid[:, np.newaxis] for m in motions]
+    for j, joint in enumerate(JOINTS):
+        if (lasts := _seconds(motions, [m[:, j] for m in moving])) < LEAST_S:
+            raise InputError(
+                f"{files}: the {joint} moves for {lasts:.1f} s (faster than {REVERSAL_SPEED:g} rad/s and away from "
+                f"reversals), expected {LEAST_S:g} s in the {motions[0].purpose} runs together; "
+                "excite both joints, or record longer; if it did move, check its encoder"
+            )
+    if (lasts := _seconds(motions, [m.all(axis=1) for m in moving])) < LEAST_S:
+        raise InputError(
+            f"{files}: hip and knee move at once for {lasts:.1f} s, expected {LEAST_S:g} s in the "
+            f"{motions[0].purpose} runs together: errors are scored there; excite both joints at the same time"
+        )
+
+
+def _seconds(motions: Sequence[Motion], marked: Sequence[NDArray]) -> float:
+    return float(sum(mask.sum() / motion.sample_rate_hz for mask, motion in zip(marked, motions, strict=True)))

@@ -1,0 +1,24 @@
+"""Runs that are fitted together are of one machine: the same joints, the same lengths, the same gravity."""
+
+from collections.abc import Sequence
+
+from pipelines.errors import InputError
+from pipelines.mechanics.motion import Motion
+
+
+def refuse_several_machines(motions: Sequence[Motion]) -> None:
+    """Refuse motions whose joints or geometry differ from the first one's."""
+    first = motions[0]
+    for other in motions[1:]:
+        if other.joints != first.joints:
+            raise InputError(
+                f"{other.file} has joints {', '.join(other.joints)}, {first.file} has {', '.join(first.joints)}; "
+                "give runs of one machine"
+            )
+        for key in ("thigh_length_m", "gravity_m_s2"):
+            ours, theirs = getattr(first.geometry, key), getattr(other.geometry, key)
+            if ours != theirs:
+                raise InputError(
+                    f"{other.file} has {key} {theirs:g}, {first.file} has {ours:g}; give runs of one machine, "
+                    "or correct the metadata"
+                )

@@ -1,0 +1,124 @@
+"""The page that reports the blind examination, written from its records.
+
+``python -m tests.blind.page build/blind/report.json build/blind-full/report.json docs/blind.md`` writes the page, and
+``images/blind-reliability.png`` beside it. The mixed examination comes first: its probabilities are those drawn.
+"""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tests.blind import reliability_figure, tables
+from tests.blind.report import Examination, markdown, read, titled
+from tests.blind.scoring import Score
+from tests.blind.seeds import RANGES, uses
+from tests.blind.tables import Page
+from tests.blind.targets import measures, of
+
+PICTURE = Path("images/blind-reliability.png")
+Table = Callable[[Sequence[Score]], Page]
+OF_SINGLES: tuple[tuple[Table, str], ...] = (
+    (tables.by_cause, "Silence about what `exoid detect` says cannot be seen counts as right."),
+    (tables.by_magnitude, ""),
+    (tables.by_visibility, "How much of an effect is there to be seen, whatever its size."),
+    (tables.by_origin, "Whether the plant's equation is the catalogue's."),
+    (tables.by_form, ""),
+    (tables.by_kinds, ""),
+    (tables.confusion, "Right answers, honest ties included, stand on the diagonal; the right cause at the wrong joint "
+     "under *joint*."),
+)  # fmt: skip
+"""What the examination with most single effects tells best, and what is said above each table."""
+OF_EACH: tuple[tuple[Table, str], ...] = (
+    (tables.pairs, ""),
+    (tables.alarms, ""),
+    (tables.outside, "Right is `unknown_cause`."),
+    (tables.faults, "Right is file, joint and kind."),
+    (tables.kinds_of_miss, "What was hidden, and what was answered, with the number of cases."),
+    (tables.residuals, "Quantiles over sessions and joints."),
+    (tables.probabilities, f"Of every named cause, whether it or what it is tied with was there.\n\n"
+     f"![Probability said against how often it was so]({PICTURE})\n\n*Drawn from examination 1.*"),
+    (tables.coverage, "Of rightly named causes, parameters that the plant's form has in common with the catalogue's."),
+    (tables.seconds, "Quantiles of wall time, beside whatever else ran; `make bench` measures speed."),
+)  # fmt: skip
+"""What every examination tells that has such cases."""
+
+INTRODUCTION = """\
+# How often a diagnosis is right
+
+Written by `make blind-page` from the records of the blind examination; what that is, what is hidden and how answers are
+scored, tells [tests/blind/README.md](../tests/blind/README.md). Recordings come from a plant that shares no code with
+exoid, and `exoid diagnose` gets them and nothing else. Shares with Wilson's 95 % interval in brackets.
+"""
+
+
+def page(examinations: Sequence[Examination]) -> str:
+    """Return the page as Markdown."""
+    richest = max(examinations, key=lambda e: len(of(e.scores, "single")))
+    parts = [INTRODUCTION, _what_was_run(examinations), _targets(examinations)]
+    parts += [_section(table, remark, examinations, [richest]) for table, remark in OF_SINGLES]
+    parts += [_section(table, remark, examinations, examinations) for table, remark in OF_EACH]
+    return "\n".join(part for part in parts if part)
+
+
+def _section(table: Table, remark: str, every: Sequence[Examination], chosen: Sequence[Examination]) -> str:
+    """Return a table of each chosen examination under one heading; nothing where none has rows."""
+    made = [(number, table(e.scores)) for number, e in enumerate(every, 1) if e in chosen]
+    made = [(number, page) for number, page in made if page.rows]
+    if not made:
+        return ""
+    lines = [f"## {made[0][1].title}", "", *([remark, ""] if remark else [])]
+    for number, page in made:
+        lines += [f"Examination {number}:", "", markdown(page)]
+    return "\n".join(lines)
+
+
+def _what_was_run(examinations: Sequence[Examination]) -> str:
+    rows = []
+    for number, examination in enumerate(examinations, 1):
+        seeds = [s.seed for s in examination.scores]
+        rows.append((str(number), f"`{examination.command}`", str(len(seeds)), f"{min(seeds)} to {max(seeds)}"))
+    made = Page("What was run", ("", "command", "cases", "seeds"), rows)
+    return f"{titled(made)}\n{_provenance({use for e in examinations for use in uses(s.seed for s in e.scores)})}\n"
+
+
+def _provenance(found: set[str]) -> str:
+    tuning, reporting = RANGES["tuning"], RANGES["reporting"]
+    if found == {"reporting"}:
+        return (
+            f"Seeds from {reporting.start} to {reporting.stop - 1} are for reporting: the diagnosis was never tuned on "
+            f"them, only on seeds from {tuning.start} to {tuning.stop - 1}."
+        )
+    return f"**Not a report: not all of these seeds are for reporting ({reporting.start} to {reporting.stop - 1}).**"
+
+
+def _targets(examinations: Sequence[Examination]) -> str:
+    columns = [measures(e.scores) for e in examinations]
+    head = ["measure", "target"]
+    for number in range(1, len(examinations) + 1):
+        head += [f"examination {number}", "met"]
+    rows = []
+    for row in zip(*columns, strict=True):
+        cells = [row[0].name, row[0].target]
+        for m in row:
+            cells += [m.shown, {True: "yes", False: "**no**", None: ""}[m.met]]
+        rows.append(tuple(cells))
+    note = "*Met* says whether the measured value itself, not its interval, is within the target.\n"
+    return f"{titled(Page('What was asked for, and what was measured', tuple(head), rows))}\n{note}"
+
+
+def main(
+    records: Annotated[list[Path], typer.Argument(exists=True, help="report.json of one or more, and the page.")],
+    out: Annotated[Path, typer.Argument(help="The page to be written.")],
+) -> None:
+    """Write the page and its picture."""
+    examinations = [read(path) for path in records]
+    picture = out.parent / PICTURE
+    picture.parent.mkdir(parents=True, exist_ok=True)
+    reliability_figure.draw(examinations[0].scores, picture)
+    out.write_text(page(examinations))
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,75 @@
+"""Sessions that no diagnosis can be made of are refused in one line that says what to do."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.diagnosis.detect import detectability_of_recorded
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.faults import excluding, find_faults
+from pipelines.errors import InputError
+from tests.diagnosis.sessions import session
+
+
+@pytest.fixture(scope="module")
+def motions():
+    return session(seed=11)
+
+
+def standing_knee(motion):
+    q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
+    q[:, 1], dq[:, 1], ddq[:, 1] = -0.5, 0.0, 0.0
+    return replace(motion, q=q, dq=dq, ddq=ddq, measured_angle=q)
+
+
+@pytest.mark.parametrize("work", [diagnose, detectability_of_recorded])
+def test_a_joint_that_never_moves_is_named(motions, work):
+    with pytest.raises(InputError, match=r"run_0.parquet, run_2.parquet: the knee moves for 0.0 s .* expected 5 s"):
+        work([standing_knee(m) for m in motions])
+
+
+def test_joints_that_take_turns_are_never_scored_and_refused(motions):
+    half = [np.arange(len(m)) < len(m) // 2 for m in motions]
+    taking_turns = [
+        replace(m, dq=np.where(np.column_stack([first, ~first]), m.dq, 0.0))
+        for m, first in zip(motions, half, strict=True)
+    ]
+    with pytest.raises(InputError, match=r"hip and knee move at once for 0.0 s"):
+        diagnose(taking_turns)
+
+
+def test_machines_whose_causes_are_not_written_are_refused(motions):
+    ankle = {"joints": [{"name": "hip", "kind": "revolute"}, {"name": "ankle", "kind": "revolute"}]}
+    with pytest.raises(InputError, match=r"run_1.parquet has joints hip \(revolute\), ankle \(revolute\), expected"):
+        diagnose([motions[0], replace(motions[1], metadata=motions[1].metadata | ankle), *motions[2:]])
+
+
+def test_runs_of_two_machines_are_refused(motions):
+    longer = replace(motions[1], geometry=replace(motions[1].geometry, thigh_length_m=0.5))
+    with pytest.raises(InputError, match=r"run_1.parquet has thigh_length_m 0.5, run_0.parquet has 0.38952"):
+        diagnose([motions[0], longer, *motions[2:]])
+
+
+def test_a_gap_is_left_out_and_does_not_forbid_to_speak_of_physics(motions):
+    kept = (motions[1].time < 8.0) | (motions[1].time > 15.0)
+    rows = {name: getattr(motions[1], name)[kept] for name in ("time", "q", "dq", "ddq", "torque", "valid", "sequence")}
+    rows |= {name: getattr(motions[1], name)[kept] for name in ("measured_angle", "reference", "temperature")}
+    gap = replace(motions[1], **rows, segment=np.where(rows["time"] < 8.0, 0, 1))
+    (fault,) = find_faults([motions[0], gap, *motions[2:]])
+    assert fault.file == "run_1.parquet" and "1 gap" in fault.what
+    assert fault.samples is not None and not fault.samples.any()
+
+
+def test_a_run_thinned_out_on_purpose_has_no_gaps(motions):
+    thin = {name: getattr(motions[0], name)[::2] for name in ("time", "q", "dq", "ddq", "torque", "valid", "segment")}
+    thin |= {name: getattr(motions[0], name)[::2] for name in ("sequence", "measured_angle", "reference")}
+    assert find_faults([replace(motions[0], **thin, temperature=None, sample_rate_hz=100.0)]) == []
+
+
+def test_where_a_fault_leaves_nothing_of_a_run_masking_does_not_help(motions):
+    torque = motions[0].torque.copy()
+    torque[:, 1] = 3.0
+    (fault,) = find_faults([replace(motions[0], torque=torque)])
+    assert "stuck" in fault.what and fault.samples is None
+    assert excluding(motions[:1], [fault])[0].valid.any()

@@ -1,0 +1,71 @@
+"""The summary: two sentences that say what is missing, what naming it gains, and where more is left."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.contracts.table import Table
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.verdict import _finding, _in_words, _times, verdict
+from pipelines.mechanics.kinematics import motion_table
+from pipelines.mechanics.motion import motion_from_table
+from pipelines.settings.filter import FilterSettings
+from tests.diagnosis.sessions import recordings
+
+SPRING = {
+    "effect": "parallel_spring", "joint": "knee", "probability": 0.97, "indistinguishable_from": [],
+}  # fmt: skip
+STRIBECK = SPRING | {"effect": "stribeck_friction", "joint": "hip"}
+
+
+@pytest.fixture(scope="module")
+def stuck():
+    """A spring at the knee; in one run to validate on the hip's encoder stands for five seconds."""
+    motions = []
+    for number, table in enumerate(recordings("parallel_spring", "knee", seed=4, stiffness=6.0, rest_angle=-0.5)):
+        frame = table.frame.copy()
+        if number == 1:
+            frame.loc[1600:2600, "hip_angle_rad"] = frame.loc[1600, "hip_angle_rad"]
+        made = motion_from_table(motion_table(Table(frame, table.metadata), FilterSettings()))
+        motions.append(replace(made, file=f"run_{number}.parquet"))
+    return diagnose(motions)
+
+
+def with_errors(d, extended, status="partly_explained"):
+    floor, baseline = np.array([0.5, 0.3]), np.array([0.6, 2.4])
+    made = replace(d.standing, floor=floor, baseline=baseline, extended=np.array(extended))
+    return replace(d, standing=made, status=status)
+
+
+def test_a_fault_that_was_masked_is_told_beside_the_cause(stuck):
+    said = verdict(stuck)["summary"]
+    assert said.startswith("Missing from the simulation: parallel spring at the knee")
+    assert "Left out as faults of acquisition: run_1.parquet, hip_angle_rad: the hip's angle is stuck" in said
+
+
+def test_what_is_left_at_the_other_joint_is_said_to_be_there_and_how_much(stuck):
+    said = _finding(with_errors(stuck, [0.56, 0.305]), [SPRING], None)
+    assert said == (
+        "Missing from the simulation: parallel spring at the knee (probability 0.97). With it the knee's torque error "
+        "falls from 2.40 N·m, 8.00 times the noise floor, to 0.30 N·m, which is noise; "
+        "the hip's stays at 0.56 N·m, 1.12 times its floor."
+    )
+
+
+def test_two_causes_are_they_and_a_rest_at_the_worst_joint_is_not_noise(stuck):
+    said = _finding(with_errors(stuck, [0.5, 1.5]), [SPRING, STRIBECK], None)
+    assert "; and Stribeck friction at the hip (probability 0.97). With them the knee's" in said
+    assert said.endswith("to 1.50 N·m, still 5.00 times the floor.")
+
+
+def test_ties_are_one_answer_with_one_probability():
+    tied = SPRING | {"indistinguishable_from": [{"effect": "base_tilt", "joint": None}]}
+    assert _in_words(tied) == (
+        "parallel spring at the knee or base tilt, which these data cannot tell apart (together 0.97)"
+    )
+
+
+@pytest.mark.parametrize(("likely", "other", "said"), [(0.8, 0.2, "4 times"), (1.0, 0.0, "over 1000 times")])
+def test_odds_beyond_a_thousand_are_not_told_by_a_figure(likely, other, said):
+    assert _times(likely, other) == said
