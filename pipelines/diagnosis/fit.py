@@ -15,6 +15,14 @@ from pipelines.effects import Parameter, Side
 SWEEPS = 2
 EVALUATIONS = 14
 """Of the fit along one shape parameter and sweep."""
+STEPS_ON, AT_AN_END = 3, 0.05
+"""How often a search that ended at an end of its range goes on from there, and what share of the range is its end."""
+CLOSER = 0.25
+"""Of its reach the second sweep looks, and so much more finely."""
+MAXIMA_APART = {"Hz": 0.01, "1/turn": 1.0}
+"""How far apart the maxima of an oscillating effect are, by its parameter's unit: the scan has found the right one."""
+ONSETS_APART_S = 2.0
+"""How far apart the onsets are that the scan has tried."""
 REACH = 1.6
 """How far a sweep looks from where a shape parameter stands, as a factor or a share of its range."""
 
@@ -103,7 +111,7 @@ def refined(causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline
                 if parameter.forms or parameter.default is not None:
                     continue
                 for which in _together(parameter, len(runs)):
-                    best = _along(best, number, i, which, runs, baseline, weights)
+                    best = _along(best, number, i, which, runs, baseline, weights, sweep)
     return best
 
 
@@ -126,12 +134,32 @@ def _best_form(best: Fit, number: int, i: int, runs: Sequence[Run], baseline: Ba
 
 
 def _along(
-    best: Fit, number: int, i: int, which: list[int], runs: Sequence[Run], baseline: Baseline, weights: NDArray
-) -> Fit:
-    """Improve one shape parameter of one cause in some runs."""
-    cause = best.causes[number]
-    now = cause.shapes[which[0]][i]
-    to_value, low, high = _scale(cause.effect.shape[i], now)
+    best: Fit, number: int, i: int, which: list[int], runs: Sequence[Run], baseline: Baseline, weights: NDArray,
+    sweep: int,
+) -> Fit:  # fmt: skip
+    """Improve one shape parameter of one cause in some runs; where the best lies at an end, look on from there."""
+    parameter = best.causes[number].effect.shape[i]
+    for _ in range(STEPS_ON):
+        now = best.causes[number].shapes[which[0]][i]
+        to_value, low, high = _scale(parameter, now, 1.0 if sweep == 0 else CLOSER)
+        if not low < high:
+            break
+        best = _between(best, number, i, which, runs, baseline, weights, (to_value, low, high))
+        found = best.causes[number].shapes[which[0]][i]
+        at_an_end = any(
+            abs(found - to_value(end)) < AT_AN_END * abs(to_value(high) - to_value(low)) for end in (low, high)
+        )
+        if not at_an_end or found == now:
+            break
+    return best
+
+
+def _between(
+    best: Fit, number: int, i: int, which: list[int], runs: Sequence[Run], baseline: Baseline, weights: NDArray,
+    scale: tuple[Callable[[float], float], float, float],
+) -> Fit:  # fmt: skip
+    """Return the best of the fits that a bounded search along one shape parameter tries."""
+    cause, (to_value, low, high) = best.causes[number], scale
     tried: list[Fit] = [best]
 
     def cost(x: float) -> float:
@@ -149,12 +177,18 @@ def _along(
     return min(tried, key=lambda f: f.cost)
 
 
-def _scale(parameter: Parameter, now: float) -> tuple[Callable[[float], float], float, float]:
-    """Return how a search coordinate becomes a value, and its range: near by, and hardly beyond typical."""
+def _scale(parameter: Parameter, now: float, share: float) -> tuple[Callable[[float], float], float, float]:
+    """Return how a search coordinate becomes a value, and its range: near by, and hardly beyond typical.
+
+    ``share`` of the usual reach.
+    """
     low, high = parameter.typical
+    if parameter.unit in MAXIMA_APART or parameter.per_run:
+        reach = share * MAXIMA_APART.get(parameter.unit, ONSETS_APART_S)
+        return float, now - reach, now + reach
     if low > 0 and high / low > 4:
-        reach = np.log(REACH) * 2
+        reach = share * 2 * float(np.log(REACH))
         bottom = min(max(np.log(now) - reach, np.log(low / REACH)), np.log(now))
         return lambda x: float(np.exp(x)), bottom, max(min(np.log(now) + reach, np.log(high * REACH)), np.log(now))
-    reach = 0.25 * (high - low)
-    return float, min(max(now - reach, low - reach), now), max(min(now + reach, high + reach), now)
+    reach, beyond = share * 0.25 * (high - low), 0.5 * (high - low)
+    return float, min(max(now - reach, low - beyond), now), max(min(now + reach, high + beyond), now)

@@ -1,5 +1,8 @@
 """A stretch reflex."""
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pipelines.effects.effect import Effect, Parameter, Side
 from pipelines.effects.kernel import reaction
 
@@ -19,6 +22,11 @@ class Spasticity(Effect):
     shape = (
         Parameter("threshold_velocity", "rad/s", "speed from which it acts; its sign is the way", "v0", (-1.5, 1.5)),
     )  # fmt: skip
+    reported = (
+        linear[0],
+        Parameter("threshold_velocity", "rad/s", "speed from which it acts", "|v0|", (0.05, 1.5)),
+        Parameter("direction", "1", "the way in which it acts: 1 or -1", "sgn v0", (-1.0, 1.0), default=1.0),
+    )
     dissipative = True
 
     @reaction
@@ -27,3 +35,13 @@ class Spasticity(Effect):
         excess = at.dq[joint] - values[1]
         if excess * values[1] > 0.0:
             out[joint] += values[0] * excess
+
+    def physical(self, values: NDArray) -> NDArray:
+        """Return gain, size and direction of the threshold."""
+        gain, threshold = values
+        return np.array([gain, abs(threshold), 1.0 if threshold >= 0 else -1.0])
+
+    def values_from(self, physical: NDArray) -> NDArray:
+        """Return gain and signed threshold."""
+        gain, speed, direction = physical
+        return np.array([gain, speed if direction >= 0 else -speed])

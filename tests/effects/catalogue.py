@@ -30,10 +30,10 @@ SIZES = {
     "time_delay": (0.0175,),
     "passive_joint_torque": (15.0, -0.9, -0.25),
     "voluntary_torque": (3.0, 0.73, 0.4, 0.8),
-    "spasticity": (5.0, 0.3),
+    "spasticity": (5.0, 0.3, 1.0),
     "cuff_compliance": (600.0,),
 }
-AT_THE_HIP = {"passive_joint_torque": (15.0, 0.3, 0.25), "spasticity": (5.0, 0.15)}
+AT_THE_HIP = {"passive_joint_torque": (15.0, 0.3, 0.25), "spasticity": (5.0, 0.15, 1.0)}
 
 
 def places(effect):
