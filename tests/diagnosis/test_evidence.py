@@ -1,0 +1,108 @@
+"""What counts as missing physics, what as noise, and what is heard rather than fitted."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.diagnosis.fit import _scale
+from pipelines.diagnosis.impacts import evidence_of_play
+from pipelines.diagnosis.observations import FOLDS, baseline_of, observe, with_load
+from pipelines.diagnosis.slow import SlowError, slow_error
+from pipelines.diagnosis.status import Standing
+from pipelines.diagnosis.tone import strongest_tone
+from pipelines.effects import Backlash, Parameter
+from tests.diagnosis.sessions import session
+
+NOISE = 0.5
+
+
+@pytest.fixture(scope="module")
+def run():
+    motion = session(seconds=40.0)[1]
+    observed = observe(motion)
+    baseline = baseline_of([observed])
+    values = np.zeros(baseline.size)
+    values[:4] = 1.5, 0.2, 0.4, 2.0
+    return with_load(observed, baseline, values)
+
+
+def noise(run, seed=0):
+    return np.random.default_rng(seed).normal(size=run.measured.shape) * NOISE
+
+
+def test_noise_alone_has_no_systematic_error(run):
+    slow = slow_error([run], [noise(run)])
+    assert np.all(np.abs(slow.sureness[:2]) < 3.5)
+    assert np.all(slow.excess[:2] < 0.25 * NOISE)
+
+
+def test_slow_error_that_repeats_is_systematic_and_fast_error_that_repeats_is_not(run):
+    phase = 2 * np.pi * run.time / run.motion.period_s
+    for harmonic, systematic in ((5, True), (150, False)):
+        repeated = 0.4 * np.sin(harmonic * phase)[:, np.newaxis]
+        found = slow_error([run], [noise(run) + repeated])
+        assert (found.excess[0] > 0.2) == systematic
+        assert (found.sureness[0] > 3.5) == systematic
+
+
+@pytest.mark.parametrize("frequency", [1.7, 4.3, 8.9])
+def test_a_hum_stands_out_with_its_own_size_wherever_noise_alone_has_no_line(run, frequency):
+    hum = 0.6 * np.sin(2 * np.pi * frequency * run.time + 1.0)[:, np.newaxis]
+    alone, with_hum = strongest_tone([run], [noise(run)]), strongest_tone([run], [noise(run) + hum])
+    # Averaging over 25 ms takes what a block takes of this frequency, here nothing: the hum is made at block rate.
+    assert with_hum[0] == pytest.approx(0.6 / np.sqrt(2), rel=0.15)
+    assert alone[0] < 0.3 * NOISE
+
+
+def test_play_is_heard_where_scatter_follows_the_load_through_zero_and_only_at_its_joint(run):
+    load = run.average(run.motion.load)
+    loud = noise(run)
+    for at in np.flatnonzero(np.diff(load[:, 1] > 0)):
+        loud[at : at + 14, 1] *= 3.0
+    gains = evidence_of_play([run], [loud], 1 / 6)
+    assert gains[1] > 6.0
+    assert gains[0] == 0.0
+    assert np.all(evidence_of_play([run], [noise(run)], 1 / 6) < 2.0)
+
+
+def standing(before, after, floor=1.0, torque=20.0, samples=500.0):
+    """One joint's errors, the other at the floor; slow and all errors alike."""
+    floors = np.array([floor, floor])
+    errors = [SlowError(np.array([rms, floor]), floors, np.full(2, samples)) for rms in (before, after)]
+    return Standing(floors, errors[0].rms, errors[1].rms, *errors, np.array([torque, torque]))
+
+
+def test_causes_are_dropped_where_plain_error_is_left_and_three_of_them_sooner():
+    one, three = [Backlash(joint="hip")] * 1, [Backlash(joint="hip")] * 3
+    friction = [replace(cause) for cause in one]
+    assert standing(3.0, 1.05).held_up(friction)
+    assert not standing(3.0, 2.9).held_up(friction)
+    springless = [type("Springless", (), {"spring": None})()]
+    assert not standing(3.0, 2.2).held_up(springless)
+    assert standing(3.0, 1.5).held_up(springless)
+    assert not standing(3.0, 1.5).held_up(springless * 3)
+    assert standing(3.0, 2.2).held_up(three), "what rings is not followed to the end"
+
+
+def test_an_error_that_grows_on_other_runs_is_no_cause():
+    assert not standing(1.5, 1.6).held_up([Backlash(joint="hip")])
+
+
+def test_trust_falls_with_what_is_plainly_left():
+    assert standing(3.0, 1.0).trust == pytest.approx(1.0)
+    assert standing(3.0, 2.0).trust == pytest.approx(1.0 - 3.0 / 8.0)
+    assert standing(1.2, 1.1, samples=20.0).trust > 0.9, "what chance could have left is not held against a cause"
+
+
+def test_refinement_stays_at_the_maximum_that_the_scan_found():
+    rhythm = Parameter("frequency", "Hz", "", "f", (0.1, 3.0))
+    _, low, high = _scale(rhythm, 0.43, 1.0)
+    assert (low, high) == pytest.approx((0.42, 0.44))
+    onset = Parameter("time", "s", "", "t", (0.0, 120.0), per_run=True)
+    assert _scale(onset, 30.0, 0.25)[1:] == pytest.approx((29.5, 30.5))
+
+
+def test_a_run_shorter_than_its_period_is_still_dealt_out_to_every_fold(run):
+    short = observe(replace(run.motion, period_s=300.0))
+    assert set(short.fold) == set(range(FOLDS))
