@@ -33,7 +33,7 @@ CERTAIN = 1000.0
 def verdict(d: Diagnosis) -> dict[str, Any]:
     """Return the verdict as JSON objects, keys as in docs/contracts.md."""
     first = d.validate[0]
-    causes = [_cause(d, label) for label in d.causes]
+    causes = _never_rising([_cause(d, label) for label in d.causes])
     spoilt = any(fault.samples is None for fault in d.faults)
     left = unknown(d) if d.status in ("unknown_cause", "partly_explained") and not spoilt else None
     return {
@@ -120,6 +120,14 @@ def _rows(frame: pd.DataFrame, name: str, joint: str | None) -> list[dict[str, A
         {str(k): (float(v) if k in ("value", "ci95_low", "ci95_high") else v) for k, v in row.items()}
         for row in frame[(frame["effect"] == name) & here].to_dict("records")
     ]
+
+
+def _never_rising(causes: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Let no cause be more probable than one before it: among nearly equals the order is that of what each explains."""
+    least = 1.0
+    for cause in causes:
+        least = cause["probability"] = min(cause["probability"], least)
+    return causes
 
 
 def _probability(d: Diagnosis, among_rivals: float) -> float:
