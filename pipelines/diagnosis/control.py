@@ -13,6 +13,7 @@ import pandas as pd
 from pipelines.contracts.joints import joints_of
 from pipelines.diagnosis import tables
 from pipelines.diagnosis.diagnose import Diagnosis
+from pipelines.diagnosis.search import imperfection
 from pipelines.diagnosis.uncertainty import uncertainty
 from pipelines.dynamics.plant import make_plant
 from pipelines.dynamics.tracking import track
@@ -42,7 +43,8 @@ def control(d: Diagnosis) -> dict[str, Any]:
     }
     if any(fault.samples is None for fault in d.faults):
         return told | {"reason": "acquisition is at fault: no model of these recordings can be trusted"}
-    plain, _ = tables.parameters(d.before.fit, d.baseline, uncertainty(d.before.fit, d.train, d.baseline))
+    sure = uncertainty(d.before.fit, d.train, d.baseline, imperfection(d.bank.gram))
+    plain, _ = tables.parameters(d.before.fit, d.baseline, sure)
     models = {"without": plain, "with": d.parameters} if d.causes else {"without": plain}
     reasons = [] if d.causes else ["no cause is named"]
     for which, frame in models.items():

@@ -28,7 +28,7 @@ from pipelines.diagnosis.floor import Floor, noise_floor, slow_scatter
 from pipelines.diagnosis.gain import Errors, errors_of, scored
 from pipelines.diagnosis.impacts import evidence_of_play
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, observe, with_load
-from pipelines.diagnosis.search import known_besides
+from pipelines.diagnosis.search import imperfection, known_besides
 from pipelines.diagnosis.second_look import rings, slower
 from pipelines.diagnosis.session import refuse_unfit
 from pipelines.diagnosis.slow import slow_error
@@ -160,9 +160,10 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
     named = choice.named.labels
     status = "unknown_cause" if spoilt else status_of(standing, bool(named), wanders or hums)
     diluted = dilution(choice, bank) if named else 1.0
-    sure = uncertainty(choice.named.fit, bank.runs, baseline)
+    imperfect = imperfection(bank.gram)
+    sure = uncertainty(choice.named.fit, bank.runs, baseline, imperfect)
     frame, covariance = tables.parameters(choice.named.fit, baseline, sure)
-    plain, _ = tables.parameters(empty, baseline, uncertainty(empty, bank.runs, baseline))
+    plain, _ = tables.parameters(empty, baseline, uncertainty(empty, bank.runs, baseline, imperfect))
     return Diagnosis(
         baseline=baseline, bank=bank, choice=choice, status=status, before=before, after=after,
         without={label: _less(choice.named, label, bank, validate) for label in named},

@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.candidates import Candidate, columns_under
 from pipelines.diagnosis.fit import Fit, laden
 from pipelines.diagnosis.observations import Baseline, Run
-from pipelines.diagnosis.scan import NEVER, ONSETS
+from pipelines.diagnosis.scan import ALWAYS, NEVER, ONSETS
 from pipelines.model import Term
 
+WITHOUT_INSTANT = 2
+"""How many of the onsets tried, the first ones, are no instant within the run."""
 ALIKE = 4.0
 """Weighted squared error within which two onsets explain a run alike."""
 
@@ -80,7 +82,8 @@ def _own(fit: Fit, run: Run, baseline: Baseline, learnt: NDArray) -> NDArray:
 def _learn(fit: Fit, run: Run, baseline: Baseline, learnt: NDArray) -> tuple[NDArray, NDArray, list[Term]]:
     """Fit the run's own onsets and phases where ``learnt`` (m, O): values, residual (m, O), terms.
 
-    Onsets that explain the learnt samples alike are as likely as one another: the middle one is taken.
+    Onsets that explain the learnt samples alike are as likely as one another, and the middle one is taken; but what
+    was there all along, or never, needs no coincidence.
     """
     shared, own = _shared_values(fit, baseline)
     tried = []
@@ -95,12 +98,13 @@ def _learn(fit: Fit, run: Run, baseline: Baseline, learnt: NDArray) -> tuple[NDA
         cost = float(np.sum(fit.weights * np.sum(np.where(learnt, left, 0.0) ** 2, axis=0)))
         tried.append((cost, values, left, terms))
     least = min(cost for cost, *_ in tried)
-    alike = [entry for entry in tried if entry[0] < least + ALIKE]
-    return alike[len(alike) // 2][1:]
+    alike = [number for number, entry in enumerate(tried) if entry[0] < least + ALIKE]
+    simple = [number for number in alike if number < WITHOUT_INSTANT]
+    return tried[simple[0] if simple else alike[len(alike) // 2]][1:]
 
 
 def _onsets(fit: Fit, terms: list[Term], run: Run) -> Iterator[list[Term]]:
-    """Yield the terms with each onset that the run may have, never among them."""
+    """Yield the terms with each onset that the run may have, first those that no instant is needed for."""
     dated = [
         (number, len(cause.effect.linear) + i)
         for number, cause in enumerate(fit.causes)
@@ -111,7 +115,7 @@ def _onsets(fit: Fit, terms: list[Term], run: Run) -> Iterator[list[Term]]:
         yield terms
         return
     number, at = dated[0]
-    for instant in (NEVER, *np.linspace(run.time[0], run.time[-1], ONSETS + 2)[1:-1]):
+    for instant in (NEVER, ALWAYS, *np.linspace(run.time[0], run.time[-1], ONSETS + 2)[1:-1]):
         values = terms[number].values.copy()
         values[at] = instant
         yield [replace(t, values=values) if k == number else t for k, t in enumerate(terms)]

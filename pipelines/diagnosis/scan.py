@@ -25,8 +25,8 @@ ONSETS = 40
 """Instants tried for what begins at a time of its own in each run."""
 OSCILLATING = {"Hz", "1/turn"}
 """Units of parameters whose effect has many maxima along them."""
-NEVER = 1e6
-"""s: an onset after every run's end."""
+NEVER, ALWAYS = 1e6, -1e6
+"""s: onsets after every run's end and before every run's begin."""
 
 
 @dataclass(frozen=True)

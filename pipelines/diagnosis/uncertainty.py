@@ -1,4 +1,4 @@
-"""Intervals of an extended model's parameters, shapes included, that survive autocorrelated residuals."""
+"""Intervals of an extended model's parameters, shapes included, that survive autocorrelation and small misfit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,6 +11,8 @@ from pipelines.diagnosis.fit import Fit, laden, stacked_columns
 from pipelines.diagnosis.observations import Baseline, Run
 from pipelines.estimation.least_squares import long_run_covariance
 
+ALIKE_S = 0.5
+"""How long what a model gets wrong stays alike: it goes with the motion, whose fastest parts are about 1 Hz."""
 STEP = 0.01
 """Of a difference along a shape parameter, as a share of its typical range."""
 
@@ -25,8 +27,12 @@ class Uncertainty:
     """(cause, shape parameter, run) behind each shape's place after the linear values; run -1 where shared."""
 
 
-def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> Uncertainty:
-    """Linearise about a fit: its columns, and what a step in each free shape does to the prediction."""
+def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: NDArray) -> Uncertainty:
+    """Linearise about a fit: its columns, and what a step in each free shape does to the prediction.
+
+    Beside the noise stands what no model of a good rig gets right, ``imperfect`` (O,) N·m rms: small against the
+    noise, but much alike from sample to sample, and so the larger part of what hours of data leave in doubt.
+    """
     runs = laden(runs, fit, baseline)
     plain = stacked_columns(fit.causes, runs, baseline)
     columns = [c for c, _ in plain]
@@ -45,6 +51,9 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> Uncertaint
         np.einsum("mo,o,mo,moi->mi", run.usable, weights, e, a) for run, e, a in zip(runs, left, wide, strict=True)
     ]
     filling, critical = long_run_covariance([[s] for s in scores], gram.shape[0])
+    for run, a in zip(runs, wide, strict=True):
+        alike = ALIKE_S * run.motion.sample_rate_hz / run.block.decimation
+        filling = filling + np.einsum("mo,o,moi,moj->ij", run.usable, alike * (weights * imperfect) ** 2, a, a)
     inverse = np.linalg.pinv(gram, rcond=1e-13, hermitian=True)
     return Uncertainty(inverse @ filling @ inverse, critical, tuple(places))
 
