@@ -51,9 +51,9 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
         np.einsum("mo,o,mo,moi->mi", run.usable, weights, e, a) for run, e, a in zip(runs, left, wide, strict=True)
     ]
     filling, critical = long_run_covariance([[s] for s in scores], gram.shape[0])
-    for run, a in zip(runs, wide, strict=True):
-        alike = ALIKE_S * run.motion.sample_rate_hz / run.block.decimation
-        filling = filling + np.einsum("mo,o,moi,moj->ij", run.usable, alike * (weights * imperfect) ** 2, a, a)
+    for observed, a in zip(runs, wide, strict=True):
+        alike = ALIKE_S * observed.motion.sample_rate_hz / observed.block.decimation
+        filling = filling + np.einsum("mo,o,moi,moj->ij", observed.usable, alike * (weights * imperfect) ** 2, a, a)
     inverse = np.linalg.pinv(gram, rcond=1e-13, hermitian=True)
     return Uncertainty(inverse @ filling @ inverse, critical, tuple(places))
 
