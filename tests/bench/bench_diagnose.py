@@ -91,7 +91,7 @@ class Counting(Scorer):
 
     def __init__(self, bank: Bank, independent: NDArray) -> None:
         self.sets: dict[int, int] = {}
-        super().__init__(bank, independent)
+        super().__init__(bank, independent, evidence={})
 
     def __call__(self, chosen: Sequence[int]) -> Scored:
         self.sets[len(chosen)] = self.sets.get(len(chosen), 0) + 1
