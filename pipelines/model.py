@@ -79,13 +79,13 @@ class Model:
         """Undo what encoders did: the motion of the motors."""
         return self._corrected(motion, lambda effect: effect.side is Side.SENSOR)
 
-    def corrected(self, motion: Motion) -> Motion:
-        """Undo what encoders and transmissions did: the motion of the machine's links."""
-        return self._corrected(self.sensed(motion), lambda e: e.side in (Side.DRIVE, Side.STRUCTURE))
+    def behind_motors(self, motor: Motion) -> Motion:
+        """Undo what transmissions did to the motors' motion: that of the machine's links."""
+        return self._corrected(motor, lambda e: e.side in (Side.DRIVE, Side.STRUCTURE))
 
-    def on_limb(self, motion: Motion) -> Motion:
-        """Undo what encoders, transmissions and cuffs did: the motion of the wearer's limb."""
-        return self._corrected(self.corrected(motion), lambda effect: effect.side is Side.HUMAN)
+    def behind_cuffs(self, link: Motion) -> Motion:
+        """Undo what cuffs did to the links' motion: that of the wearer's limb."""
+        return self._corrected(link, lambda effect: effect.side is Side.HUMAN)
 
     def _corrected(self, motion: Motion, chosen) -> Motion:
         for term in self.terms:
@@ -99,7 +99,9 @@ class Model:
         Drive effects see the motor's motion, those on the wearer's side of the cuffs the limb's, all others the
         link's. The sensors then make of all these torques, one sensor effect after the other, what they measure.
         """
-        motor, link, limb = self.sensed(motion), self.corrected(motion), self.on_limb(motion)
+        motor = self.sensed(motion)
+        link = self.behind_motors(motor)
+        limb = self.behind_cuffs(link)
         parts: dict[int, NDArray] = {}
         for i in sorted(range(len(self.terms)), key=lambda i: self.terms[i].effect.side is Side.SENSOR):
             effect, shape = self.terms[i].effect, self.terms[i].shape

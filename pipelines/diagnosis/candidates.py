@@ -78,7 +78,9 @@ def columns_under(terms: Sequence[Term], run: Run, baseline: Baseline) -> tuple[
     """
     motion = run.motion
     model = Model(tuple(terms))
-    motor, link, limb = model.sensed(motion), model.corrected(motion), model.on_limb(motion)
+    motor = model.sensed(motion)
+    link = model.behind_motors(motor)
+    limb = model.behind_cuffs(link)
     joints = len(baseline.joints)
     parts = [baseline.columns(motor, link, limb)]
     for term in sorted(terms, key=lambda t: t.effect.side is Side.SENSOR):

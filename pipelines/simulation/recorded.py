@@ -83,7 +83,8 @@ def _drives(motion: Motion) -> Drives:
 
 def _loop_as_recorded(plant: Plant, motion: Motion, k: int, period: float) -> LoopState:
     """Return the loop in the recorded state at the begin of sample ``k``, half a period before its time."""
-    motor, link = plant.model.sensed(motion), plant.model.corrected(motion)
+    motor = plant.model.sensed(motion)
+    link = plant.model.behind_motors(motor)
     state = np.stack([link.q[k], link.dq[k], motor.q[k], motor.dq[k]])
     state[::2] -= 0.5 * period * state[1::2]
     at_rest = loop_at_rest(plant.assembly, link.q[k])
