@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.bank import Bank
-from pipelines.diagnosis.fit import Fit, fit, laden, refined, stacked_columns
+from pipelines.diagnosis.fit import Fit, fit, refined, residuals_on
 from pipelines.diagnosis.floor import Floor, independent_share
 from pipelines.diagnosis.search import Scored, Scorer, cost, known_besides, log_likelihood, search
 
@@ -128,10 +128,8 @@ def dilution(choice: Choice, bank: Bank) -> float:
     Where the named causes leave more than noise, that is their form's misfit, and it is much alike from sample to
     sample: a likelihood that counts it as noise is sure of the wrong cause.
     """
-    made = choice.named.fit
-    runs = laden(bank.runs, made, bank.baseline)
-    left = [y - c @ made.values for c, y in stacked_columns(made.causes, runs, bank.baseline)]
-    independent = bank.gram.count.sum(axis=0) * independent_share(runs, left)
+    left = residuals_on(choice.named.fit, bank.runs, bank.baseline)
+    independent = bank.gram.count.sum(axis=0) * independent_share(bank.runs, left)
     return float(min(1.0, independent.sum() / choice.independent.sum()))
 
 

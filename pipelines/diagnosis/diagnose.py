@@ -23,7 +23,7 @@ from pipelines.diagnosis.choice import (
 )
 from pipelines.diagnosis.evaluate import evaluate, settled
 from pipelines.diagnosis.faults import Fault, excluding, find_faults
-from pipelines.diagnosis.fit import Fit, fit, stacked_columns
+from pipelines.diagnosis.fit import Fit, fit, residuals_on
 from pipelines.diagnosis.floor import Floor, noise_floor, slow_scatter
 from pipelines.diagnosis.gain import Errors, errors_of, scored
 from pipelines.diagnosis.impacts import evidence_of_play
@@ -136,7 +136,7 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
     empty = fit((), bank.runs, baseline, bank.weights)
     validate = tuple(with_load(run, baseline, empty.values) for run in validate)
     report(SEARCH_SHARE, "combinations")
-    left = [y - c @ empty.values for c, y in stacked_columns((), bank.runs, baseline)]
+    left = residuals_on(empty, bank.runs, baseline)
     # Where masking does not help, physics would be blamed for what acquisition did.
     spoilt = any(fault.samples is None for fault in faults)
     evidence = _heard(bank.runs, left)

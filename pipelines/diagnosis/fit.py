@@ -65,6 +65,12 @@ def laden(runs: Sequence[Run], made: Fit, baseline: Baseline) -> list[Run]:
     return list(runs) if made.loads is None else [with_load(run, baseline, made.loads) for run in runs]
 
 
+def residuals_on(made: Fit, runs: Sequence[Run], baseline: Baseline) -> list[NDArray]:
+    """Return what a fit leaves of each run that it was made on, (m, O) N·m."""
+    columns = stacked_columns(made.causes, laden(runs, made, baseline), baseline)
+    return [measured - c @ made.values for c, measured in columns]
+
+
 def _last_sensors(cause: Candidate) -> bool:
     return cause.effect.side is Side.SENSOR
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from pipelines.diagnosis.dependence import Dependence, dependences, describe, excesses
 from pipelines.diagnosis.diagnose import Diagnosis
-from pipelines.diagnosis.fit import laden, stacked_columns
+from pipelines.diagnosis.fit import residuals_on
 from pipelines.diagnosis.gain import errors_of
 from pipelines.diagnosis.smooth_term import smooth_term
 
@@ -36,10 +36,7 @@ class Unknown:
 
 def unknown(d: Diagnosis) -> Unknown:
     """Describe the residual of validation runs and extend the model by a smooth term learnt on train runs."""
-    made = d.after.fit
-    runs = laden(d.train, made, d.baseline)
-    train = [y - c @ made.values for c, y in stacked_columns(made.causes, runs, d.baseline)]
-    term = smooth_term(d.train, train)
+    term = smooth_term(d.train, residuals_on(d.after.fit, d.train, d.baseline))
     found = dependences(d.validate, list(d.after.residuals))
     above = excesses(d.validate, list(d.after.residuals), d.floor)
     left = [r - np.nan_to_num(term.torque(run)) for run, r in zip(d.validate, d.after.residuals, strict=True)]
