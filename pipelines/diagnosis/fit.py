@@ -51,13 +51,14 @@ class Fit:
         return sum(kind in effect.acts_in and effect.run in (None, kind) for kind in self.kinds)
 
 
-def fit(causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline, weights: NDArray) -> Fit:
-    """Fit baseline and causes at the shapes they have."""
+def fit(
+    causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline, weights: NDArray, loads: NDArray | None = None
+) -> Fit:
+    """Fit baseline and causes at the shapes they have, to runs with the ``loads`` that ``Fit.loads`` tells of."""
     gram = gram_of_runs(runs, *zip(*stacked_columns(causes, runs, baseline), strict=True))
     values = solve(gram, weights)
-    return Fit(
-        tuple(sorted(causes, key=_last_sensors)), values, *_errors(gram, values), tuple(r.motion.run for r in runs)
-    )
+    ordered, kinds = tuple(sorted(causes, key=_last_sensors)), tuple(run.motion.run for run in runs)
+    return Fit(ordered, values, *_errors(gram, values), kinds, loads)
 
 
 def laden(runs: Sequence[Run], made: Fit, baseline: Baseline) -> list[Run]:
@@ -109,7 +110,7 @@ def refined(causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline
             # The bodies of the fit before were biased by what is missing, and so were the loads that bend and rub.
             loads = best.values
             runs = [with_load(run, baseline, loads) for run in runs]
-            best = replace(fit(best.causes, runs, baseline, weights), loads=loads)
+            best = fit(best.causes, runs, baseline, weights, loads)
         for number, cause in enumerate(best.causes):
             for i, parameter in enumerate(cause.effect.shape):
                 if parameter.forms and cause.bends and cause.effect.swings:
@@ -135,7 +136,7 @@ def _best_form(best: Fit, number: int, i: int, runs: Sequence[Run], baseline: Ba
             continue
         shapes = tuple(tuple(form if k == i else v for k, v in enumerate(shape)) for shape in cause.shapes)
         causes = [replace(c, shapes=shapes) if k == number else c for k, c in enumerate(best.causes)]
-        tried.append(replace(fit(causes, runs, baseline, weights), loads=best.loads))
+        tried.append(fit(causes, runs, baseline, weights, best.loads))
     return min(tried, key=lambda f: f.cost)
 
 
@@ -174,7 +175,7 @@ def _between(
             for r, shape in enumerate(cause.shapes)
         )
         causes = [replace(c, shapes=shapes) if k == number else c for k, c in enumerate(best.causes)]
-        tried.append(replace(fit(causes, runs, baseline, weights), loads=best.loads))
+        tried.append(fit(causes, runs, baseline, weights, best.loads))
         return tried[-1].cost
 
     minimize_scalar(
