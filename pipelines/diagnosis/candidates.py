@@ -7,7 +7,7 @@ Linearised at biased parameters, elasticity would pass for an encoder offset.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,15 @@ class Candidate:
     def term(self, run: int) -> Term:
         """Return the candidate as a term of a run's model, its amplitudes nought."""
         return Term(self.effect, np.append(np.zeros(len(self.effect.linear)), self.shapes[run]))
+
+    def reshaped(self, i: int, value: float, runs: Sequence[int] | None = None) -> "Candidate":
+        """Return the candidate with another value of shape parameter ``i``, in some runs or in all."""
+        within = range(len(self.shapes)) if runs is None else runs
+        shapes = tuple(
+            tuple(value if r in within and k == i else v for k, v in enumerate(shape))
+            for r, shape in enumerate(self.shapes)
+        )
+        return replace(self, shapes=shapes)
 
     @property
     def bends(self) -> bool:

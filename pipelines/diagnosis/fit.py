@@ -1,7 +1,7 @@
 """The extended model: baseline and causes fitted together, shapes refined, uncertainty honest."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,8 +134,7 @@ def _best_form(best: Fit, number: int, i: int, runs: Sequence[Run], baseline: Ba
     for form in cause.effect.shape[i].forms:
         if form == cause.shapes[0][i]:
             continue
-        shapes = tuple(tuple(form if k == i else v for k, v in enumerate(shape)) for shape in cause.shapes)
-        causes = [replace(c, shapes=shapes) if k == number else c for k, c in enumerate(best.causes)]
+        causes = [c.reshaped(i, form) if k == number else c for k, c in enumerate(best.causes)]
         tried.append(fit(causes, runs, baseline, weights, best.loads))
     return min(tried, key=lambda f: f.cost)
 
@@ -166,15 +165,11 @@ def _between(
     scale: tuple[Callable[[float], float], float, float],
 ) -> Fit:  # fmt: skip
     """Return the best of the fits that a bounded search along one shape parameter tries."""
-    cause, (to_value, low, high) = best.causes[number], scale
+    to_value, low, high = scale
     tried: list[Fit] = [best]
 
     def cost(x: float) -> float:
-        shapes = tuple(
-            tuple(to_value(x) if r in which and k == i else v for k, v in enumerate(shape))
-            for r, shape in enumerate(cause.shapes)
-        )
-        causes = [replace(c, shapes=shapes) if k == number else c for k, c in enumerate(best.causes)]
+        causes = [c.reshaped(i, to_value(x), which) if k == number else c for k, c in enumerate(best.causes)]
         tried.append(fit(causes, runs, baseline, weights, best.loads))
         return tried[-1].cost
 

@@ -1,7 +1,7 @@
 """Intervals of an extended model's parameters, shapes included, that survive autocorrelation and small misfit."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,8 +73,5 @@ def _moved(causes: Sequence[Candidate], number: int, i: int, run: int) -> tuple[
     low, high = cause.effect.shape[i].typical
     now = cause.shapes[max(run, 0)][i]
     step = STEP * (abs(now) if low > 0 and high / low > 4 else high - low)
-    shapes = tuple(
-        tuple(v + step if k == i and run in (-1, r) else v for k, v in enumerate(shape))
-        for r, shape in enumerate(cause.shapes)
-    )
-    return [replace(c, shapes=shapes) if k == number else c for k, c in enumerate(causes)], step
+    moved = cause.reshaped(i, now + step, None if run < 0 else [run])
+    return [moved if k == number else c for k, c in enumerate(causes)], step
