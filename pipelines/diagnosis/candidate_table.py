@@ -64,7 +64,7 @@ def _parameters(ranked: Ranked, d: Diagnosis) -> list[dict[str, Any]]:
     found, at = [], d.baseline.size
     for cause in ranked.fit.causes:
         effect = cause.effect
-        apart = [] if cause.bends else [p.per_run for p in effect.linear]
+        apart = cause.apart
         shared = apart.count(False)
         if not any(apart):
             fitted = np.append(ranked.fit.values[at : at + shared], cause.shapes[0])

@@ -53,6 +53,11 @@ class Candidate:
         """Whether the effect changes kinematics or readings rather than adding torque of its own."""
         return bends_motion(self.effect)
 
+    @property
+    def apart(self) -> list[bool]:
+        """Which linear parameters have a column of their own for each run; none of one that bends."""
+        return [p.per_run and not self.bends for p in self.effect.linear]
+
 
 def bends_motion(effect: Effect) -> bool:
     """Tell whether an effect changes kinematics or readings rather than adding torque of its own."""
@@ -146,8 +151,7 @@ def torque_columns(candidate: Candidate, number: int, run: Run) -> NDArray:
 
 def expanded(columns: Sequence[NDArray], candidate: Candidate, runs: Sequence[Run]) -> list[NDArray]:
     """Give linear parameters that each run has for itself a column for each run the effect acts in, (m, O, k')."""
-    effect = candidate.effect
-    apart = [] if candidate.bends else [p.per_run for p in effect.linear]
+    effect, apart = candidate.effect, candidate.apart
     if not any(apart):
         return list(columns)
     acting = [r for r, run in enumerate(runs) if effect.explains(run.motion)]

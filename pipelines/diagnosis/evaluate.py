@@ -54,11 +54,11 @@ def _shared_values(fit: Fit, baseline: Baseline) -> tuple[NDArray, NDArray]:
     values, own = list(fit.values[: baseline.size]), [False] * baseline.size
     at = baseline.size
     for cause in fit.causes:
-        apart = [] if cause.bends else [p.per_run for p in cause.effect.linear]
+        apart = cause.apart
         shared = [i for i, a in enumerate(apart) if not a]
         in_place = dict(zip(shared, fit.values[at : at + len(shared)], strict=True))
         values += [in_place.get(i, 0.0) for i in range(len(apart))]
-        own += list(apart)
+        own += apart
         at += len(shared) + (len(apart) - len(shared)) * fit.acting(cause)
     return np.array(values), np.array(own, dtype=bool)
 

@@ -81,7 +81,7 @@ def stacked_columns(
 ) -> list[tuple[NDArray, NDArray]]:
     """Return columns (m, O, c) and measured torque (m, O) of each run, run-wise parameters in places of their own."""
     made = [columns_under([c.term(r) for c in causes], run, baseline) for r, run in enumerate(runs)]
-    if not any(p.per_run for c in causes for p in c.effect.linear):
+    if not any(any(cause.apart) for cause in causes):
         return made
     at = baseline.size
     parts = [[columns[:, :, :at] for columns, _ in made]]

@@ -67,8 +67,7 @@ def _add_causes(fit: Fit, baseline: Baseline, sure: Uncertainty, add) -> None:
     """Add each cause's parameters as files name them; those that every run has for itself are its first run's."""
     size, at = len(sure.covariance), baseline.size
     for number, cause in enumerate(fit.causes):
-        effect = cause.effect
-        apart = [False] * len(effect.linear) if cause.bends else [p.per_run for p in effect.linear]
+        effect, apart = cause.effect, cause.apart
         shared = [i for i, a in enumerate(apart) if not a]
         places: list[int | None] = [None] * len(effect.fitted)
         for k, i in enumerate(shared):
