@@ -8,18 +8,15 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from pipelines.contracts.joints import joints_of
-from pipelines.diagnosis import tables
 from pipelines.diagnosis.diagnose import Diagnosis
-from pipelines.diagnosis.search import imperfection
-from pipelines.diagnosis.uncertainty import uncertainty
+from pipelines.diagnosis.fitted_model import fitted_model
 from pipelines.dynamics.plant import make_plant
 from pipelines.dynamics.tracking import track
 from pipelines.errors import ExoidError, InputError
 from pipelines.mechanics.gait import gait
-from pipelines.model import Model, Term, model_from_parameters
+from pipelines.model import Model, Term
 from pipelines.settings.simulate import SimulateSettings
 
 CASE = SimulateSettings()
@@ -43,22 +40,20 @@ def control(d: Diagnosis) -> dict[str, Any]:
     }
     if any(fault.samples is None for fault in d.faults):
         return told | {"reason": "acquisition is at fault: no model of these recordings can be trusted"}
-    sure = uncertainty(d.before.fit, d.train, d.baseline, imperfection(d.bank.gram))
-    plain, _ = tables.parameters(d.before.fit, d.baseline, sure)
-    models = {"without": plain, "with": d.parameters} if d.causes else {"without": plain}
+    fits = {"without": d.before.fit, "with": d.after.fit} if d.causes else {"without": d.before.fit}
     reasons = [] if d.causes else ["no cause is named"]
-    for which, frame in models.items():
+    for which, made in fits.items():
         try:
-            told[which] = _tracked(frame, run, d)
+            told[which] = _tracked(fitted_model(made, d.baseline, run), run, d)
         except ExoidError as error:
             # What is wrong; its second sentence tells those who asked for a simulation what to do.
             reasons.append(f"{which} the causes: {str(error).partition('. ')[0]}")
     return told | {"reason": "; ".join(reasons) or None}
 
 
-def _tracked(frame: pd.DataFrame, run: str, d: Diagnosis) -> dict[str, dict[str, float]]:
+def _tracked(model: Model, run: str, d: Diagnosis) -> dict[str, dict[str, float]]:
     motion = d.validate[0].motion
-    terms = tuple(_from_the_begin(term) for term in model_from_parameters(frame, run))
+    terms = tuple(_from_the_begin(term) for term in model)
     loop = track(make_plant(Model(terms), motion.geometry, joints_of(motion.metadata), run), CASE, gait())
     if loop.ran_away:
         raise InputError(loop.ran_away)

@@ -21,9 +21,10 @@ from pipelines.diagnosis.choice import (
     probabilities,
     rivals,
 )
-from pipelines.diagnosis.evaluate import evaluate, settled
+from pipelines.diagnosis.evaluate import evaluate
 from pipelines.diagnosis.faults import Fault, excluding, find_faults
 from pipelines.diagnosis.fit import Fit, fit, residuals_on
+from pipelines.diagnosis.fitted_model import model_of_run
 from pipelines.diagnosis.floor import Floor, noise_floor, slow_scatter
 from pipelines.diagnosis.gain import Errors, errors_of, scored
 from pipelines.diagnosis.impacts import evidence_of_play
@@ -39,7 +40,7 @@ from pipelines.dynamics.replay import replay
 from pipelines.effects import Backlash
 from pipelines.errors import ExoidError, InputError
 from pipelines.mechanics.motion import Motion
-from pipelines.model import Model, effect_named, model_from_parameters
+from pipelines.model import effect_named
 
 SEARCH_SHARE = 0.75
 """Of the progress bar that filling the bank takes."""
@@ -160,10 +161,8 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
     named = choice.named.labels
     status = "unknown_cause" if spoilt else status_of(standing, bool(named), wanders or hums)
     diluted = dilution(choice, bank) if named else 1.0
-    imperfect = imperfection(bank.gram)
-    sure = uncertainty(choice.named.fit, bank.runs, baseline, imperfect)
+    sure = uncertainty(choice.named.fit, bank.runs, baseline, imperfection(bank.gram))
     frame, covariance = tables.parameters(choice.named.fit, baseline, sure)
-    plain, _ = tables.parameters(empty, baseline, uncertainty(empty, bank.runs, baseline, imperfect))
     return Diagnosis(
         baseline=baseline, bank=bank, choice=choice, status=status, before=before, after=after,
         without={label: _less(choice.named, label, bank, validate) for label in named},
@@ -171,8 +170,8 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
         standing=standing, floor=floor, sure=sure, parameters=frame, covariance=covariance,
         residuals=tables.residual_table(validate, {"baseline": before.residuals, "extended": after.residuals}),
         train=bank.runs, validate=validate, faults=faults,
-        strayed={"baseline": _strayed(plain, empty, validate, baseline),
-                 "extended": _strayed(frame, choice.named.fit, validate, baseline)},
+        strayed={"baseline": _strayed(empty, validate, baseline),
+                 "extended": _strayed(choice.named.fit, validate, baseline)},
     )  # fmt: skip
 
 
@@ -223,13 +222,12 @@ def _standing(before: Extended, after: Extended, floor: Floor, validate: Sequenc
     return Standing(floor.rms[:J], before.errors.rms, after.errors.rms, slow, left, rms)
 
 
-def _strayed(frame: pd.DataFrame, made: Fit, validate: Sequence[Run], baseline: Baseline) -> NDArray | None:
+def _strayed(made: Fit, validate: Sequence[Run], baseline: Baseline) -> NDArray | None:
     """Return the rms angle error of 1 s simulations over all validation runs, (J,) rad; None where none can run."""
     squares, count = 0.0, 0
     for run in validate:
         try:
-            model = _with_own(model_from_parameters(frame, run.motion.run), made, run, baseline)
-            result = replay(model, run.motion)
+            result = replay(model_of_run(made, baseline, run), run.motion)
         except (ExoidError, ZeroDivisionError):
             # Causes that the forward dynamics cannot hold together, or a mass matrix that no leg has: the torque
             # error stands all the same.
@@ -239,14 +237,6 @@ def _strayed(frame: pd.DataFrame, made: Fit, validate: Sequence[Run], baseline: 
     with np.errstate(invalid="ignore"):
         rms = np.sqrt(squares / max(count, 1))
     return rms if np.all(np.isfinite(rms)) else None
-
-
-def _with_own(model: Model, made: Fit, run: Run, baseline: Baseline) -> Model:
-    """Give the causes the onsets and phases of this run."""
-    if not any(p.per_run for cause in made.causes for p in cause.effect.fitted):
-        return model
-    own = {term.effect.label: term for term in settled(made, run, baseline)[0]}
-    return Model(tuple(replace(t, values=own[t.effect.label].values) if t.effect.label in own else t for t in model))
 
 
 def summary_numbers(diagnosis: Diagnosis) -> dict[str, Any]:

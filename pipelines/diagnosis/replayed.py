@@ -6,15 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis import tables
 from pipelines.diagnosis.diagnose import Diagnosis, Extended
-from pipelines.diagnosis.evaluate import settled
+from pipelines.diagnosis.fitted_model import model_of_run
 from pipelines.diagnosis.gain import scored
-from pipelines.diagnosis.observations import Run
-from pipelines.diagnosis.uncertainty import Uncertainty
 from pipelines.dynamics.replay import WINDOW_S, replay
 from pipelines.errors import ExoidError
-from pipelines.model import Model, model_from_parameters
 
 STRETCH_S = 6.0
 STEP_S = 0.5
@@ -58,7 +54,7 @@ def simulated_error(made: Extended, d: Diagnosis, stretch: Stretch) -> tuple[NDA
     """
     run = d.validate[stretch.run]
     try:
-        result = replay(model_for(made, d, run), run.motion, every_s=WINDOW_S)
+        result = replay(model_of_run(made.fit, d.baseline, run), run.motion, every_s=WINDOW_S)
     except (ExoidError, ZeroDivisionError):
         return None
     if not np.all(np.isfinite(result.error)):
@@ -70,13 +66,3 @@ def simulated_error(made: Extended, d: Diagnosis, stretch: Stretch) -> tuple[NDA
     time = np.pad(times[first[shown, np.newaxis] + np.arange(length)], ((0, 0), (0, 1)), constant_values=np.nan)
     error = np.pad(result.error[shown], ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
     return time.ravel(), error.reshape(-1, error.shape[2])
-
-
-def model_for(made: Extended, d: Diagnosis, run: Run) -> Model:
-    """Return a fitted model with the onsets and phases that a run has for itself."""
-    # Nobody asks how sure the values are.
-    size = len(made.fit.values)
-    frame, _ = tables.parameters(made.fit, d.baseline, Uncertainty(np.zeros((size, size)), 1.0, ()))
-    own = {term.effect.label: term for term in settled(made.fit, run, d.baseline)[0]}
-    model = model_from_parameters(frame, run.motion.run)
-    return Model(tuple(own.get(term.effect.label, term) for term in model))

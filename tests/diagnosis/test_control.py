@@ -54,9 +54,9 @@ def test_with_the_cause_named_the_loop_is_that_of_the_true_leg(sprung):
 
 
 def test_a_leg_that_cannot_exist_is_not_simulated_and_the_reason_is_told(sprung):
-    heavy = sprung.parameters.copy()
-    heavy.loc[heavy["name"] == "X3", "value"] = 9.0
-    told = control(replace(sprung, parameters=heavy))
+    heavy = sprung.after.fit.values.copy()
+    heavy[[p.name for p in RigidBody.linear].index("X3")] = 9.0
+    told = control(replace(sprung, after=replace(sprung.after, fit=replace(sprung.after.fit, values=heavy))))
     assert told["with"] is None
     assert told["without"] is not None
     assert told["reason"].startswith("with the causes: the with_human parameters are no real leg: X2 (X1 - X2) = ")

@@ -11,6 +11,7 @@ from pipelines.diagnosis import figures, replayed
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.error_budget import scatter_between_periods, shares_of_causes
 from pipelines.diagnosis.figures.against import against, binned_mean
+from pipelines.diagnosis.fitted_model import model_of_run
 from pipelines.diagnosis.observations import observe
 from pipelines.diagnosis.verdict import verdict
 from pipelines.dynamics.replay import replay
@@ -159,7 +160,7 @@ def test_a_tone_is_folded_onto_its_crest(diagnosed):
 
 def test_the_figures_models_stray_as_far_as_the_verdict_says(diagnosed):
     found, _ = diagnosed("explained")
-    errors = [replay(replayed.model_for(found.after, found, run), run.motion).error for run in found.validate]
+    errors = [replay(model_of_run(found.after.fit, found.baseline, run), run.motion).error for run in found.validate]
     pooled = np.concatenate([error.reshape(-1, 2) for error in errors])
     np.testing.assert_allclose(np.sqrt(np.mean(pooled**2, axis=0)), found.strayed["extended"], rtol=1e-6)
 

@@ -1,0 +1,29 @@
+"""A fit as a model, as replays and control loops take it: the one that ``parameters.parquet`` tells of."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipelines.diagnosis import tables
+from pipelines.diagnosis.evaluate import settled
+from pipelines.diagnosis.fit import Fit
+from pipelines.diagnosis.observations import Baseline, Run
+from pipelines.diagnosis.uncertainty import Uncertainty
+from pipelines.model import Model, model_from_parameters
+
+
+def fitted_model(made: Fit, baseline: Baseline, kind: str) -> Model:
+    """Return a fit as the model of a kind of run; what each run has for itself is as in the first one fitted."""
+    # Nobody asks how sure the values are.
+    size = len(made.values)
+    frame, _ = tables.parameters(made, baseline, Uncertainty(np.zeros((size, size)), 1.0, ()))
+    return model_from_parameters(frame, kind)
+
+
+def model_of_run(made: Fit, baseline: Baseline, run: Run) -> Model:
+    """Return a fit as the model of one run, with the onsets and phases that it has for itself."""
+    model = fitted_model(made, baseline, run.motion.run)
+    if not any(p.per_run for cause in made.causes for p in cause.effect.fitted):
+        return model
+    own = {term.effect.label: term.values for term in settled(made, run, baseline)[0]}
+    return Model(tuple(replace(t, values=own.get(t.effect.label, t.values)) for t in model))
