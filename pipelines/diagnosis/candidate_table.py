@@ -7,8 +7,7 @@ import pandas as pd
 
 from pipelines.diagnosis.choice import NEEDED, Ranked
 from pipelines.diagnosis.diagnose import Diagnosis, Extended
-from pipelines.diagnosis.evaluate import evaluate
-from pipelines.diagnosis.gain import errors_of, gain
+from pipelines.diagnosis.gain import gain
 from pipelines.effects import EFFECTS
 
 
@@ -55,8 +54,7 @@ def _evaluated(d: Diagnosis, labels: tuple[str, ...], ranked: Ranked | None) -> 
         return None
     if labels == d.choice.named.labels:
         return d.after
-    residuals = tuple(evaluate(ranked.fit, d.validate, d.baseline))
-    return Extended(ranked.fit, residuals, errors_of(d.validate, residuals))
+    return Extended.of(ranked.fit, d.validate, d.baseline)
 
 
 def _parameters(ranked: Ranked, d: Diagnosis) -> list[dict[str, Any]]:

@@ -55,6 +55,12 @@ class Extended:
     """(m, O) of each validation run."""
     errors: Errors
 
+    @classmethod
+    def of(cls, made: Fit, validate: Sequence[Run], baseline: Baseline) -> "Extended":
+        """Evaluate a fit on the validation runs."""
+        residuals = tuple(evaluate(made, validate, baseline))
+        return cls(made, residuals, errors_of(validate, residuals))
+
 
 @dataclass(frozen=True)
 class Diagnosis:
@@ -142,8 +148,8 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
     spoilt = any(fault.samples is None for fault in faults)
     evidence = _heard(bank.runs, left)
     choice = nothing_chosen(empty) if spoilt else choose(bank, noise_floor(bank.runs, left), evidence)
-    before = _extended(empty, validate, baseline)
-    after = _extended(choice.named.fit, validate, baseline)
+    before = Extended.of(empty, validate, baseline)
+    after = Extended.of(choice.named.fit, validate, baseline)
     floor = noise_floor(validate, after.residuals)
     standing = _standing(before, after, floor, validate)
     effects = [cause.effect for cause in choice.named.fit.causes]
@@ -204,14 +210,9 @@ def _dealt(motions: Sequence[Motion]) -> tuple[tuple[Run, ...], tuple[Run, ...]]
     )
 
 
-def _extended(made: Fit, validate: Sequence[Run], baseline: Baseline) -> Extended:
-    residuals = tuple(evaluate(made, validate, baseline))
-    return Extended(made, residuals, errors_of(validate, residuals))
-
-
 def _less(named: Ranked, label: str, bank: Bank, validate: Sequence[Run]) -> Extended:
     rest = [c for c in named.fit.causes if c.label != label]
-    return _extended(fit(rest, bank.runs, bank.baseline, bank.weights), validate, bank.baseline)
+    return Extended.of(fit(rest, bank.runs, bank.baseline, bank.weights), validate, bank.baseline)
 
 
 def _standing(before: Extended, after: Extended, floor: Floor, validate: Sequence[Run]) -> Standing:
