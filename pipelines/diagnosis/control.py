@@ -38,7 +38,7 @@ def control(d: Diagnosis) -> dict[str, Any]:
         "with": None,
         "reason": None,
     }
-    if any(fault.samples is None for fault in d.faults):
+    if d.spoilt:
         return told | {"reason": "acquisition is at fault: no model of these recordings can be trusted"}
     fits = {"without": d.before.fit, "with": d.after.fit} if d.causes else {"without": d.before.fit}
     reasons = [] if d.causes else ["no cause is named"]

@@ -99,6 +99,11 @@ class Diagnosis:
 
         return tuple(sorted(self.likely, key=order))
 
+    @property
+    def spoilt(self) -> list[Fault]:
+        """Faults of acquisition beside which no physics is blamed."""
+        return [fault for fault in self.faults if fault.spoils]
+
     def alike(self, label: str) -> dict[str, float]:
         """Return a named cause and those that cannot be told from it, with their probabilities."""
         from pipelines.diagnosis.ties import ALIKE
@@ -128,7 +133,7 @@ def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = s
     faults = tuple(find_faults(motions))
     sound = excluding(motions, faults)
     first = _look(sound, faults, report)
-    if first.status != "unknown_cause" or any(fault.samples is None for fault in faults):
+    if first.status != "unknown_cause" or first.spoilt:
         return first
     second = _look([slower(m) for m in sound], faults, report)
     named = {effect_named(label.partition("@")[0]) for label in second.causes}
@@ -144,8 +149,7 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
     validate = tuple(with_load(run, baseline, empty.values) for run in validate)
     report(SEARCH_SHARE, "combinations")
     left = residuals_on(empty, bank.runs, baseline)
-    # Where masking does not help, physics would be blamed for what acquisition did.
-    spoilt = any(fault.samples is None for fault in faults)
+    spoilt = any(fault.spoils for fault in faults)
     evidence = _heard(bank.runs, left)
     choice = nothing_chosen(empty) if spoilt else choose(bank, noise_floor(bank.runs, left), evidence)
     before = Extended.of(empty, validate, baseline)

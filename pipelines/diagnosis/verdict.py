@@ -34,8 +34,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
     """Return the verdict as JSON objects, keys as in docs/contracts.md."""
     first = d.validate[0]
     causes = _never_rising([_cause(d, label) for label in d.causes])
-    spoilt = any(fault.samples is None for fault in d.faults)
-    left = unknown(d) if d.status in ("unknown_cause", "partly_explained") and not spoilt else None
+    left = unknown(d) if d.status in ("unknown_cause", "partly_explained") and not d.spoilt else None
     return {
         "contract": "verdict/1",
         "status": d.status,
@@ -168,9 +167,8 @@ def _times(likely: float, other: float) -> str:
 
 
 def _summary(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -> str:
-    spoilt = [fault for fault in d.faults if fault.samples is None]
-    if spoilt:
-        return f"Acquisition, not physics: {_first_of(spoilt)}."
+    if d.spoilt:
+        return f"Acquisition, not physics: {_first_of(d.spoilt)}."
     said = _finding(d, causes, left)
     return f"{said} Left out as faults of acquisition: {_first_of(d.faults)}." if d.faults else said
 

@@ -23,6 +23,11 @@ class Fault:
     samples: NDArray | None = None
     """(n,) bool, the samples that must not be used; None where masking would not help."""
 
+    @property
+    def spoils(self) -> bool:
+        """Whether it spoils the whole recording: physics would be blamed for what acquisition did."""
+        return self.samples is None
+
 
 def column(motion: Motion, joint: int, quantity: str) -> str:
     """Return the name in the file of a quantity of joint number ``joint``."""

@@ -67,8 +67,7 @@ def _shape(axis: Axes, d: Diagnosis, said: dict[str, Any]) -> None:
     else:
         joint = max(said["noise_floor_nm"], key=lambda j: said["baseline_rmse_nm"][j] / said["noise_floor_nm"][j])
         # When a fault of acquisition sets in tells more than what it goes with.
-        spoilt = any(fault.samples is None for fault in d.faults)
-        variable, kinds = "time" if spoilt else said["depends_on"][joint][0]["variable"], RUNS
+        variable, kinds = "time" if d.spoilt else said["depends_on"][joint][0]["variable"], RUNS
     j = d.baseline.joints.index(joint)
     floor = float(d.floor.rms[j])
     seen = against(variable, d, joint, kinds)
