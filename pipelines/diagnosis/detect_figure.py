@@ -8,7 +8,7 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 
 from pipelines.diagnosis.detect import Detectable
-from pipelines.model import effect_named
+from pipelines.diagnosis.label import effect_labelled, title_in_words
 from pipelines.plots import BLUE, GREY, ORANGE, STYLE, save
 
 
@@ -70,6 +70,6 @@ def _note(one: Detectable) -> str:
 
 
 def _short(label: str, joint: str | None) -> str:
-    name, _, place = label.partition("@")
-    title = effect_named(name).title.lower()
-    return title if place in ("", joint) else f"{title} ({place})"
+    effect = effect_labelled(label)
+    title = title_in_words(effect)
+    return title if effect.joint in (None, joint) else f"{title} ({effect.joint})"

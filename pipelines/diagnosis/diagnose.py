@@ -28,6 +28,7 @@ from pipelines.diagnosis.fitted_model import model_of_run
 from pipelines.diagnosis.floor import Floor, noise_floor, slow_scatter
 from pipelines.diagnosis.gain import Errors, errors_of, scored
 from pipelines.diagnosis.impacts import evidence_of_play
+from pipelines.diagnosis.label import effect_labelled
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, observe, with_load
 from pipelines.diagnosis.search import imperfection, known_besides
 from pipelines.diagnosis.second_look import rings, slower
@@ -40,7 +41,6 @@ from pipelines.dynamics.replay import replay
 from pipelines.effects import Backlash
 from pipelines.errors import ExoidError, InputError
 from pipelines.mechanics.motion import Motion
-from pipelines.model import effect_named
 
 SEARCH_SHARE = 0.75
 """Of the progress bar that filling the bank takes."""
@@ -136,8 +136,7 @@ def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = s
     if first.status != "unknown_cause" or first.spoilt:
         return first
     second = _look([slower(m) for m in sound], faults, report)
-    named = {effect_named(label.partition("@")[0]) for label in second.causes}
-    return second if any(rings(effect) for effect in named) else first
+    return second if any(rings(effect_labelled(label)) for label in second.causes) else first
 
 
 def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable[[float, str], None]) -> Diagnosis:

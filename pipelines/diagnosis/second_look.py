@@ -41,6 +41,6 @@ def slower(motion: Motion) -> Motion:
     return replace(motion, q=q, dq=dq, ddq=ddq, valid=valid, cutoff_hz=CUTOFF_HZ, metadata=metadata, load=None)
 
 
-def rings(effect: type[Effect]) -> bool:
+def rings(effect: Effect) -> bool:
     """Tell whether an effect is a transmission that swings on its load."""
     return effect.spring is not None

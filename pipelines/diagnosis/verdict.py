@@ -11,6 +11,7 @@ from pipelines.diagnosis.diagnose import Diagnosis, summary_numbers
 from pipelines.diagnosis.error_budget import error_budget
 from pipelines.diagnosis.faults import Fault
 from pipelines.diagnosis.gain import gain
+from pipelines.diagnosis.label import effect_labelled, in_words
 from pipelines.diagnosis.status import AT_FLOOR, EXPLAINED
 from pipelines.diagnosis.ties import tie_between
 from pipelines.diagnosis.unknown import Unknown, unknown
@@ -71,24 +72,18 @@ def _depends_on(d: Diagnosis) -> dict[str, list[dict[str, Any]]]:
     }
 
 
-def _split(label: str) -> tuple[str, str | None]:
-    name, _, joint = label.partition("@")
-    return name, joint or None
-
-
 def _cause(d: Diagnosis, label: str) -> dict[str, Any]:
-    name, joint = _split(label)
-    effect = effect_named(name)(joint=joint)
+    effect = effect_labelled(label)
     alike = d.alike(label)
     worth = gain(d.without[label].errors, d.after.errors)
     named_joint = d.baseline.joints[worth.joint]
     floor = d.standing.floor[worth.joint]
     power = d.without[label].errors.rms[worth.joint] ** 2 - floor**2
     removed = d.without[label].errors.rms[worth.joint] ** 2 - d.after.errors.rms[worth.joint] ** 2
-    rows = _rows(d.parameters, name, joint)
+    rows = _rows(d.parameters, effect)
     return {
-        "effect": name,
-        "joint": joint,
+        "effect": effect.name,
+        "joint": effect.joint,
         "side": str(effect.side),
         "probability": _probability(d, sum(alike.values())),
         "parameters": [
@@ -113,11 +108,11 @@ def _of_a_run(effect: Effect, name: str) -> bool:
     return any(p.name == name and p.per_run for p in (*effect.linear, *effect.shape, *(effect.reported or ())))
 
 
-def _rows(frame: pd.DataFrame, name: str, joint: str | None) -> list[dict[str, Any]]:
-    here = frame["joint"].isna() if joint is None else frame["joint"] == joint
+def _rows(frame: pd.DataFrame, effect: Effect) -> list[dict[str, Any]]:
+    here = frame["joint"].isna() if effect.joint is None else frame["joint"] == effect.joint
     return [
         {str(k): (float(v) if k in ("value", "ci95_low", "ci95_high") else v) for k, v in row.items()}
-        for row in frame[(frame["effect"] == name) & here].to_dict("records")
+        for row in frame[(frame["effect"] == effect.name) & here].to_dict("records")
     ]
 
 
@@ -136,11 +131,11 @@ def _probability(d: Diagnosis, among_rivals: float) -> float:
 
 
 def _tie(effect: Effect, other: str, probability: float, d: Diagnosis) -> dict[str, Any]:
-    name, joint = _split(other)
-    tie = tie_between(effect.name, name, effect.confirm, effect_named(name).confirm)
+    rival = effect_labelled(other)
+    tie = tie_between(effect.name, rival.name, effect.confirm, rival.confirm)
     return {
-        "effect": name,
-        "joint": joint,
+        "effect": rival.name,
+        "joint": rival.joint,
         "why": tie.why,
         "how_to_separate": tie.how_to_separate,
         "probability": probability,
@@ -213,16 +208,10 @@ def _remains(d: Diagnosis, worst: int) -> str:
 
 def _in_words(cause: dict[str, Any]) -> str:
     """Return a cause, those that could stand in its place, and how probable all of these are together."""
-    alike = [_named(one["effect"], one["joint"]) for one in (cause, *cause["indistinguishable_from"])]
+    listed = (cause, *cause["indistinguishable_from"])
+    alike = [in_words(effect_named(one["effect"])(joint=one["joint"])) for one in listed]
     likely = f"{cause['probability']:.2f}"
     if len(alike) == 1:
         return f"{alike[0]} (probability {likely})"
     *most, last = [*alike[:MENTIONED], *([f"{len(alike) - MENTIONED} more"] if len(alike) > MENTIONED else [])]
     return f"{', '.join(most)} or {last}, which these data cannot tell apart (together {likely})"
-
-
-def _named(effect: str, joint: str | None) -> str:
-    title = effect_named(effect).title
-    # Names of people keep their capital.
-    title = title if title.startswith(("Coulomb", "Stribeck")) else title.lower()
-    return f"{title} at the {joint}" if joint else title

@@ -11,7 +11,8 @@ from matplotlib.patches import Patch
 
 from pipelines.diagnosis.diagnose import Diagnosis
 from pipelines.diagnosis.error_budget import FLOOR, LEFT, REPEATS, WANDERS
-from pipelines.diagnosis.figures.palette import AFTER, CAUSE, NOISE, in_words
+from pipelines.diagnosis.figures.palette import AFTER, CAUSE, NOISE
+from pipelines.diagnosis.label import effect_labelled, in_words
 
 WORDS = {
     FLOOR: "noise floor",
@@ -56,7 +57,7 @@ def colours_of(budget: Mapping[str, Mapping[str, float]]) -> dict[str, str]:
 
 def words_of(key: str) -> str:
     """Say what a share is."""
-    return WORDS.get(key) or in_words(key)
+    return WORDS.get(key) or in_words(effect_labelled(key))
 
 
 def stack(axis: Axes, row: float, shares: Mapping[str, float], colours: Mapping[str, str], scale: float = 1.0) -> None:

@@ -14,7 +14,8 @@ from pipelines.diagnosis.dependence import VARIABLES, knows, tone, variable_shar
 from pipelines.diagnosis.diagnose import Diagnosis
 from pipelines.diagnosis.figures.against import against, draw, reach
 from pipelines.diagnosis.figures.budget import colours_of, highest, lowest, stack, words_of
-from pipelines.diagnosis.figures.palette import AFTER, BEFORE, NOISE, in_words
+from pipelines.diagnosis.figures.palette import AFTER, BEFORE, NOISE
+from pipelines.diagnosis.label import effect_labelled, in_words
 from pipelines.effects import RUNS
 from pipelines.model import effect_named
 
@@ -74,7 +75,8 @@ def _shape(axis: Axes, d: Diagnosis, said: dict[str, Any]) -> None:
     draw(axis, seen, floor, max(reach(seen.before, seen.after), 2 * floor), bool(d.causes))
     axis.set_ylabel(f"{joint} torque error, N·m")
     lines = [("rigid body and friction", BEFORE)]
-    lines += [("with " + " and ".join(in_words(label) for label in d.causes), AFTER)] if d.causes else []
+    named = " and ".join(in_words(effect_labelled(label)) for label in d.causes)
+    lines += [(f"with {named}", AFTER)] if d.causes else []
     handles = [Line2D([], [], color=colour, lw=2) for _, colour in lines] + [Patch(color=NOISE, alpha=0.5)]
     axis.legend(handles, [words for words, _ in lines] + ["noise floor"], loc="upper left",
                 bbox_to_anchor=(-0.02, -0.2), fontsize=8)  # fmt: skip

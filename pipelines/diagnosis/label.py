@@ -1,0 +1,24 @@
+"""A cause's label, ``effect@joint`` (see ``Effect.label``): whose it is, and how sentences say it."""
+
+from pipelines.effects import Effect
+from pipelines.model import effect_named
+
+NAMES = ("Coulomb", "Stribeck")
+"""Of people, whose capital stays."""
+
+
+def effect_labelled(label: str) -> Effect:
+    """Return the effect that ``cogging@knee`` is the label of."""
+    name, _, joint = label.partition("@")
+    return effect_named(name)(joint=joint or None)
+
+
+def title_in_words(effect: Effect) -> str:
+    """Return an effect's title as it stands within a sentence."""
+    return effect.title if effect.title.startswith(NAMES) else effect.title.lower()
+
+
+def in_words(effect: Effect) -> str:
+    """Return an effect and where it is: ``cogging at the knee``."""
+    title = title_in_words(effect)
+    return f"{title} at the {effect.joint}" if effect.joint else title
