@@ -31,7 +31,7 @@ from pipelines.diagnosis.impacts import evidence_of_play
 from pipelines.diagnosis.label import effect_labelled
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, observe, with_load
 from pipelines.diagnosis.search import imperfection, known_besides
-from pipelines.diagnosis.second_look import rings, slower
+from pipelines.diagnosis.second_look import slower
 from pipelines.diagnosis.session import refuse_unfit
 from pipelines.diagnosis.slow import slow_error
 from pipelines.diagnosis.status import WANDERING, Standing, status_of
@@ -136,7 +136,7 @@ def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = s
     if first.status != "unknown_cause" or first.spoilt:
         return first
     second = _look([slower(m) for m in sound], faults, report)
-    return second if any(rings(effect_labelled(label)) for label in second.causes) else first
+    return second if any(effect_labelled(label).rings for label in second.causes) else first
 
 
 def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable[[float, str], None]) -> Diagnosis:
@@ -158,7 +158,7 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
     effects = [cause.effect for cause in choice.named.fit.causes]
     hums = standing.hums(strongest_tone(validate, after.residuals)[: len(baseline.joints)])
     wanders = bool(np.any(slow_scatter(validate, after.residuals)[: len(baseline.joints)] > WANDERING))
-    foreign = hums or (wanders and not any(p.per_run for effect in effects for p in effect.fitted))
+    foreign = hums or (wanders and not any(effect.per_run for effect in effects))
     # Play rings on as it likes: what no model follows there is no reason to doubt what was heard in these runs too.
     heard = known_besides(choice.named.fit.causes, _heard(validate, before.residuals)) > NEEDED
     if effects and not heard and (foreign or not standing.held_up(effects)):

@@ -29,7 +29,7 @@ def evaluate(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> list[NDArray]
 
 def _residual(fit: Fit, run: Run, baseline: Baseline) -> NDArray:
     effects = [cause.effect for cause in fit.causes]
-    if not any(p.per_run for e in effects for p in e.fitted if e.explains(run.motion)):
+    if not any(effect.per_run and effect.explains(run.motion) for effect in effects):
         columns, measured = columns_under([_shared_term(c) for c in fit.causes], run, baseline)
         return measured - columns @ _shared_values(fit, baseline)[0]
     left = np.zeros_like(run.measured)

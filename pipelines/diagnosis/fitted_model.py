@@ -23,7 +23,7 @@ def fitted_model(made: Fit, baseline: Baseline, kind: str) -> Model:
 def model_of_run(made: Fit, baseline: Baseline, run: Run) -> Model:
     """Return a fit as the model of one run, with the onsets and phases that it has for itself."""
     model = fitted_model(made, baseline, run.motion.run)
-    if not any(p.per_run for cause in made.causes for p in cause.effect.fitted):
+    if not any(cause.effect.per_run for cause in made.causes):
         return model
     own = {term.effect.label: term.values for term in settled(made, run, baseline)[0]}
     return Model(tuple(replace(t, values=own.get(t.effect.label, t.values)) for t in model))

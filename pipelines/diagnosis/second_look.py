@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipelines.effects import Effect
 from pipelines.mechanics.motion import Motion
 from pipelines.signals.blocks import BlockAverage
 from pipelines.signals.low_pass import derivative, low_pass, shortest
@@ -39,8 +38,3 @@ def slower(motion: Motion) -> Motion:
     }  # fmt: skip
     metadata = {**motion.metadata, "regression_filter": filters}
     return replace(motion, q=q, dq=dq, ddq=ddq, valid=valid, cutoff_hz=CUTOFF_HZ, metadata=metadata, load=None)
-
-
-def rings(effect: Effect) -> bool:
-    """Tell whether an effect is a transmission that swings on its load."""
-    return effect.spring is not None

@@ -72,10 +72,10 @@ class Standing:
         worst = int(np.argmax(before.sureness[:J]))
         plain = self.systematic(self.slow_after)[worst] and self.slow_after.sureness[worst] > PLAIN
         left = self._power(self.slow_after)[worst] / max(self._power(before)[worst], 1e-12)
-        if not plain or any(effect.spring is not None for effect in effects):
+        if not plain or any(effect.rings for effect in effects):
             return True
         if len(effects) < 3:
-            return bool(left < FOREIGN) or any(p.per_run for effect in effects for p in effect.fitted)
+            return bool(left < FOREIGN) or any(effect.per_run for effect in effects)
         return bool(left < FOREIGN / 3)
 
     @staticmethod

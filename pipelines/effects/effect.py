@@ -134,6 +134,16 @@ class Effect(ABC):
         return f"{self.name}@{self.joint}" if self.joint else self.name
 
     @property
+    def per_run(self) -> bool:
+        """Tell whether each run has some value of it for itself, as an onset or a phase."""
+        return any(p.per_run for p in self.fitted)
+
+    @property
+    def rings(self) -> bool:
+        """Tell whether it is a transmission that swings on its load."""
+        return self.spring is not None
+
+    @property
     def on_limb(self) -> bool:
         """Tell whether it sits on the wearer's side of the cuffs."""
         return self.side is Side.HUMAN or self.run == "with_human"
