@@ -35,6 +35,7 @@ from pipelines.diagnosis.second_look import slower
 from pipelines.diagnosis.session import refuse_unfit
 from pipelines.diagnosis.slow import slow_error
 from pipelines.diagnosis.status import WANDERING, Standing, status_of
+from pipelines.diagnosis.ties import ALIKE
 from pipelines.diagnosis.tone import strongest_tone
 from pipelines.diagnosis.uncertainty import Uncertainty, uncertainty
 from pipelines.dynamics.replay import replay
@@ -106,8 +107,6 @@ class Diagnosis:
 
     def alike(self, label: str) -> dict[str, float]:
         """Return a named cause and those that cannot be told from it, with their probabilities."""
-        from pipelines.diagnosis.ties import ALIKE
-
         odds = self.likely[label]
         return {other: p for other, p in odds.items() if p >= ALIKE * odds[label]}
 
