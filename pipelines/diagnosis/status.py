@@ -64,19 +64,23 @@ class Standing:
         a rhythm that wanders.
         """
         before = self.slow_before.over(self.slow_after)
-        J = len(self.floor)
         if np.sum(self._power(self.slow_after)) > (1.0 - HELD_UP) * np.sum(self._power(before)):
             return False
         if np.sum((self.extended / self.floor) ** 2) > np.sum((self.baseline / self.floor) ** 2):
             return False
-        worst = int(np.argmax(before.sureness[:J]))
+        worst, left = self._left_at_the_worst()
         plain = self.systematic(self.slow_after)[worst] and self.slow_after.sureness[worst] > PLAIN
-        left = self._power(self.slow_after)[worst] / max(self._power(before)[worst], 1e-12)
         if not plain or any(effect.rings for effect in effects):
             return True
         if len(effects) < 3:
-            return bool(left < FOREIGN) or any(effect.per_run for effect in effects)
-        return bool(left < FOREIGN / 3)
+            return left < FOREIGN or any(effect.per_run for effect in effects)
+        return left < FOREIGN / 3
+
+    def _left_at_the_worst(self) -> tuple[int, float]:
+        """Return the joint where the systematic error was surest, and the share of its power that is left there."""
+        before = self.slow_before.over(self.slow_after)
+        worst = int(np.argmax(before.sureness[: len(self.floor)]))
+        return worst, float(self._power(self.slow_after)[worst] / max(self._power(before)[worst], 1e-12))
 
     @staticmethod
     def _power(slow: SlowError) -> NDArray:
@@ -90,9 +94,7 @@ class Standing:
         1 where they leave nothing; a half, plus half of the share explained, where they plainly leave some: so often
         were they right on tuning sessions.
         """
-        before = self.slow_before.over(self.slow_after)
-        worst = int(np.argmax(before.sureness[: len(self.floor)]))
-        left = self._power(self.slow_after)[worst] / max(self._power(before)[worst], 1e-12)
+        worst, left = self._left_at_the_worst()
         sure = np.clip(self.slow_after.sureness[worst] / PLAIN, 0.0, 1.0)
         return float(1.0 - 0.5 * min(left, 1.0) * sure)
 
