@@ -135,11 +135,16 @@ def signatures(
         for r, run in enumerate(runs)
     ]  # fmt: skip
     values = solve(gram_of_runs(runs, *zip(*under, strict=True)), weights)
-    size = baseline.size
     return [
-        (columns @ values - plain @ values[:size] - (measured - run.measured))[:, :, np.newaxis]
+        bent_column(columns, measured, values, plain, run)
         for (columns, measured), plain, run in zip(under, untouched, runs, strict=True)
     ]
+
+
+def bent_column(columns: NDArray, measured: NDArray, values: NDArray, untouched: NDArray, run: Run) -> NDArray:
+    """Return what the bent baseline's ``columns`` and ``measured`` torque add to the untouched ones, (m, O, 1) N·m."""
+    plain = untouched @ values[: untouched.shape[2]]
+    return (columns @ values - plain - (measured - run.measured))[:, :, np.newaxis]
 
 
 def torque_columns(candidate: Candidate, number: int, run: Run) -> NDArray:

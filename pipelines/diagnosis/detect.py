@@ -23,6 +23,7 @@ from scipy.stats import ncx2
 
 from pipelines.diagnosis.candidates import (
     Candidate,
+    bent_column,
     columns_under,
     expanded,
     expanded_columns,
@@ -387,13 +388,10 @@ def neutral(parameter: Parameter) -> float:
 
 def _bend(candidate: Candidate, sight: Sight) -> list[NDArray]:
     """Return what the bent baseline adds to the untouched one, (m, O, 1) of each run."""
-    made = []
-    size = sight.baseline.size
-    for r, run in enumerate(sight.runs):
-        columns, measured = columns_under([candidate.term(r)], run, sight.baseline)
-        added = columns[:, :, :size] @ sight.values - sight.untouched[r] @ sight.values - (measured - run.measured)
-        made.append(added[:, :, np.newaxis])
-    return made
+    return [
+        bent_column(*columns_under([candidate.term(r)], run, sight.baseline), sight.values, sight.untouched[r], run)
+        for r, run in enumerate(sight.runs)
+    ]
 
 
 def _growth(effect: Effect, left: NDArray, raw: NDArray, columns: int, sight: Sight, power: float) -> tuple[float, str]:
