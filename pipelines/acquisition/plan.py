@@ -108,6 +108,12 @@ def _extended(trajectory: Trajectory, time: NDArray) -> NDArray:
     return trajectory.at(np.mod(time, trajectory.period_s) if trajectory.period_s else time)[0]
 
 
+def _first_outside(values: NDArray, low: float, high: float) -> int | None:
+    """Return where values (n,) first leave a range or are no numbers; None where all of them keep it."""
+    outside = ~((values >= low) & (values <= high))
+    return int(np.argmax(outside)) if outside.any() else None
+
+
 def _refuse_ramps_outside(rig: RigSettings, plan: Plan, rest: NDArray, rate: float) -> None:
     """Refuse a plan whose ways into and out of the run, or the seams between, leave the drives' limits.
 
@@ -116,17 +122,14 @@ def _refuse_ramps_outside(rig: RigSettings, plan: Plan, rest: NDArray, rate: flo
     speed = np.diff(np.vstack([rest, plan.reference, rest]), axis=0) * rate
     for j, drive in enumerate(rig.drive):
         low, high = drive.angle_rad
-        outside = ~((plan.reference[:, j] >= low) & (plan.reference[:, j] <= high))  # NaN too
-        if outside.any():
-            k = int(np.argmax(outside))
+        if (k := _first_outside(plan.reference[:, j], low, high)) is not None:
             raise InputError(
                 f"the {drive.joint} would be at {plan.reference[k, j]:.3f} rad on the way "
                 f"{'into' if k < plan.first else 'out of'} the run, but the rig allows {low:g} to {high:g} rad; make "
                 "the excitation smaller, or record a whole period of it to see where it leaves the limits"
             )
-        fast = ~(np.abs(speed[:, j]) <= drive.speed_rad_s * (1.0 + 1e-9))
-        if fast.any():
-            k = int(np.argmax(fast))
+        fastest = drive.speed_rad_s * (1.0 + 1e-9)
+        if (k := _first_outside(speed[:, j], -fastest, fastest)) is not None:
             raise InputError(
                 f"the {drive.joint} would move at {speed[k, j]:.3f} rad/s {(k - plan.first) / rate:.3f} s after the "
                 f"run's beginning, but the rig allows {drive.speed_rad_s:g} rad/s; make the excitation slower"
@@ -139,17 +142,13 @@ def _refuse_outside(rig: RigSettings, run: NDArray, time: NDArray, rate: float) 
     speed = np.diff(run, axis=0) * rate
     for j, drive in enumerate(rig.drive):
         low, high = drive.angle_rad[0] + margin, drive.angle_rad[1] - margin
-        outside = ~((run[:, j] >= low) & (run[:, j] <= high))  # NaN too
-        if outside.any():
-            k = int(np.argmax(outside))
+        if (k := _first_outside(run[:, j], low, high)) is not None:
             raise InputError(
                 f"the {drive.joint} would be at {run[k, j]:.3f} rad at {time[k]:.3f} s, but the rig allows "
                 f"{low:g} to {high:g} rad (its limits less angle_margin_rad); make the excitation smaller, or design "
                 "it within the rig's limits"
             )
-        fast = ~(np.abs(speed[:, j]) <= drive.speed_rad_s)
-        if fast.any():
-            k = int(np.argmax(fast))
+        if (k := _first_outside(speed[:, j], -drive.speed_rad_s, drive.speed_rad_s)) is not None:
             raise InputError(
                 f"the {drive.joint} would move at {speed[k, j]:.3f} rad/s at {time[k]:.3f} s, but the rig "
                 f"allows {drive.speed_rad_s:g} rad/s; make the excitation slower or smaller"
