@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.diagnosis.dependence import Dependence, dependences, describe, excesses
+from pipelines.diagnosis.dependence import Dependence, describe, excesses
 from pipelines.diagnosis.diagnose import Diagnosis
 from pipelines.diagnosis.fit import residuals_on
 from pipelines.diagnosis.gain import errors_of
@@ -34,10 +34,12 @@ class Unknown:
         }
 
 
-def unknown(d: Diagnosis) -> Unknown:
-    """Describe the residual of validation runs and extend the model by a smooth term learnt on train runs."""
+def unknown(d: Diagnosis, found: list[Dependence]) -> Unknown:
+    """Describe the residual of validation runs and extend the model by a smooth term learnt on train runs.
+
+    ``found`` is what the extended model's residual depends on.
+    """
     term = smooth_term(d.train, residuals_on(d.after.fit, d.train, d.baseline))
-    found = dependences(d.validate, list(d.after.residuals))
     above = excesses(d.validate, list(d.after.residuals), d.floor)
     left = [r - np.nan_to_num(term.torque(run)) for run, r in zip(d.validate, d.after.residuals, strict=True)]
     rms = errors_of(d.validate, left).rms

@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from pipelines.diagnosis.control import control
-from pipelines.diagnosis.dependence import dependences
+from pipelines.diagnosis.dependence import Dependence, dependences
 from pipelines.diagnosis.diagnose import Diagnosis, summary_numbers
 from pipelines.diagnosis.error_budget import error_budget
 from pipelines.diagnosis.faults import Fault
@@ -35,7 +35,9 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
     """Return the verdict as JSON objects, keys as in docs/contracts.md."""
     first = d.validate[0]
     causes = _never_rising([_cause(d, label) for label in d.causes])
-    left = unknown(d) if d.status in ("unknown_cause", "partly_explained") and not d.spoilt else None
+    before = dependences(d.validate, d.before.residuals)
+    after = dependences(d.validate, d.after.residuals) if d.causes else before
+    left = unknown(d, after) if d.status in ("unknown_cause", "partly_explained") and not d.spoilt else None
     return {
         "contract": "verdict/1",
         "status": d.status,
@@ -48,7 +50,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         **summary_numbers(d),
         "control": control(d),
         "error_budget": error_budget(d),
-        "depends_on": _depends_on(d),
+        "depends_on": _depends_on(before, after),
         "causes": causes,
         "data_faults": [{"file": f.file, "channel": f.channel, "what": f.what} for f in d.faults],
         "residual": left.as_json() if left else None,
@@ -57,10 +59,8 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _depends_on(d: Diagnosis) -> dict[str, list[dict[str, Any]]]:
+def _depends_on(before: Sequence[Dependence], after: Sequence[Dependence]) -> dict[str, list[dict[str, Any]]]:
     """Return what each joint's residual goes with, most first, as the baseline and as the extended model leave it."""
-    before = dependences(d.validate, d.before.residuals)
-    after = dependences(d.validate, d.after.residuals) if d.causes else before
     left = {(one.joint, one.variable): one.share for one in after}
     return {
         joint: [
@@ -68,7 +68,7 @@ def _depends_on(d: Diagnosis) -> dict[str, list[dict[str, Any]]]:
             for one in before
             if one.joint == joint
         ]
-        for joint in d.baseline.joints
+        for joint in dict.fromkeys(one.joint for one in before)
     }
 
 
