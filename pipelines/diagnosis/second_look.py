@@ -36,5 +36,9 @@ def slower(motion: Motion) -> Motion:
     filters = {
         "kind": "block_average", "order": 1, "cutoff_hz": block.cutoff_hz(rate), "decimation": block.decimation,
     }  # fmt: skip
-    metadata = {**motion.metadata, "regression_filter": filters}
-    return replace(motion, q=q, dq=dq, ddq=ddq, valid=valid, cutoff_hz=CUTOFF_HZ, metadata=metadata, load=None)
+    return replace(
+        motion, q=q, dq=dq, ddq=ddq, valid=valid, cutoff_hz=CUTOFF_HZ,
+        metadata={**motion.metadata, "regression_filter": filters},
+        # What a fit to the faster motion estimated is not that of this one.
+        load=None, limb_load=None, body=None, limb_body=None,
+    )  # fmt: skip
