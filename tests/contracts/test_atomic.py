@@ -25,7 +25,7 @@ def test_a_folder_in_which_nobody_can_write_is_refused_by_its_name():
 
 @of_linux
 def test_a_full_disk_is_refused_though_it_takes_names(tmp_path, monkeypatch):
-    monkeypatch.setattr(atomic.tempfile, "TemporaryFile", lambda dir: open("/dev/full", "wb"))
+    monkeypatch.setattr(atomic.tempfile, "TemporaryFile", lambda dir: open("/dev/full", "wb"))  # noqa: SIM115
     with pytest.raises(OSError) as refused:
         open_folder(tmp_path)
     assert (refused.value.errno, refused.value.filename) == (errno.ENOSPC, str(tmp_path))
