@@ -79,7 +79,7 @@ def _show(said: dict[str, Any], output: Path) -> None:
              "at the floor" if said["unexplained"][joint] is None else f"{said['unexplained'][joint]:.0%}")
             for joint in joints
         ],
-        title="torque error on runs no fit has seen, N·m; excess: mean square above the floor",
+        title="torque error on runs no fit has seen, N·m",
         numbers="noise floor, rigid + friction, with the causes, excess left",
     )  # fmt: skip
     if said["causes"]:

@@ -1,6 +1,7 @@
 """The runs that a diagnosis is given: of one hip and knee, whose joints move for long enough to say anything."""
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +28,19 @@ def refuse_unfit(motions: Sequence[Motion]) -> None:
                 "the causes are written for a leg of these two; use `exoid identify` for other machines"
             )
     refuse_several_machines(motions)
+    _refuse_twins(motions)
     for purpose, run in sorted({(m.purpose, m.run) for m in motions}):
         _refuse_standstill([m for m in motions if (m.purpose, m.run) == (purpose, run)])
+
+
+def _refuse_twins(motions: Sequence[Motion]) -> None:
+    """Refuse one measurement under two names: an error would pass for one of a run that no fit has seen."""
+    for one, other in combinations(motions, 2):
+        if np.array_equal(one.q, other.q) and np.array_equal(one.torque, other.torque):
+            raise InputError(
+                f"{other.file} ({other.run}, {other.purpose}) holds the same torques and angles as {one.file} "
+                f"({one.run}, {one.purpose}), expected a measurement of its own in each; give each run once"
+            )
 
 
 def _refuse_standstill(motions: Sequence[Motion]) -> None:

@@ -41,6 +41,13 @@ def test_two_seconds_with_the_human_are_not_made_up_for_by_a_long_run_without(mo
         diagnose([*rest, short])
 
 
+def test_a_run_is_not_validated_on_itself(motions):
+    train = [m for m in motions if m.purpose == "train"]
+    again = [replace(m, purpose="validate", file=f"copy_of_{m.file}") for m in train]
+    with pytest.raises(InputError, match=rf"copy_of_{train[0].file} \(exo_alone, validate\) holds the same torques"):
+        diagnose([*train, *again])
+
+
 def test_joints_that_take_turns_are_never_scored_and_refused(motions):
     half = [np.arange(len(m)) < len(m) // 2 for m in motions]
     taking_turns = [
