@@ -1,10 +1,11 @@
 """The commands of exoid, and the one place where an error becomes a line and an exit code.
 
-0 is success, 1 a fault of exoid itself, 2 the user's to mend, 3 a device's, 130 a stop by Ctrl-C.
+0 is success, 1 a fault of exoid itself, 2 the user's to mend, 3 a device's, 130 a stop by Ctrl-C, 143 one by SIGTERM.
 """
 
 import errno
 import os
+import signal
 import sys
 import tempfile
 import time
@@ -74,8 +75,14 @@ def options(
     console.configure(quiet=quiet, json=json)
 
 
+INTERRUPTED, TERMINATED = 128 + signal.SIGINT, 128 + signal.SIGTERM
+"""Exit codes of a stop by a signal, as shells have them."""
+
+
 def main() -> NoReturn:
     """Run exoid as the shell's command."""
+    # As an exception: what is half written is cleared away, as it is after Ctrl-C.
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(TERMINATED))
     sys.exit(run(sys.argv[1:]))
 
 
@@ -83,12 +90,7 @@ def run(arguments: Sequence[str]) -> int:
     """Run one command line and return its exit code."""
     console.configure()
     try:
-        command = typer.main.get_command(app)
-        # Not standalone: typer would print a box of several lines for a mistyped option.
-        return (
-            command.main(args=_global_options_first(arguments or ["--help"]), prog_name="exoid", standalone_mode=False)
-            or 0
-        )
+        return _command_line(arguments)
     except ExoidError as error:
         console.fail(str(error))
         return error.exit_code
@@ -96,13 +98,26 @@ def run(arguments: Sequence[str]) -> int:
         return _usage_error(error)
     except KeyboardInterrupt:
         console.fail("stopped by Ctrl-C")
-        return 130
+        return INTERRUPTED
+    except SystemExit as stop:
+        if stop.code == TERMINATED:
+            console.fail("stopped by SIGTERM")
+        raise
     except OSError as error:
         console.fail(_about_the_system(error))
         return 2
     except Exception as error:
         console.fail(f"exoid itself failed: {type(error).__name__}: {error}; please report it, {_keep_traceback()}")
         return 1
+
+
+def _command_line(arguments: Sequence[str]) -> int:
+    command = typer.main.get_command(app)
+    # Not standalone: typer would print a box of several lines for a mistyped option.
+    code = command.main(args=_global_options_first(arguments or ["--help"]), prog_name="exoid", standalone_mode=False)
+    if code == INTERRUPTED:
+        raise KeyboardInterrupt  # of which typer makes an exit code, and says nothing
+    return code or 0
 
 
 def _global_options_first(arguments: Sequence[str]) -> list[str]:

@@ -47,7 +47,7 @@ class Console:
         """Print a table for a person; headings named in ``numbers`` (comma-separated) are set to the right."""
         if not self.speaks:
             return
-        right = {name.strip() for name in numbers.split(",")}
+        right = {name.strip() for name in numbers.split(",") if name.strip()}
         table = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False)
         for heading in headings:
             table.add_column(heading, justify="right" if heading in right else "left", overflow="fold")

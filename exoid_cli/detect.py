@@ -36,10 +36,13 @@ def detect(
     Examples: exoid detect trajectory.parquet -o detectable/,
     exoid detect recordings/*.parquet --power 0.95
     """
+    from pipelines.contracts.atomic import open_folder, write_text
     from pipelines.diagnosis.detect import as_json
     from pipelines.settings import Experiment
 
     experiment = Experiment.load(config) if config else Experiment()
+    if output:
+        open_folder(output)
     with console.progress("Looking", total=1.0) as report:
         if _is_trajectory(files):
             found = _planned(files, experiment, rig, runs, power, report)
@@ -47,10 +50,9 @@ def detect(
             found = _recorded(files, experiment, power, report)
     told = {"files": [str(file) for file in files], "power": power, **as_json(found)}
     if output:
-        from pipelines.contracts.atomic import write_text
         from pipelines.diagnosis.detect_figure import draw
 
-        write_text(output / "detectability.json", json.dumps(told, ensure_ascii=False, indent=1))
+        write_text(output / "detectability.json", json.dumps(told, ensure_ascii=False, indent=1) + "\n")
         draw(found, output / "detectability", f"What {', '.join(file.name for file in files)} would reveal")
     console.emit(told)
     _show(found)
@@ -73,7 +75,8 @@ def _planned(files: Sequence[Path], experiment: Any, rig: Path | None, runs: str
     from pipelines.diagnosis.detect import detectability
     from pipelines.diagnosis.observations import baseline_of, observe
     from pipelines.diagnosis.planned import planned_motions, planned_noise
-    from pipelines.errors import InputError
+    from pipelines.diagnosis.session import refuse_unfit
+    from pipelines.errors import InputError, about
     from pipelines.mechanics.trajectory import read_trajectory
     from pipelines.settings.plant import PlantSettings
     from pipelines.settings.rig import load_rig
@@ -86,6 +89,8 @@ def _planned(files: Sequence[Path], experiment: Any, rig: Path | None, runs: str
     design = experiment.design
     kinds = ("exo_alone", "with_human") if runs == "both" else (runs,)
     motions = planned_motions(read_trajectory(files[0]), plant, design.noise, kinds, design.sample_rate_hz)
+    with about(files[0]):
+        refuse_unfit(motions)
     observed = [observe(motion) for motion in motions]
     noise = planned_noise(design.noise, design.sample_rate_hz, observed[0].block)
     return detectability(observed, baseline_of(observed), noise, power, report)

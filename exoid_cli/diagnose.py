@@ -22,7 +22,7 @@ def diagnose(
     Example: exoid diagnose recordings/*.parquet --out diagnosed/
     """
     from pipelines.contracts import CANDIDATES, PARAMETERS, RESIDUALS, describe
-    from pipelines.contracts.atomic import write_text
+    from pipelines.contracts.atomic import open_folder, write_text
     from pipelines.diagnosis.candidate_table import candidates
     from pipelines.diagnosis.detect import as_json, detectability
     from pipelines.diagnosis.diagnose import diagnose as find
@@ -36,7 +36,7 @@ def diagnose(
     for name, contract in tables.items():
         contract.refuse_place(output / f"{name}.parquet")
     motions = read_motions(files, settings.filter, geometry_from(settings.mechanism))
-    output.mkdir(parents=True, exist_ok=True)
+    open_folder(output)
     with console.progress("diagnosing", 1.0) as report:
         found = find(motions, report)
     said = verdict(found)
@@ -54,7 +54,9 @@ def diagnose(
     (output / "verdict.json").unlink(missing_ok=True)
     for name, contract in tables.items():
         contract.write(output / f"{name}.parquet", frames[name], shared | (model if name == "parameters" else {}))
-    write_text(output / "detectability.json", json.dumps(visible, indent=1, ensure_ascii=False) + "\n")
+    write_text(
+        output / "detectability.json", json.dumps(visible | {"provenance": shared}, indent=1, ensure_ascii=False) + "\n"
+    )
     for old in (output / f"{name}.{kind}" for name in FIGURES for kind in ("png", "pdf")):
         old.unlink(missing_ok=True)
     if figures:
@@ -71,14 +73,14 @@ def _show(said: dict[str, Any], output: Path) -> None:
     console.say("")
     joints = list(said["noise_floor_nm"])
     console.table(
-        ("joint", "noise floor", "rigid + friction", "with the causes", "unexplained"),
+        ("joint", "noise floor", "rigid + friction", "with the causes", "excess left"),
         [
             (joint, *(f"{said[key][joint]:.3f}" for key in ("noise_floor_nm", "baseline_rmse_nm", "extended_rmse_nm")),
              "at the floor" if said["unexplained"][joint] is None else f"{said['unexplained'][joint]:.0%}")
             for joint in joints
         ],
         title="torque error on runs no fit has seen, N·m",
-        numbers="noise floor, rigid + friction, with the causes, unexplained",
+        numbers="noise floor, rigid + friction, with the causes, excess left",
     )  # fmt: skip
     if said["causes"]:
         console.say(_control(said["control"]))
@@ -86,14 +88,21 @@ def _show(said: dict[str, Any], output: Path) -> None:
         where = f" at the {cause['joint']}" if cause["joint"] else ""
         console.say(f"\n{cause['effect']}{where} ({cause['side']}), probability {cause['probability']:.2f}")
         for p in cause["parameters"]:
-            low, high = p["ci95"]
-            console.say(f"  {p['name']} {p['value']:.4g} {p['unit']} ({low:.4g} … {high:.4g})")
+            console.say(f"  {_in_words(p)}")
         for sentence in cause["evidence"]:
             console.say(f"  - {sentence}")
         for tie in cause["indistinguishable_from"]:
             other = f"{tie['effect']}@{tie['joint']}" if tie["joint"] else tie["effect"]
             console.say(f"  or {other}: {tie['why']}; {tie['how_to_separate']}")
     console.say(f"\n{output}: verdict.json, parameters, residuals, candidates, detectability.json")
+
+
+def _in_words(parameter: dict[str, Any]) -> str:
+    """Return a parameter with its interval; what was chosen among a few values has none."""
+    low, high = parameter["ci95"]
+    unit = "" if parameter["unit"] == "1" else f" {parameter['unit']}"
+    sure = "as chosen among a few values" if low == high else f"{low:.4g} … {high:.4g}"
+    return f"{parameter['name']} {parameter['value']:.4g}{unit} ({sure})"
 
 
 def _control(said: dict[str, Any]) -> str:

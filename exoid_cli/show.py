@@ -9,7 +9,7 @@ from exoid_cli.console import console
 
 
 def show(
-    file: Annotated[Path, typer.Argument(help="A Parquet file of exoid's, verdict.json, or a trajectory as TOML.")],
+    file: Annotated[Path, typer.Argument(help="A Parquet or JSON file of exoid's, or a trajectory as TOML.")],
 ) -> None:
     """Say what an exoid file is, where it came from, and its columns with units and ranges.
 

@@ -2,6 +2,7 @@
 
 import os
 import secrets
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -29,6 +30,17 @@ def whole_file(path: Path) -> Iterator[Path]:
         raise
     with suppress(OSError):  # some file systems cannot sync a folder; the file itself is safe
         _sync(path.parent)
+
+
+def open_folder(path: Path) -> None:
+    """Make a folder; where nothing can be written in it, raise the system's refusal before the work, not after it."""
+    path.mkdir(parents=True, exist_ok=True)
+    try:
+        with tempfile.TemporaryFile(dir=path) as probe:
+            probe.write(b"exoid")  # a full disk takes names still, but no bytes
+    except OSError as error:
+        error.filename = str(path)
+        raise
 
 
 def write_text(path: Path, text: str) -> None:

@@ -37,8 +37,8 @@ class Inspection:
 
 
 def inspect(path: Path) -> Inspection:
-    """Describe a Parquet file of exoid's, a verdict, or a trajectory as TOML, told apart by their content."""
-    for reader in (_verdict, _trajectory_toml):
+    """Describe a Parquet file of exoid's, one of its JSON documents, or a trajectory as TOML, by its content."""
+    for reader in (_document, _trajectory_toml):
         found = reader(path)
         if found:
             return found
@@ -84,13 +84,20 @@ def _column(table: pa.Table, name: str) -> dict[str, Any]:
     }
 
 
-def _verdict(path: Path) -> Inspection | None:
+DOCUMENTS = {
+    "verdict/1": "the answer of `exoid diagnose`",
+    "detectability/1": "the smallest size of each cause that would be seen",
+}
+"""What is written as JSON, for people and programs that have no Parquet."""
+
+
+def _document(path: Path) -> Inspection | None:
     content = _parsed(path, json.loads)
-    if content.get("contract") != "verdict/1":
+    if content.get("contract") not in DOCUMENTS:
         return None
-    origin = {key: content.pop(key) for key in ORIGIN if key in content}
-    contract = content.pop("contract")
-    return Inspection(str(path), contract, "the answer of `exoid diagnose`", origin, content)
+    contract, provenance = content.pop("contract"), content.pop("provenance", {})
+    origin = {key: provenance.pop(key) for key in ORIGIN if key in provenance}
+    return Inspection(str(path), contract, DOCUMENTS[contract], origin, content | provenance)
 
 
 def _trajectory_toml(path: Path) -> Inspection | None:

@@ -251,7 +251,7 @@ def detectability_of_recorded(
 
 def as_json(found: Sequence[Detectable]) -> dict:
     """Return what ``detectability.json`` holds."""
-    return {"causes": [one.as_json() for one in found]}
+    return {"contract": "detectability/1", "causes": [one.as_json() for one in found]}
 
 
 @cache

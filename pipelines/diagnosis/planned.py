@@ -38,6 +38,7 @@ def _motion(
         time, *state, torque=load.copy(), load=load, segment=np.zeros(len(time), np.int64),
         valid=np.ones(len(time), bool), run=kind, sample_rate_hz=rate_hz, period_s=trajectory.period_s, joints=names,
         geometry=geometry, file=kind,
+        metadata={"joints": [{"name": joint.name, "kind": joint.kind} for joint in trajectory.joints]},
     )  # fmt: skip
     for joint, levels in zip(names, zip(plant.coulomb_nm, plant.viscous_nm_s_rad, strict=True), strict=True):
         motion.torque[:] += Friction(joint).torque(motion, np.array(levels))

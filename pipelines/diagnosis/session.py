@@ -1,6 +1,7 @@
 """The runs that a diagnosis is given: of one hip and knee, whose joints move for long enough to say anything."""
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from pipelines.mechanics.one_machine import refuse_several_machines
 JOINTS = ("hip", "knee")
 """Both revolute: what the rigid body of the baseline and the effects of the catalogue are written for."""
 LEAST_S = 5.0
-"""Of motion, all runs of a purpose together; below, gravity, inertia and friction are not told apart."""
+"""Of motion, all runs of a kind and purpose together; below, gravity, inertia and friction are not told apart."""
 
 
 def refuse_unfit(motions: Sequence[Motion]) -> None:
@@ -23,31 +24,41 @@ def refuse_unfit(motions: Sequence[Motion]) -> None:
         found = [f"{joint.name} ({joint.kind})" for joint in joints_of(motion.metadata)]
         if found != [f"{joint} (revolute)" for joint in JOINTS]:
             raise InputError(
-                f"{motion.file} has joints {', '.join(found)}, expected hip and knee, both revolute: "
+                f"{motion.file} has joints {', '.join(found)}, expected hip and knee in this order, both revolute: "
                 "the causes are written for a leg of these two; use `exoid identify` for other machines"
             )
     refuse_several_machines(motions)
-    for purpose in ("train", "validate"):
-        _refuse_standstill([m for m in motions if m.purpose == purpose])
+    _refuse_twins(motions)
+    for purpose, run in sorted({(m.purpose, m.run) for m in motions}):
+        _refuse_standstill([m for m in motions if (m.purpose, m.run) == (purpose, run)])
+
+
+def _refuse_twins(motions: Sequence[Motion]) -> None:
+    """Refuse one measurement under two names: an error would pass for one of a run that no fit has seen."""
+    for one, other in combinations(motions, 2):
+        if np.array_equal(one.q, other.q) and np.array_equal(one.torque, other.torque):
+            raise InputError(
+                f"{other.file} ({other.run}, {other.purpose}) holds the same torques and angles as {one.file} "
+                f"({one.run}, {one.purpose}), expected a measurement of its own in each; give each run once"
+            )
 
 
 def _refuse_standstill(motions: Sequence[Motion]) -> None:
-    """Refuse runs of one purpose, if there are any, in which a joint hardly moves or both hardly move at once."""
-    if not motions:
-        return
+    """Refuse runs of one kind and purpose in which a joint hardly moves or both hardly move at once."""
     files = ", ".join(m.file for m in motions)
+    together = f"in the {motions[0].run} runs to {motions[0].purpose} together"
     moving = [away_from_reversals(m) & m.valid[:, np.newaxis] for m in motions]
     for j, joint in enumerate(JOINTS):
         if (lasts := _seconds(motions, [m[:, j] for m in moving])) < LEAST_S:
             raise InputError(
                 f"{files}: the {joint} moves for {lasts:.1f} s (faster than {REVERSAL_SPEED:g} rad/s and away from "
-                f"reversals), expected {LEAST_S:g} s in the {motions[0].purpose} runs together; "
+                f"reversals), expected {LEAST_S:g} s {together}; "
                 "excite both joints, or record longer; if it did move, check its encoder"
             )
     if (lasts := _seconds(motions, [m.all(axis=1) for m in moving])) < LEAST_S:
         raise InputError(
-            f"{files}: hip and knee move at once for {lasts:.1f} s, expected {LEAST_S:g} s in the "
-            f"{motions[0].purpose} runs together: errors are scored there; excite both joints at the same time"
+            f"{files}: hip and knee move at once for {lasts:.1f} s, expected {LEAST_S:g} s {together}: "
+            "errors are scored there; excite both joints at the same time, or record longer"
         )
 
 

@@ -149,7 +149,8 @@ def _evidence(d: Diagnosis, label: str, effect: Effect, worth: float, joint: str
     if others:
         rival = max(others, key=lambda k: others[k])
         sentences.append(
-            f"the next explanation, {rival}, is {_times(d.likely[label][label], others[rival])} less likely"
+            f"of the other causes that exoid knows the next, {_named(*_split(rival))}, is "
+            f"{_times(d.likely[label][label], others[rival])} less likely"
         )
     sentences.append(f"it looks like {effect.looks_like}")
     sentences.append(f"to make sure: {effect.confirm}")
@@ -165,6 +166,8 @@ def _summary(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -
     if d.spoilt:
         return f"Acquisition, not physics: {_first_of(d.spoilt)}."
     said = _finding(d, causes, left)
+    if not d.floor.from_periods:
+        said += " No motion here repeats, so the noise floor is a guess from the band above the motion."
     return f"{said} Left out as faults of acquisition: {_first_of(d.faults)}." if d.faults else said
 
 
@@ -182,7 +185,10 @@ def _finding(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -
         return f"Nothing is missing that these data could show: the largest torque error, at the {joint}, is {size}."
     if d.status == "unknown_cause":
         described = f" {left.description}" if left else ""
-        return f"Something is missing that no known cause explains: the {joint}'s torque error is {size}.{described}"
+        return (
+            "Something is missing, and no cause that exoid knows explains it well enough to be named: "
+            f"the {joint}'s torque error is {size}.{described}"
+        )
     named = "; and ".join(_in_words(cause) for cause in causes)
     return (
         f"Missing from the simulation: {named}. With {'it' if len(causes) == 1 else 'them'} the {joint}'s torque error "
@@ -199,7 +205,7 @@ def _remains(d: Diagnosis, worst: int) -> str:
     ]
     said = f"{'still ' if left[worst] else ''}{ratio[worst]:.2f} times the floor"
     others = [
-        f"; the {d.baseline.joints[j]}'s stays at {d.standing.extended[j]:.2f} N·m, {times:.2f} times its floor"
+        f"; the {d.baseline.joints[j]}'s is then {d.standing.extended[j]:.2f} N·m, {times:.2f} times its floor"
         for j, times in enumerate(ratio)
         if left[j] and j != worst
     ]

@@ -1,5 +1,6 @@
 """Errors become one line and an exit code; help is there and quick."""
 
+import signal
 import subprocess
 import sys
 
@@ -59,6 +60,35 @@ def test_an_error_is_one_line_and_an_exit_code(exoid, monkeypatch, error, code, 
     monkeypatch.setattr(application.typer.main, "get_command", fails)
     outcome = exoid("show")
     assert (outcome.code, outcome.out, outcome.err) == (code, "", line)
+
+
+HALT = """
+import os, sys, time
+from pathlib import Path
+from exoid_cli import app
+from pipelines.contracts.atomic import whole_file
+
+@app.app.command("halt")
+def halt(path: Path, number: int):
+    with whole_file(path) as half:
+        half.write_text("half")
+        os.kill(os.getpid(), number)
+        time.sleep(30)
+
+app.main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("number", "line"), [(signal.SIGINT, "exoid: stopped by Ctrl-C\n"), (signal.SIGTERM, "exoid: stopped by SIGTERM\n")]
+)
+def test_a_signal_in_the_middle_of_a_command_leaves_what_was_there_and_says_so_in_one_line(tmp_path, number, line):
+    path = tmp_path / "verdict.json"
+    path.write_text("old")
+    command = [sys.executable, "-c", HALT, "halt", str(path), str(int(number))]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (128 + number, "", line)
+    assert [(file.name, file.read_text()) for file in tmp_path.iterdir()] == [("verdict.json", "old")]
 
 
 def test_a_fault_of_exoid_keeps_its_traceback_in_a_file(exoid, monkeypatch, tmp_path):

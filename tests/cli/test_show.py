@@ -76,6 +76,18 @@ def test_verdict_and_trajectory_toml_are_recognised(exoid, tmp_path):
     assert "trajectory as TOML" in exoid("show", trajectory).out
 
 
+def test_what_a_motion_would_reveal_is_shown_with_its_origin_and_set_to_the_left(exoid, tmp_path):
+    path = tmp_path / "detectability.json"
+    told = {"causes": [{"effect": "base_tilt", "joint": None}], "provenance": {"created_by": "exoid 9"}}
+    path.write_text(json.dumps({"contract": "detectability/1"} | told))
+    outcome = exoid("show", path)
+    assert (outcome.code, outcome.err) == (0, "")
+    assert "detectability/1, the smallest size of each cause that would be seen" in outcome.out
+    lines = [line.rstrip() for line in outcome.out.splitlines()]
+    assert "created_by          exoid 9" in lines  # under "Where it came from", and to the left
+    assert "causes[0].effect  base_tilt" in lines
+
+
 @pytest.mark.parametrize("content", [None, b"", b"hello", b"PAR1", b"\xff\xfe"])
 def test_what_is_no_exoid_file_is_one_line_and_exit_code_2(exoid, tmp_path, content):
     path = tmp_path / "x"

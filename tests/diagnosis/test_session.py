@@ -25,8 +25,27 @@ def standing_knee(motion):
 
 @pytest.mark.parametrize("work", [diagnose, detectability_of_recorded])
 def test_a_joint_that_never_moves_is_named(motions, work):
-    with pytest.raises(InputError, match=r"run_0.parquet, run_2.parquet: the knee moves for 0.0 s .* expected 5 s"):
+    with pytest.raises(
+        InputError, match=r"run_0.parquet: the knee moves for 0.0 s .* expected 5 s in the exo_alone runs to train"
+    ):
         work([standing_knee(m) for m in motions])
+
+
+def test_two_seconds_with_the_human_are_not_made_up_for_by_a_long_run_without(motions):
+    (short,) = [m for m in motions if (m.run, m.purpose) == ("with_human", "train")]
+    short = replace(short, valid=short.valid & (short.time < 2.0))
+    rest = [m for m in motions if m.file != short.file]
+    with pytest.raises(
+        InputError, match=rf"{short.file}: the hip moves for [01]\.\d s .* in the with_human runs to train"
+    ):
+        diagnose([*rest, short])
+
+
+def test_a_run_is_not_validated_on_itself(motions):
+    train = [m for m in motions if m.purpose == "train"]
+    again = [replace(m, purpose="validate", file=f"copy_of_{m.file}") for m in train]
+    with pytest.raises(InputError, match=rf"copy_of_{train[0].file} \(exo_alone, validate\) holds the same torques"):
+        diagnose([*train, *again])
 
 
 def test_joints_that_take_turns_are_never_scored_and_refused(motions):

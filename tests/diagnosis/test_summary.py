@@ -7,7 +7,8 @@ import pytest
 
 from pipelines.contracts.table import Table
 from pipelines.diagnosis.diagnose import diagnose
-from pipelines.diagnosis.verdict import _finding, _in_words, _times, verdict
+from pipelines.diagnosis.verdict import _evidence, _finding, _in_words, _times, verdict
+from pipelines.effects import ParallelSpring
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table
 from pipelines.settings.filter import FilterSettings
@@ -49,8 +50,20 @@ def test_what_is_left_at_the_other_joint_is_said_to_be_there_and_how_much(stuck)
     assert said == (
         "Missing from the simulation: parallel spring at the knee (probability 0.97). With it the knee's torque error "
         "falls from 2.40 N·m, 8.00 times the noise floor, to 0.30 N·m, which is noise; "
-        "the hip's stays at 0.56 N·m, 1.12 times its floor."
+        "the hip's is then 0.56 N·m, 1.12 times its floor."
     )
+
+
+def test_a_floor_that_no_repetition_shows_is_said_to_be_a_guess(stuck):
+    assert "guess" not in verdict(stuck)["summary"]
+    without_periods = replace(stuck, floor=replace(stuck.floor, from_periods=False))
+    assert "so the noise floor is a guess from the band above the motion." in verdict(without_periods)["summary"]
+
+
+def test_odds_are_those_among_the_causes_that_exoid_knows_in_their_own_words(stuck):
+    d = replace(stuck, likely={"parallel_spring@knee": {"parallel_spring@knee": 0.8, "torque_offset@knee": 0.02}})
+    told = _evidence(d, "parallel_spring@knee", ParallelSpring("knee"), 1.0, "knee", {"parallel_spring@knee": 0.8})
+    assert "of the other causes that exoid knows the next, torque offset at the knee, is 40 times less likely" in told
 
 
 def test_two_causes_are_they_and_a_rest_at_the_worst_joint_is_not_noise(stuck):
