@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 
 from pipelines.diagnosis.choice import NEEDED, Ranked
-from pipelines.diagnosis.diagnose import Diagnosis, Extended
+from pipelines.diagnosis.diagnose import Diagnosis
+from pipelines.diagnosis.examined import Extended
 from pipelines.diagnosis.gain import gain
 from pipelines.effects import EFFECTS
 
@@ -91,6 +92,8 @@ def _judged(d: Diagnosis, labels: tuple[str, ...], score: float) -> tuple[str, s
     best = d.choice.named
     if d.causes and labels == best.labels:
         return "named", "it earned its place: nothing smaller explains as much, nothing larger enough more"
+    if labels in d.choice.refuted:
+        return "rejected", "it explains the train runs about as well as anything does, and fails on validation runs"
     if not d.causes:
         return "rejected", (
             f"it gains {score:.1f} in log likelihood; a cause must gain {NEEDED:g}, take away a material share of a "

@@ -1,7 +1,7 @@
 """Which set of causes is named, how likely each is, and what cannot be told from it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,8 @@ MATERIAL, MATERIAL_IN_CUFFS = 0.02, 0.1
 """Share of a drive's error, or else of that of the cuffs' torque, that one more cause must take away."""
 FINALISTS = 3
 """Sets of each size whose shapes are refined before they are compared."""
-BEHIND = 30.0
-"""Log likelihood behind the best at which a set is no finalist."""
+BEHIND, BEHIND_SHARE = 30.0, 0.2
+"""Log likelihood behind the best, or share of the best's, at which a set is no finalist: shapes are coarse yet."""
 SOFTENING = 0.25
 """What a log likelihood is worth: the true effect never has exactly our form (docs/diagnosis.md)."""
 
@@ -47,6 +47,25 @@ class Choice:
     refined: list[dict[tuple[str, ...], Ranked]]
     """By size of the set, the empty one first."""
     independent: NDArray
+    freer: Fit | None = None
+    """The named set with one of its causes in two shapes at once, where that was tried."""
+    refuted: frozenset[tuple[str, ...]] = frozenset()
+    """Sets that explain the training runs and fail on others."""
+
+    def next_best(self) -> "Choice | None":
+        """Return the choice with the named set refuted, of the sets that training hardly tells from it; None without.
+
+        So runs that are never fitted decide only between explanations that are as good as one another.
+        """
+        refuted = self.refuted | {self.named.labels}
+        level = self.refined[len(self.named.labels)]
+        close = max(ranked.score for ranked in level.values()) - NEEDED
+        left = [ranked for labels, ranked in level.items() if labels not in refuted and ranked.score > close]
+        return replace(self, named=max(left, key=lambda r: r.score), freer=None, refuted=refuted) if left else None
+
+    def none_left(self, empty: Fit) -> "Choice":
+        """Return the choice of no cause, the named set refuted."""
+        return replace(self, named=Ranked(empty, 0.0), freer=None, refuted=self.refuted | {self.named.labels})
 
     def alone(self, cause: str) -> float:
         """Return what a cause gains in log likelihood with no other beside it."""
@@ -72,29 +91,40 @@ def choose(bank: Bank, floor: Floor, evidence: Mapping[str, float]) -> Choice:
     empty = fit((), bank.runs, bank.baseline, bank.weights)
     named = Ranked(empty, 0.0)
     ranked = [{named.labels: named}]
+    freer: list[Ranked] = []
     for level in levels:
-        finalists = [_rank(scorer, s, empty) for s in _finalists(level)]
+        finalists = [_rank(scorer, s, empty) for s in _finalists(level, named, scorer.imperfect)]
         ranked.append({r.labels: r for r in finalists})
         if not finalists:
             break
-        best = max(finalists, key=lambda r: r.score)
         freer = [_rank(scorer, s, empty) for s in _freer(level, named)]
-        if not all(_worth_it(best, before, scorer) for before in (named, *freer)):
+        worthy = [r for r in finalists if all(_worth_it(r, before, scorer) for before in (named, *freer))]
+        if not worthy:
             break
-        named = best
-    return Choice(named, levels, ranked, independent)
+        named, freer = max(worthy, key=lambda r: r.score), []
+    return Choice(named, levels, ranked, independent, freer[0].fit if freer else None)
 
 
 def _freer(level: dict[tuple[str, ...], Scored], named: Ranked) -> list[Scored]:
     """Return the named set with one of its causes in two shapes at once, the best of such sets, if there is any."""
     made = [tuple(sorted((*named.labels, label))) for label in named.labels]
-    found = [level[labels] for labels in made if labels in level]
+    found = [level[labels] for labels in made if labels in level and not level[labels].bound]
     return sorted(found, key=lambda s: -s.score)[:1]
 
 
-def _finalists(level: dict[tuple[str, ...], Scored]) -> list[Scored]:
-    ordered = sorted((s for labels, s in level.items() if len(set(labels)) == len(labels)), key=lambda s: -s.score)
-    return [s for s in ordered[:FINALISTS] if s.score > ordered[0].score - BEHIND]
+def _finalists(level: dict[tuple[str, ...], Scored], named: Ranked, imperfect: NDArray) -> list[Scored]:
+    """Return the sets that may be best once refined, those that would show at all first.
+
+    Beside the best ones stands the best that extends what is named so far.
+    """
+    ordered = sorted(
+        ((labels, s) for labels, s in level.items() if len(set(labels)) == len(labels) and not s.bound),
+        key=lambda e: (not np.any(_material(e[1].error, named.fit.rms, imperfect)), -e[1].score),
+    )
+    furthest = ordered[0][1].score - max(BEHIND, BEHIND_SHARE * ordered[0][1].score)
+    near = [(labels, s) for labels, s in ordered[:FINALISTS] if s.score > furthest]
+    extending = [(labels, s) for labels, s in ordered if set(named.labels) < set(labels)][:1]
+    return list(dict(near + extending).values())
 
 
 def _rank(scorer: Scorer, scored: Scored, empty: Fit) -> Ranked:
@@ -144,6 +174,8 @@ def rivals(choice: Choice, bank: Bank, cause: str) -> dict[str, float]:
     fine = choice.refined[size]
     best_coarse = choice.levels[size - 1][choice.named.labels].score
     for labels, scored in choice.levels[size - 1].items():
+        if labels in choice.refuted:
+            continue
         if set(others) <= set(labels) and len(set(labels)) == len(labels) == size:
             rival = next(iter(set(labels) - set(others)))
             gap = choice.named.score - fine[labels].score if labels in fine else best_coarse - scored.score

@@ -40,6 +40,7 @@ from pipelines.diagnosis.observations import Baseline, Run, baseline_of, observe
 from pipelines.diagnosis.scan import BENDING, values_of
 from pipelines.diagnosis.search import SHAPE_COST, imperfection
 from pipelines.diagnosis.session import refuse_unfit
+from pipelines.diagnosis.thinned import thinned
 from pipelines.effects import Effect, Parameter
 from pipelines.mechanics.motion import Motion
 
@@ -241,6 +242,7 @@ def detectability_of_recorded(
     Training runs count, as they do for a diagnosis; where there is none, all do.
     """
     refuse_unfit(motions)
+    motions = [thinned(m) for m in motions]
     runs = [observe(m) for m in motions if m.purpose == "train"] or [observe(m) for m in motions]
     baseline = baseline_of(runs)
     active = np.any([run.usable.any(axis=0) for run in runs], axis=0).astype(float)

@@ -1,10 +1,10 @@
 """What a model leaves of the validation runs, which no fit has seen.
 
 Shared parameters come from training. What is tied to wall time, an onset or a phase, each validation run
-fits for itself: on odd periods to be scored on even ones, and the other way round.
+fits for itself: on odd seconds to be scored on even ones, and the other way round.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,8 +16,10 @@ from pipelines.diagnosis.observations import Baseline, Run
 from pipelines.diagnosis.scan import ALWAYS, NEVER, ONSETS
 from pipelines.model import Term
 
-WITHOUT_INSTANT = 2
-"""How many of the onsets tried, the first ones, are no instant within the run."""
+STRETCH_S = 1.0
+"""Of every second stretch a run's own onsets and phases are learnt, to be scored on the others."""
+FINER = 9
+"""Instants tried about the best onset of the first search."""
 ALIKE = 4.0
 """Weighted squared error within which two onsets explain a run alike."""
 
@@ -41,8 +43,8 @@ def _residual(fit: Fit, run: Run, baseline: Baseline) -> NDArray:
 
 
 def _halves(run: Run) -> NDArray:
-    """Deal the blocks out to two halves: odd and even periods, or stretches of a fold's length."""
-    return run.fold % 2
+    """Deal the blocks out to two halves, second by second: an onset is as well known as that."""
+    return np.floor(run.time / STRETCH_S).astype(int) % 2
 
 
 def _shared_term(cause: Candidate) -> Term:
@@ -85,37 +87,53 @@ def _learn(fit: Fit, run: Run, baseline: Baseline, learnt: NDArray) -> tuple[NDA
     Onsets that explain the learnt samples alike are as likely as one another, and the middle one is taken; but what
     was there all along, or never, needs no coincidence.
     """
+    terms = [_shared_term(cause) for cause in fit.causes]
+    dated = _onset(fit)
+    if dated is None:
+        return _learn_amplitudes(fit, terms, run, baseline, learnt)[1:]
+
+    def learn_from(instant: float) -> tuple[float, NDArray, NDArray, list[Term]]:
+        return _learn_amplitudes(fit, _beginning(terms, *dated, instant), run, baseline, learnt)
+
+    simple = [learn_from(instant) for instant in (NEVER, ALWAYS)]
+    instants = np.linspace(run.time[0], run.time[-1], ONSETS + 2)[1:-1]
+    dating = {instant: learn_from(instant) for instant in instants}
+    best = min(dating, key=lambda instant: dating[instant][0])
+    apart = instants[1] - instants[0]
+    dating |= {instant: learn_from(instant) for instant in best + apart * np.linspace(-1.0, 1.0, FINER)}
+    alike = min(entry[0] for entry in (*simple, *dating.values())) + ALIKE
+    likely = [entry for entry in simple if entry[0] < alike][:1]
+    likely = likely or [dating[instant] for instant in sorted(dating) if dating[instant][0] < alike]
+    return likely[len(likely) // 2][1:]
+
+
+def _learn_amplitudes(
+    fit: Fit, terms: list[Term], run: Run, baseline: Baseline, learnt: NDArray
+) -> tuple[float, NDArray, NDArray, list[Term]]:
+    """Fit the run's own amplitudes to terms of given shapes: squared error, values, residual (m, O), terms."""
     shared, own = _shared_values(fit, baseline)
-    tried = []
-    for terms in _onsets(fit, [_shared_term(c) for c in fit.causes], run):
-        columns, measured = columns_under(terms, run, baseline)
-        values = shared.copy()
-        if own.any():
-            root = np.sqrt(fit.weights) * learnt
-            A = (columns[:, :, own] * root[:, :, np.newaxis]).reshape(-1, int(own.sum()))
-            values[own] = np.linalg.lstsq(A, ((measured - columns @ shared) * root).ravel(), rcond=1e-9)[0]
-        left = measured - columns @ values
-        cost = float(np.sum(fit.weights * np.sum(np.where(learnt, left, 0.0) ** 2, axis=0)))
-        tried.append((cost, values, left, terms))
-    least = min(cost for cost, *_ in tried)
-    alike = [number for number, entry in enumerate(tried) if entry[0] < least + ALIKE]
-    simple = [number for number in alike if number < WITHOUT_INSTANT]
-    return tried[simple[0] if simple else alike[len(alike) // 2]][1:]
+    columns, measured = columns_under(terms, run, baseline)
+    values = shared.copy()
+    if own.any():
+        root = np.sqrt(fit.weights) * learnt
+        A = (columns[:, :, own] * root[:, :, np.newaxis]).reshape(-1, int(own.sum()))
+        values[own] = np.linalg.lstsq(A, ((measured - columns @ shared) * root).ravel(), rcond=1e-9)[0]
+    left = measured - columns @ values
+    squares = float(np.sum(fit.weights * np.sum(np.where(learnt, left, 0.0) ** 2, axis=0)))
+    return squares, values, left, terms
 
 
-def _onsets(fit: Fit, terms: list[Term], run: Run) -> Iterator[list[Term]]:
-    """Yield the terms with each onset that the run may have, first those that no instant is needed for."""
-    dated = [
-        (number, len(cause.effect.linear) + i)
-        for number, cause in enumerate(fit.causes)
-        for i, parameter in enumerate(cause.effect.shape)
-        if parameter.per_run
-    ]
-    if not dated:
-        yield terms
-        return
-    number, at = dated[0]
-    for instant in (NEVER, ALWAYS, *np.linspace(run.time[0], run.time[-1], ONSETS + 2)[1:-1]):
-        values = terms[number].values.copy()
-        values[at] = instant
-        yield [replace(t, values=values) if k == number else t for k, t in enumerate(terms)]
+def _onset(fit: Fit) -> tuple[int, int] | None:
+    """Return which cause has an onset of its own in each run, and its place among the cause's values, if any has."""
+    for number, cause in enumerate(fit.causes):
+        for i, parameter in enumerate(cause.effect.shape):
+            if parameter.per_run:
+                return number, len(cause.effect.linear) + i
+    return None
+
+
+def _beginning(terms: list[Term], number: int, at: int, instant: float) -> list[Term]:
+    """Return the terms with one that begins at an instant."""
+    values = terms[number].values.copy()
+    values[at] = instant
+    return [replace(t, values=values) if k == number else t for k, t in enumerate(terms)]

@@ -27,7 +27,7 @@ def noise_floor(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Floor:
 
     ``residuals`` (m, O) of each run; slow drift cancels in the differences of adjacent periods.
     """
-    pairs = [_differences(run, residual) for run, residual in zip(runs, residuals, strict=True)]
+    pairs = [scatter(run, residual) for run, residual in zip(runs, residuals, strict=True)]
     if not any(len(d) for d in pairs):
         pairs = [_successive(run, residual) for run, residual in zip(runs, residuals, strict=True)]
         from_periods = False
@@ -60,12 +60,12 @@ def slow_scatter(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray:
 
     About 1 for a sensor's noise; many times that where a person or a drift does not repeat; 1 without periods.
     """
-    pairs = [_differences(run, residual) for run, residual in zip(runs, residuals, strict=True)]
+    pairs = [scatter(run, residual) for run, residual in zip(runs, residuals, strict=True)]
     rate = runs[0].motion.sample_rate_hz / runs[0].block.decimation
     return np.array([_slow_share([p[:, o] for p in pairs], rate) for o in range(residuals[0].shape[1])])
 
 
-def _differences(run: Run, residual: NDArray) -> NDArray:
+def scatter(run: Run, residual: NDArray) -> NDArray:
     """Return differences of adjacent periods over the root of two, (k, O); NaN where either is not usable."""
     period = run.motion.period_s
     if not period or run.time[-1] - run.time[0] < 2 * period:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.effects.friction import Friction
-from pipelines.estimation.regression import away_from_reversals, block_average
+from pipelines.estimation.regression import away_from_reversals, away_from_turns, block_average
 from pipelines.mechanics.leg import cuff_torque, regressor
 from pipelines.mechanics.motion import CUFFS, Motion
 from pipelines.signals.blocks import BlockAverage
@@ -99,7 +99,8 @@ def observe(motion: Motion) -> Run:
         felt = block.mean(cuffs, starts)
         known = np.isfinite(felt)
         measured = np.hstack([measured, np.where(known, felt, 0.0)])
-        usable = np.hstack([usable, valid[:, np.newaxis] & known])
+        steady = block.all(away_from_turns(motion), starts)
+        usable = np.hstack([usable, (valid & steady)[:, np.newaxis] & known])
     length = motion.period_s or FOLD_S
     number = np.floor(time / length + 1e-9).astype(int)
     # A short run has no whole period for each fold: its stretches are dealt out instead.
@@ -176,6 +177,15 @@ def baseline_of(runs: Sequence[Run]) -> Baseline:
     """Return the baseline that the kinds of run at hand allow."""
     kinds = tuple(k for k in ("exo_alone", "with_human") if any(run.motion.run == k for run in runs))
     return Baseline(kinds, runs[0].motion.joints, any(run.has_cuffs for run in runs))
+
+
+def like_trained(run: Run, baseline: Baseline) -> Run:
+    """Return the run without its cuffs where none was there to train on: their zeros are not known."""
+    if baseline.cuffs or not run.has_cuffs:
+        return run
+    usable = run.usable.copy()
+    usable[:, len(baseline.joints) :] = False
+    return replace(run, usable=usable)
 
 
 def with_load(run: Run, baseline: Baseline, values: NDArray) -> Run:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.diagnose import Diagnosis, Extended
+from pipelines.diagnosis.diagnose import Diagnosis
+from pipelines.diagnosis.examined import Extended
 from pipelines.diagnosis.fitted_model import model_of_run
 from pipelines.diagnosis.gain import scored
 from pipelines.dynamics.replay import WINDOW_S, replay

@@ -87,7 +87,8 @@ def _coarse(run: Run) -> Motion:
     J = len(m.joints)
     return replace(
         m, time=run.time, q=q, dq=dq, ddq=ddq, torque=run.measured[:, :J], segment=m.segment[run.starts],
-        valid=run.valid, load=None if m.load is None else run.average(m.load), forces=None,
+        valid=run.valid, load=None if m.load is None else run.average(m.load),
+        limb_load=None if m.limb_load is None else run.average(m.limb_load), forces=None,
         sample_rate_hz=m.sample_rate_hz / run.block.decimation,
     )  # fmt: skip
 

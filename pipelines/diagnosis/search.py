@@ -35,12 +35,19 @@ class Scored:
     """Log likelihood over the baseline's, on held-out data, less the cost of shapes."""
     error: NDArray
     """(O,) root mean square held-out error, N·m."""
+    bound: bool = False
+    """Whether an amplitude stands at nought, where physics forbids the sign that it would have."""
 
 
 def imperfection(gram: Gram) -> NDArray:
     """Return what no model of a real machine gets right, (O,) N·m: errors below it are worth nothing."""
     rms = np.sqrt(gram.square.sum(axis=0) / np.maximum(gram.count.sum(axis=0), 1))
-    return np.asarray(rms * np.repeat(IMPERFECTION, len(rms) // 2))
+    return np.asarray(rms * imperfect_share(len(rms)))
+
+
+def imperfect_share(outputs: int) -> NDArray:
+    """Return the share of each output's torque, (O,), that is a little off on a good rig: drives first, then cuffs."""
+    return np.repeat(IMPERFECTION, outputs // 2)
 
 
 def log_likelihood(rms: NDArray, before: NDArray, independent: NDArray, imperfect: NDArray) -> float:
@@ -75,38 +82,52 @@ class Scorer:
         self.bank, self.independent, self.evidence = bank, independent, evidence
         self.count = bank.gram.count.sum(axis=0)
         self.imperfect = imperfection(bank.gram)
-        plain = self._held_out(())
-        assert plain is not None, "the baseline has no sign that could be impossible"
-        self.plain = plain
+        self.plain = self._held_out(bank.gram.select(bank.columns_of(())))
 
     def __call__(self, chosen: Sequence[int]) -> Scored:
         """Score a set."""
-        rms = self._held_out(chosen)
-        if rms is None:
-            return Scored(tuple(chosen), -np.inf, np.full(len(self.count), np.nan))
-        columns = len(self.bank.columns_of(chosen)) - self.bank.baseline.size
+        columns = self.bank.columns_of(chosen)
+        gram = self.bank.gram.select(columns)
+        forbidden = self._forbidden(gram, chosen)
+        bound = bool(forbidden.any())
+        if bound:
+            # What is left of a cause whose amplitude is nought: of a spring, its preload; of most causes, nothing.
+            gram = self.bank.gram.select(columns[~forbidden])
+            if self._empty(forbidden, chosen) or self._still_forbidden(gram, forbidden, chosen):
+                return Scored(tuple(chosen), -np.inf, np.full(len(self.count), np.nan))
+        rms = self._held_out(gram)
         causes = [self.bank.candidates[i] for i in chosen]
         gain = log_likelihood(rms, self.plain, self.independent, self.imperfect)
         besides = known_besides(causes, self.evidence)
-        return Scored(tuple(chosen), gain + besides - cost(causes, columns, self.independent), rms)
+        price = cost(causes, len(columns) - self.bank.baseline.size, self.independent)
+        return Scored(tuple(chosen), gain + besides - price, rms, bound)
 
-    def _held_out(self, chosen: Sequence[int]) -> NDArray | None:
-        gram = self.bank.gram.select(self.bank.columns_of(chosen))
-        if not self._possible(gram, chosen):
-            return None
-        return np.sqrt(held_out_error(gram, self.bank.weights) / np.maximum(self.count, 1))
+    def _held_out(self, gram: Gram) -> NDArray:
+        return np.asarray(np.sqrt(held_out_error(gram, self.bank.weights) / np.maximum(self.count, 1)))
 
-    def _possible(self, gram: Gram, chosen: Sequence[int]) -> bool:
-        """Tell whether no cause comes out with a sign that physics forbids it."""
-        values = solve(gram, self.bank.weights)[self.bank.baseline.size :]
-        at = 0
+    def _forbidden(self, gram: Gram, chosen: Sequence[int]) -> NDArray:
+        """Tell which columns come out with a sign that physics forbids, (columns,) bool."""
+        return (solve(gram, self.bank.weights) < 0) & self._one_way(chosen)
+
+    def _still_forbidden(self, gram: Gram, dropped: NDArray, chosen: Sequence[int]) -> bool:
+        return bool(np.any((solve(gram, self.bank.weights) < 0) & self._one_way(chosen)[~dropped]))
+
+    def _one_way(self, chosen: Sequence[int]) -> NDArray:
+        """Tell which columns of a set may only have a positive amplitude, (columns,) bool."""
+        parts = [np.zeros(self.bank.baseline.size, dtype=bool)]
         for i in chosen:
-            candidate, width = self.bank.candidates[i], self.bank.where[i].stop - self.bank.where[i].start
+            candidate, width = self.bank.candidates[i], self._width(i)
             seen_otherwise = self.evidence.get(candidate.label, 0.0) > 0
-            if not seen_otherwise and np.any(values[at : at + width][one_way(candidate, width)] < 0):
-                return False
-            at += width
-        return True
+            parts.append(one_way(candidate, width) & (not seen_otherwise))
+        return np.concatenate(parts)
+
+    def _empty(self, dropped: NDArray, chosen: Sequence[int]) -> bool:
+        """Tell whether one of the set's causes has lost all its columns."""
+        ends = np.cumsum([self._width(i) for i in chosen])[:-1]
+        return any(part.all() for part in np.split(dropped[self.bank.baseline.size :], ends))
+
+    def _width(self, i: int) -> int:
+        return self.bank.where[i].stop - self.bank.where[i].start
 
 
 def one_way(candidate: Candidate, width: int) -> NDArray:

@@ -33,12 +33,9 @@ def slower(motion: Motion) -> Motion:
         valid[stretch.start : stretch.start + edge] = False
         valid[max(stretch.start, stretch.stop - edge) : stretch.stop] = False
     block = BlockAverage.lasting(BLOCK_S, rate)
-    filters = {
-        "kind": "block_average", "order": 1, "cutoff_hz": block.cutoff_hz(rate), "decimation": block.decimation,
-    }  # fmt: skip
     return replace(
         motion, q=q, dq=dq, ddq=ddq, valid=valid, cutoff_hz=CUTOFF_HZ,
-        metadata={**motion.metadata, "regression_filter": filters},
+        metadata={**motion.metadata, "regression_filter": block.as_metadata(rate)},
         # What a fit to the faster motion estimated is not that of this one.
         load=None, limb_load=None, body=None, limb_body=None,
     )  # fmt: skip

@@ -47,7 +47,7 @@ class SlowError:
 
 def slow_error(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SlowError:
     """Return the error of residuals (m, O) in the slow band."""
-    slow = [_slowed(run, residual) for run, residual in zip(runs, residuals, strict=True)]
+    slow = [slowed(run, residual) for run, residual in zip(runs, residuals, strict=True)]
     longer = [run for run, _ in slow]
     floor = noise_floor(longer, [residual for _, residual in slow])
     squares = [np.sum(np.where(run.usable, r, 0.0) ** 2, axis=0) for run, r in slow]
@@ -59,13 +59,16 @@ def slow_error(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SlowError:
     return SlowError(rms, known, independent)
 
 
-def _slowed(run: Run, residual: NDArray) -> tuple[Run, NDArray]:
-    """Average neighbouring blocks, (m // k, O); never across a gap."""
+def slowed(run: Run, residual: NDArray, length_s: float = SLOW_S, needed: float = 1.0) -> tuple[Run, NDArray]:
+    """Average neighbouring blocks to a length, (m // k, O), where a share of them is usable; never across a gap."""
     width = run.block.decimation / run.motion.sample_rate_hz
-    k = max(1, round(SLOW_S / width))
+    k = max(1, round(length_s / width))
     whole = len(residual) // k * k
     time = run.time[:whole].reshape(-1, k)
     together = time[:, -1] - time[:, 0] < (k - 0.5) * width
-    usable = run.usable[:whole].reshape(-1, k, residual.shape[1]).all(axis=1) & together[:, np.newaxis]
+    there = run.usable[:whole].reshape(-1, k, residual.shape[1])
+    count = there.sum(axis=1)
+    mean = np.where(there, residual[:whole].reshape(there.shape), 0.0).sum(axis=1) / np.maximum(count, 1)
+    usable = (count >= needed * k) & together[:, np.newaxis]
     longer = replace(run, time=time.mean(axis=1), usable=usable, block=BlockAverage(k * run.block.decimation))
-    return longer, residual[:whole].reshape(-1, k, residual.shape[1]).mean(axis=1)
+    return longer, mean

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.diagnosis.search import imperfect_share
 from pipelines.diagnosis.slow import SlowError
 from pipelines.effects import Effect
 
@@ -20,7 +21,11 @@ FOREIGN = 0.3
 
 Three causes together can imitate nearly anything: of them a third of that.
 """
-PLAIN = 10.0
+WORSE = 1.03
+"""Ratio of a joint's errors from which causes do harm there."""
+RINGING = 0.5
+"""Share of the systematic power below which what is left beside a soft transmission may be its ringing."""
+PLAIN = 6.0
 """Standard errors of the floor's power by which what is left must exceed it to be plain."""
 SIGNIFICANT = 3.5
 """Standard errors of the floor's power by which slow error must exceed it to be systematic."""
@@ -36,7 +41,7 @@ WANDERING = 3.0
 
 @dataclass(frozen=True)
 class Standing:
-    """Errors of each joint on the validation runs, (J,) N·m each."""
+    """Errors of the validation runs, of each joint (J,) N·m but for those told otherwise."""
 
     floor: NDArray
     baseline: NDArray
@@ -44,7 +49,7 @@ class Standing:
     slow_before: SlowError
     slow_after: SlowError
     torque: NDArray
-    """(J,) rms of the measured torque, N·m."""
+    """(O,) rms of what was measured, N·m."""
 
     @property
     def unexplained(self) -> list[float | None]:
@@ -57,35 +62,51 @@ class Standing:
                 shares.append(float(max(after**2 - floor**2, 0.0) / (before**2 - floor**2)))
         return shares
 
+    @property
+    def takes_enough(self) -> bool:
+        """Whether the named causes take away enough, in drives and cuffs together, and no drive's error grows."""
+        worse = self.extended > WORSE * self.baseline
+        together = np.sum((self.extended / self.floor) ** 2) <= np.sum((self.baseline / self.floor) ** 2)
+        return self._share_left <= 1.0 - HELD_UP and bool(together) and not bool(worse.any())
+
+    def rings(self, effects: Sequence[Effect]) -> bool:
+        """Tell whether what is left may be the ringing of a named transmission, which takes most of the error away."""
+        return any(effect.rings for effect in effects) and self._share_left < RINGING
+
     def held_up(self, effects: Sequence[Effect]) -> bool:
-        """Tell whether the named effects take away enough, in drives and cuffs together and at the worst joint.
+        """Tell whether the named effects take away enough, everywhere and at the worst joint.
 
         The ringing of a transmission no model follows to the end, nor what goes with wall time: a drift that bends,
         a rhythm that wanders.
         """
-        before = self.slow_before.over(self.slow_after)
-        if np.sum(self._power(self.slow_after)) > (1.0 - HELD_UP) * np.sum(self._power(before)):
-            return False
-        if np.sum((self.extended / self.floor) ** 2) > np.sum((self.baseline / self.floor) ** 2):
+        if not self.takes_enough:
             return False
         worst, left = self._left_at_the_worst()
         plain = self.systematic(self.slow_after)[worst] and self.slow_after.sureness[worst] > PLAIN
-        if not plain or any(effect.rings for effect in effects):
-            return True
-        if len(effects) < 3:
-            return left < FOREIGN or any(effect.per_run for effect in effects)
-        return left < FOREIGN / 3
+        rings = any(effect.rings for effect in effects)
+        if len(effects) > 2:
+            return not plain or left < FOREIGN / 3 or (rings and self._share_left < FOREIGN)
+        return not plain or left < FOREIGN or rings or any(effect.per_run for effect in effects)
+
+    @property
+    def _share_left(self) -> float:
+        """Share of all outputs' systematic power that is left."""
+        before = np.sum(self._power(self.slow_before.over(self.slow_after)))
+        return float(np.sum(self._power(self.slow_after)) / max(before, 1e-12))
 
     def _left_at_the_worst(self) -> tuple[int, float]:
-        """Return the joint where the systematic error was surest, and the share of its power that is left there."""
-        before = self.slow_before.over(self.slow_after)
-        worst = int(np.argmax(before.sureness[: len(self.floor)]))
-        return worst, float(self._power(self.slow_after)[worst] / max(self._power(before)[worst], 1e-12))
+        """Return the joint where the systematic error was largest, and the share of its power that is left there."""
+        before = self._power(self.slow_before.over(self.slow_after))
+        worst = int(np.argmax(before[: len(self.floor)]))
+        return worst, float(self._power(self.slow_after)[worst] / max(before[worst], 1e-12))
 
-    @staticmethod
-    def _power(slow: SlowError) -> NDArray:
-        """Return the systematic power in units of the floor's, (O,)."""
-        return np.asarray((slow.excess / slow.floor) ** 2)
+    def _power(self, slow: SlowError) -> NDArray:
+        """Return the systematic power beyond a good rig's, in units of the floor's, (O,).
+
+        A cuff's noise is so small that what is a little off in it always would outweigh what is missing in a drive.
+        """
+        good = imperfect_share(len(self.torque)) * self.torque
+        return np.asarray(np.maximum(slow.excess**2 - good**2, 0.0) / slow.floor**2)
 
     @property
     def trust(self) -> float:
@@ -101,12 +122,12 @@ class Standing:
     def systematic(self, slow: SlowError) -> NDArray:
         """Tell at which joints an error is beyond chance, beyond the floor and beyond a good rig's, (J,) bool."""
         J = len(self.floor)
-        large = slow.excess[:J] > np.maximum(MATERIAL * self.floor, IMPERFECT * self.torque)
+        large = slow.excess[:J] > np.maximum(MATERIAL * self.floor, IMPERFECT * self.torque[:J])
         return np.asarray(large & (slow.sureness[:J] > SIGNIFICANT))
 
     def hums(self, tone: NDArray) -> bool:
         """Tell whether a tone (J,) N·m is beyond the floor and beyond a good rig's at some joint."""
-        return bool(np.any(tone > np.maximum(HUM * self.floor, IMPERFECT * self.torque)))
+        return bool(np.any(tone > np.maximum(HUM * self.floor, IMPERFECT * self.torque[: len(self.floor)])))
 
 
 def status_of(standing: Standing, named: bool, wandering: bool) -> str:

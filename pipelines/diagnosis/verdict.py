@@ -149,7 +149,7 @@ def _evidence(d: Diagnosis, label: str, effect: Effect, worth: float, joint: str
     if others:
         rival = max(others, key=lambda k: others[k])
         sentences.append(
-            f"of the other causes that exoid knows the next, {_named(*_split(rival))}, is "
+            f"of the other causes that exoid knows the next, {in_words(effect_labelled(rival))}, is "
             f"{_times(d.likely[label][label], others[rival])} less likely"
         )
     sentences.append(f"it looks like {effect.looks_like}")

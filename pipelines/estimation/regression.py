@@ -12,6 +12,8 @@ from pipelines.signals.blocks import BlockAverage, dilate
 
 REVERSAL_SPEED = 0.04
 """rad/s (m/s) below which the sign of the speed, and so friction, is not known."""
+TURN_S = 0.075
+"""Beside a turn, where measured forces and the filtered acceleration are not of the same moment."""
 REVERSAL_PADDING_S = 0.08
 """What a joint that stuck still does after it has come free."""
 MASK = f"|v| < {REVERSAL_SPEED:g} rad/s, padded {REVERSAL_PADDING_S:g} s"
@@ -70,6 +72,16 @@ def away_from_reversals(motion: Motion) -> NDArray:
     padding = round(REVERSAL_PADDING_S * motion.sample_rate_hz)
     slow = np.abs(motion.dq) < REVERSAL_SPEED
     return ~np.column_stack([dilate(column, padding) for column in slow.T])
+
+
+def away_from_turns(motion: Motion) -> NDArray:
+    """Tell for each sample whether no joint turns round within ``TURN_S``, (n,) bool.
+
+    Where a joint stops, friction jumps and so does the acceleration of every link; filtered, neither is at its time.
+    """
+    turned = np.zeros(len(motion), dtype=bool)
+    turned[1:] = np.any(np.diff(motion.dq > 0, axis=0), axis=1)
+    return np.asarray(~dilate(turned, round(TURN_S * motion.sample_rate_hz)))
 
 
 def regress(motion: Motion, model: Model) -> Regression:

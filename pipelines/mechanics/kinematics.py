@@ -66,12 +66,7 @@ def motion_table(recording: Table, settings: FilterSettings) -> Table:
             "cutoff_hz": made.cutoff.hz,
             "why": made.cutoff.reason,
         },
-        "regression_filter": {
-            "kind": "block_average",
-            "order": 1,
-            "cutoff_hz": block.cutoff_hz(rate_hz),
-            "decimation": block.decimation,
-        },
+        "regression_filter": block.as_metadata(rate_hz),
     }
     return Table(pd.DataFrame(columns), {**metadata, **filters}, recording.path)
 

@@ -5,6 +5,7 @@ kept away from reversals by short blocks, leave the noise itself (docs/identific
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,12 @@ class BlockAverage:
     def cutoff_hz(self, rate_hz: float) -> float:
         """Return the frequency at which the mean has lost half the power."""
         return HALF_POWER * rate_hz / self.decimation
+
+    def as_metadata(self, rate_hz: float) -> dict[str, Any]:
+        """Return what a motion's metadata say of this filter (CONTRACTS, motion/1)."""
+        return {
+            "kind": "block_average", "order": 1, "cutoff_hz": self.cutoff_hz(rate_hz), "decimation": self.decimation,
+        }  # fmt: skip
 
     def starts(self, segment: NDArray) -> NDArray:
         """Return the first sample of each whole block, given each sample's segment number (n,)."""

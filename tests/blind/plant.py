@@ -175,7 +175,7 @@ def _ripple(machine: Machine, angle: NDArray, noise: Generator) -> NDArray:
 def _cuff_forces(rig: Rig, plan: Plan, log: loop.Log, noise: Generator) -> NDArray:
     """What four sensors feel (n, 4, 3) N: thigh front and back, shank front and back; distal, forward, lateral."""
     machine = rig.machine
-    along, across = _firmly_strapped(rig, log) if plan.cuffs is None else (np.zeros_like(log.cuff), log.cuff)
+    along, across = _firmly_strapped(rig, plan, log) if plan.cuffs is None else (np.zeros_like(log.cuff), log.cuff)
     forces = np.zeros((len(across), 4, 3))
     for i in range(2):
         # The back pushes forward, the front backward: pads press, they never pull.
@@ -186,13 +186,17 @@ def _cuff_forces(rig: Rig, plan: Plan, log: loop.Log, noise: Generator) -> NDArr
     return forces + machine.cuff_zero + noise.normal(0.0, machine.cuff_noise, forces.shape)
 
 
-def _firmly_strapped(rig: Rig, log: loop.Log) -> tuple[NDArray, NDArray]:
+def _firmly_strapped(rig: Rig, plan: Plan, log: loop.Log) -> tuple[NDArray, NDArray]:
     """Forces along and across thigh and shank, (n, 2) N each, when the wearer's leg moves as the machine does.
 
-    MuJoCo says what torque the wearer's own leg takes; forces follow from the levers, shank first.
+    MuJoCo says what torque the wearer's own leg takes, on a tilted base too; forces follow from the levers, the
+    shank's first.
     """
     machine, leg = rig.machine, rig.person.leg
-    q, dq, ddq = (log.link[:, 2 * i : 2 * i + 2] for i in range(3))
+    q, dq, ddq = (log.link[:, 2 * i : 2 * i + 2].copy() for i in range(3))
+    base, sway, frequency = plan.tilt
+    # Inertia does not depend on the hip's angle: gravity from elsewhere is a hip turned otherwise.
+    q[:, HIP] += base + sway * np.sin(2 * np.pi * frequency * (np.arange(len(q)) + 0.5) * loop.SAMPLE_S)
     torque = Body(leg).inverse(q, dq, ddq) + log.human
     thigh_lever, shank_lever = machine.cuff_distance
     weight = machine.carried * leg.gravity

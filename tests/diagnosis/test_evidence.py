@@ -11,6 +11,7 @@ from pipelines.diagnosis.observations import FOLDS, baseline_of, observe, with_l
 from pipelines.diagnosis.slow import SlowError, slow_error
 from pipelines.diagnosis.status import Standing
 from pipelines.diagnosis.tone import strongest_tone
+from pipelines.diagnosis.volition import evidence_of_will
 from pipelines.effects import Backlash, EncoderOffset, Parameter, TorqueDrift
 from tests.diagnosis.sessions import session
 
@@ -25,6 +26,11 @@ def run():
     values = np.zeros(baseline.size)
     values[:4] = 1.5, 0.2, 0.4, 2.0
     return with_load(observed, baseline, values)
+
+
+@pytest.fixture(scope="module")
+def worn():
+    return observe(session(seconds=40.0)[3])
 
 
 def noise(run, seed=0):
@@ -66,11 +72,44 @@ def test_play_is_heard_where_scatter_follows_the_load_through_zero_and_only_at_i
     assert np.all(evidence_of_play([run], [noise(run)], 1 / 6) < 2.0)
 
 
+def bursts(run, seed=3):
+    """A push of half a second every three seconds or so, at instants of its own."""
+    starts = np.cumsum(np.random.default_rng(seed).exponential(3.0, 40))
+    return 1.5 * sum(np.exp(-(((run.time - at) / 0.5) ** 2)) for at in starts)
+
+
+def test_a_push_is_felt_where_cuffs_and_drive_scatter_alike_and_only_at_its_joint(worn):
+    push = bursts(worn)[:, np.newaxis] * np.array([0.0, 1.0, 0.0, 1.0])
+    quiet = noise(worn) * np.array([1.0, 1.0, 0.2, 0.2])
+    gains = evidence_of_will([worn], [quiet + push])
+    assert gains[1] > 6.0
+    assert gains[0] == 0.0
+
+
+def test_a_drag_of_the_machines_own_and_noise_are_no_push(worn):
+    quiet = noise(worn) * np.array([1.0, 1.0, 0.2, 0.2])
+    drag = bursts(worn)[:, np.newaxis] * np.array([0.0, 1.0, 0.0, 0.0])
+    assert np.all(evidence_of_will([worn], [quiet + drag]) == 0.0)
+    repeated = np.sin(2 * np.pi * 5 * worn.time / worn.motion.period_s)[:, np.newaxis]
+    assert np.all(evidence_of_will([worn], [quiet + repeated]) == 0.0), "a spring on the limb repeats with the motion"
+    silent = [evidence_of_will([worn], [noise(worn, seed) * np.array([1, 1, 0.2, 0.2])]) for seed in range(20)]
+    assert np.all(np.array(silent) == 0.0)
+
+
 def standing(before, after, floor=1.0, torque=20.0, samples=500.0):
     """One joint's errors, the other at the floor; slow and all errors alike."""
     floors = np.array([floor, floor])
     errors = [SlowError(np.array([rms, floor]), floors, np.full(2, samples)) for rms in (before, after)]
     return Standing(floors, errors[0].rms, errors[1].rms, *errors, np.array([torque, torque]))
+
+
+def test_what_is_a_little_off_in_every_cuff_does_not_outweigh_what_is_missing_in_a_drive():
+    floors = np.array([1.0, 1.0, 0.02, 0.02])
+    before, after = (SlowError(np.array([rms, 1.0, 0.1, 0.1]), floors, np.full(4, 500.0)) for rms in (1.5, 1.0))
+    made = Standing(floors[:2], before.rms[:2], after.rms[:2], before, after, np.array([20.0, 20.0, 10.0, 10.0]))
+    assert made.held_up([EncoderOffset(joint="hip")])
+    loud = replace(before, rms=np.array([1.5, 1.0, 0.6, 0.6])), replace(after, rms=np.array([1.0, 1.0, 0.6, 0.6]))
+    assert not replace(made, slow_before=loud[0], slow_after=loud[1]).held_up([EncoderOffset(joint="hip")])
 
 
 def test_causes_are_dropped_where_plain_error_is_left_and_three_of_them_sooner():
@@ -91,7 +130,7 @@ def test_an_error_that_grows_on_other_runs_is_no_cause():
 
 def test_trust_falls_with_what_is_plainly_left():
     assert standing(3.0, 1.0).trust == pytest.approx(1.0)
-    assert standing(3.0, 2.0).trust == pytest.approx(1.0 - 0.5 * 3.0 / 8.0)
+    assert standing(3.0, 2.0, torque=0.0).trust == pytest.approx(1.0 - 0.5 * 3.0 / 8.0)
     assert standing(1.2, 1.1, samples=20.0).trust > 0.9, "what chance could have left is not held against a cause"
 
 

@@ -7,7 +7,8 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pipelines.diagnosis.diagnose import Diagnosis, Extended
+from pipelines.diagnosis.diagnose import Diagnosis
+from pipelines.diagnosis.examined import Extended
 from pipelines.diagnosis.figures.palette import AFTER, BEFORE, MEASURED, NOISE
 from pipelines.diagnosis.replayed import Stretch, simulated_error, worst_stretch
 

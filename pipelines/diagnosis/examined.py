@@ -1,0 +1,90 @@
+"""What a set of causes leaves of the validation runs, and whether that lets them stay named."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.choice import MOST_INDEPENDENT, NEEDED, Choice
+from pipelines.diagnosis.evaluate import evaluate
+from pipelines.diagnosis.fit import Fit
+from pipelines.diagnosis.floor import Floor, noise_floor, slow_scatter
+from pipelines.diagnosis.gain import Errors, errors_of
+from pipelines.diagnosis.impacts import evidence_of_play
+from pipelines.diagnosis.observations import Baseline, Run
+from pipelines.diagnosis.search import known_besides
+from pipelines.diagnosis.slow import slow_error
+from pipelines.diagnosis.status import WANDERING, Standing
+from pipelines.diagnosis.tone import strongest_tone
+from pipelines.diagnosis.volition import evidence_of_will
+from pipelines.effects import Backlash, VoluntaryTorque
+
+
+@dataclass(frozen=True)
+class Extended:
+    """A set of causes, fitted, and what it leaves of the validation runs."""
+
+    fit: Fit
+    residuals: tuple[NDArray, ...]
+    """(m, O) of each validation run."""
+    errors: Errors
+
+    @classmethod
+    def of(cls, made: Fit, validate: Sequence[Run], baseline: Baseline) -> "Extended":
+        """Evaluate a fit on the validation runs."""
+        residuals = tuple(evaluate(made, validate, baseline))
+        return cls(made, residuals, errors_of(validate, residuals))
+
+
+@dataclass(frozen=True)
+class Examined:
+    """What a fit leaves of the validation runs, and what that says of its causes."""
+
+    after: Extended
+    floor: Floor
+    standing: Standing
+    unsteady: bool
+    """Whether something hums, or does not repeat with the motion."""
+    holds_up: bool
+    """Whether its causes may stay named."""
+
+    @classmethod
+    def of(cls, choice: Choice, before: Extended, validate: Sequence[Run], baseline: Baseline) -> "Examined":
+        """Examine what is chosen beside the baseline."""
+        made, J = choice.named.fit, len(baseline.joints)
+        after = Extended.of(made, validate, baseline)
+        floor = noise_floor(validate, after.residuals)
+        standing = _standing(before, after, floor, validate)
+        hums = standing.hums(strongest_tone(validate, after.residuals)[:J])
+        wanders = bool(np.any(slow_scatter(validate, after.residuals)[:J] > WANDERING))
+        effects = [cause.effect for cause in made.causes]
+        foreign = (hums or (wanders and not any(effect.per_run for effect in effects))) and not standing.rings(effects)
+        # Play rings on as it likes, and a wearer pushes at will: what no model follows there is no reason to doubt
+        # what was heard and felt in these runs too.
+        known = known_besides(made.causes, evidence_in(validate, before.residuals)) > NEEDED
+        holds_up = known or (not foreign and standing.held_up(effects))
+        if not holds_up and not foreign and choice.freer is not None:
+            # What is left may be the cause's own, in a form that takes two of ours.
+            freer = Extended.of(choice.freer, validate, baseline)
+            holds_up = standing.takes_enough and _standing(before, freer, floor, validate).held_up(effects)
+        return cls(after, floor, standing, wanders or hums, holds_up)
+
+
+def evidence_in(runs: Sequence[Run], residuals: Sequence[NDArray]) -> dict[str, float]:
+    """Return what is known of causes besides what they do to the mean torque, by label."""
+    joints = runs[0].motion.joints
+    known = {Backlash: evidence_of_play(runs, residuals, MOST_INDEPENDENT),
+             VoluntaryTorque: evidence_of_will(runs, residuals)}  # fmt: skip
+    return {
+        effect(joint=joint).label: float(gain)
+        for effect, gains in known.items() for joint, gain in zip(joints, gains, strict=True)
+    }  # fmt: skip
+
+
+def _standing(before: Extended, after: Extended, floor: Floor, validate: Sequence[Run]) -> Standing:
+    J = len(validate[0].motion.joints)
+    count = np.maximum(sum(run.usable.sum(axis=0) for run in validate), 1)
+    squares = sum(np.sum(np.where(run.usable, run.measured, 0.0) ** 2, axis=0) for run in validate)
+    slow, left = (slow_error(validate, extended.residuals) for extended in (before, after))
+    return Standing(floor.rms[:J], before.errors.rms, after.errors.rms, slow, left, np.sqrt(squares / count))

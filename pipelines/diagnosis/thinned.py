@@ -1,0 +1,31 @@
+"""Fast recordings at the rate that the diagnosis needs: motion below 20 Hz asks for no kilohertz."""
+
+from dataclasses import replace
+
+from pipelines.estimation.regression import block_average
+from pipelines.mechanics.motion import Motion
+from pipelines.signals.blocks import BlockAverage
+
+ENOUGH_HZ = 200.0
+"""Rate down to which neighbouring samples are averaged."""
+
+
+def thinned(motion: Motion) -> Motion:
+    """Return the motion with neighbouring samples averaged to ``ENOUGH_HZ`` or a little more; as it is where slower."""
+    every = BlockAverage(int(motion.sample_rate_hz // ENOUGH_HZ))
+    if every.decimation < 2:
+        return motion
+    starts = every.starts(motion.segment)
+    averaged = {
+        name: every.mean(getattr(motion, name), starts)
+        for name in ("time", "q", "dq", "ddq", "torque", "forces", "reference", "measured_angle", "temperature")
+        if getattr(motion, name) is not None
+    }
+    blocks = BlockAverage(max(1, round(block_average(motion).decimation / every.decimation)))
+    rate = motion.sample_rate_hz / every.decimation
+    return replace(
+        motion, **averaged, segment=motion.segment[starts], valid=every.all(motion.valid, starts),
+        sequence=None if motion.sequence is None else motion.sequence[starts], sample_rate_hz=rate,
+        load=None, limb_load=None, body=None, limb_body=None,
+        metadata={**motion.metadata, "regression_filter": blocks.as_metadata(rate)},
+    )  # fmt: skip

@@ -1,0 +1,59 @@
+"""A recording at a kilohertz says what it says at 200 Hz, and is diagnosed as such."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pipelines.diagnosis.observations import observe
+from pipelines.diagnosis.thinned import thinned
+from tests.diagnosis.sessions import session
+
+RATE_HZ = 1000.0
+
+
+@pytest.fixture(scope="module")
+def fast():
+    """A motion between whose samples four more are put, on the lines that join them; noise is on the torque alone."""
+    slow = session(seconds=20.0)[3]
+    time = np.arange(5 * len(slow)) / RATE_HZ
+    at = {
+        name: np.column_stack([np.interp(time, slow.time, column) for column in getattr(slow, name).T])
+        for name in ("q", "dq", "ddq")
+    }
+    torque = np.repeat(slow.torque, 5, axis=0) + np.random.default_rng(0).normal(size=(len(time), 2))
+    forces = np.repeat(slow.forces, 5, axis=0)
+    blocks = {**slow.metadata["regression_filter"], "decimation": 25}
+    return replace(
+        slow, time=time, **at, torque=torque, forces=forces, segment=np.repeat(slow.segment, 5),
+        valid=np.repeat(slow.valid, 5), sample_rate_hz=RATE_HZ, sequence=None, reference=None, measured_angle=None,
+        temperature=None, metadata={**slow.metadata, "regression_filter": blocks},
+    )  # fmt: skip
+
+
+def test_a_kilohertz_becomes_200_hz_and_the_blocks_last_as_long_as_before(fast):
+    thin = thinned(fast)
+    assert thin.sample_rate_hz == 200.0
+    assert len(thin) == len(fast) // 5
+    before, after = observe(fast), observe(thin)
+    assert_allclose(after.time, before.time, atol=1e-9)
+    assert_allclose(after.measured[:, :2], before.measured[:, :2], atol=1e-9)
+    # The cuffs' torque also goes with the angle, which moves 2 ms within an average.
+    assert_allclose(after.measured[:, 2:], before.measured[:, 2:], atol=1e-4)
+    assert_allclose(after.state[0], before.state[0], atol=1e-9)
+
+
+def test_a_slow_recording_is_left_as_it_is(fast):
+    thin = thinned(fast)
+    assert thinned(thin) is thin
+
+
+def test_no_average_reaches_across_a_gap(fast):
+    segment = np.zeros(len(fast), dtype=np.int64)
+    segment[1003:] = 1
+    time = fast.time + 0.5 * segment
+    thin = thinned(replace(fast, segment=segment, time=time))
+    spread = np.diff(thin.time)
+    assert np.count_nonzero(spread > 0.4) == 1
+    assert not np.any((thin.time > fast.time[1002] + 0.002) & (thin.time < time[1003]))
