@@ -1,6 +1,7 @@
 """Fast recordings at the rate that the diagnosis needs: motion below 20 Hz asks for no kilohertz."""
 
 from dataclasses import replace
+from typing import Any
 
 from pipelines.estimation.regression import block_average
 from pipelines.mechanics.motion import Motion
@@ -16,7 +17,7 @@ def thinned(motion: Motion) -> Motion:
     if every.decimation < 2:
         return motion
     starts = every.starts(motion.segment)
-    averaged = {
+    averaged: dict[str, Any] = {
         name: every.mean(getattr(motion, name), starts)
         for name in ("time", "q", "dq", "ddq", "torque", "forces", "reference", "measured_angle", "temperature")
         if getattr(motion, name) is not None
