@@ -1,17 +1,21 @@
 """Every candidate's columns at every shape, multiplied out once."""
 
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates import Candidate, expanded, gram_of_runs, proposals, signatures
-from pipelines.diagnosis.gram import Gram, error, solve
-from pipelines.diagnosis.observations import Baseline, Run, with_load
+from pipelines.diagnosis.gram import Gram, error, gram_of, solve
+from pipelines.diagnosis.observations import FOLDS, Baseline, Run, with_load
 from pipelines.diagnosis.scan import Scan, worth_a_look
 
 PASSES = 3
+ROWS = 4096
+"""Blocks whose columns stand side by side in memory: hours of them would be gigabytes."""
 Report = Callable[[float, str], None]
 
 
@@ -71,5 +75,17 @@ def fill(
             where.append(slice(at, at + made[0].shape[2]))
             columns.append(made)
             at += made[0].shape[2]
-    stacked = [np.concatenate([column[r] for column in columns], axis=2) for r in range(len(runs))]
-    return Bank(tuple(runs), baseline, tuple(candidates), tuple(where), gram_of_runs(runs, stacked), weights)
+    return Bank(tuple(runs), baseline, tuple(candidates), tuple(where), _multiplied_out(runs, columns), weights)
+
+
+def _multiplied_out(runs: Sequence[Run], columns: Sequence[Sequence[NDArray]]) -> Gram:
+    """Return the products of all columns, each a list over runs: side by side only some rows at a time."""
+    grams = (
+        gram_of(
+            np.concatenate([column[r][rows] for column in columns], axis=2),
+            run.measured[rows], run.usable[rows], run.fold[rows], FOLDS,
+        )
+        for r, run in enumerate(runs)
+        for rows in (slice(first, first + ROWS) for first in range(0, len(run.time), ROWS))
+    )  # fmt: skip
+    return reduce(operator.add, grams)
