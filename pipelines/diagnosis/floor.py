@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from pipelines.diagnosis.observations import Run
 
@@ -25,14 +26,15 @@ class Floor:
 def noise_floor(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Floor:
     """Estimate the noise from differences between adjacent periods at the same phase.
 
-    ``residuals`` (m, O) of each run; slow drift cancels in the differences of adjacent periods.
+    ``residuals`` (m, O) of each run; slow drift cancels in the differences of adjacent periods. Without periods the
+    noise is what is faster than the motion, and as dense below: what is missing and as fast passes for noise.
     """
     pairs = [scatter(run, residual) for run, residual in zip(runs, residuals, strict=True)]
-    if not any(len(d) for d in pairs):
-        pairs = [_successive(run, residual) for run, residual in zip(runs, residuals, strict=True)]
-        from_periods = False
-    else:
-        from_periods = True
+    from_periods = any(len(d) for d in pairs)
+    averaged = np.inf
+    if not from_periods:
+        averaged = min(_blocks(run, LONGEST_LAG_S) for run in runs)
+        pairs = [faster(run, residual, LONGEST_LAG_S) for run, residual in zip(runs, residuals, strict=True)]
     outputs = residuals[0].shape[1]
     rms, share = np.full(outputs, np.nan), np.ones(outputs)
     for o in range(outputs):
@@ -40,8 +42,10 @@ def noise_floor(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Floor:
         known = np.concatenate(d)
         known = known[np.isfinite(known)]
         if len(known) > 20:
-            rms[o] = np.sqrt(np.mean(known**2))
-            share[o] = 1.0 / _correlation_time(d)
+            time = _correlation_time(d)
+            # The average that was taken off held a part of the noise too.
+            rms[o] = np.sqrt(np.mean(known**2) / max(1.0 - time / averaged, 0.5))
+            share[o] = 1.0 / time
     return Floor(rms, share, from_periods)
 
 
@@ -89,10 +93,20 @@ def scatter(run: Run, residual: NDArray) -> NDArray:
     return np.where(usable, (residual[later] - residual[now]) / np.sqrt(2), np.nan)
 
 
-def _successive(run: Run, residual: NDArray) -> NDArray:
-    """Without periods: second differences of successive blocks, which no slow motion survives."""
-    usable = run.usable[2:] & run.usable[1:-1] & run.usable[:-2]
-    return np.where(usable, (residual[2:] - 2 * residual[1:-1] + residual[:-2]) / np.sqrt(6), np.nan)
+def faster(run: Run, residual: NDArray, than_s: float) -> NDArray:
+    """Return a residual (m, O) less its running average over ``than_s``, NaN where it is not usable.
+
+    Next to a gap or a reversal the average is of those samples that are usable, at least half.
+    """
+    width = _blocks(run, than_s)
+    known = uniform_filter1d(run.usable.astype(float), width, axis=0, mode="nearest")
+    mean = uniform_filter1d(np.where(run.usable, residual, 0.0), width, axis=0, mode="nearest")
+    return np.where(run.usable & (known > 0.5), residual - mean / np.maximum(known, 1e-9), np.nan)
+
+
+def _blocks(run: Run, seconds: float) -> int:
+    """Return how many blocks last so long, at least 3."""
+    return max(3, round(seconds * run.motion.sample_rate_hz / run.block.decimation))
 
 
 def _correlation_time(series: Sequence[NDArray]) -> float:
