@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.candidates import Candidate
 from pipelines.diagnosis.fit import Fit, laden, stacked_columns
 from pipelines.diagnosis.observations import Baseline, Run
+from pipelines.diagnosis.slow import slow_error
 from pipelines.estimation.least_squares import long_run_covariance
 
 ALIKE_S = 0.5
@@ -30,20 +31,17 @@ class Uncertainty:
 def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: NDArray) -> Uncertainty:
     """Linearise about a fit: its columns, and what a step in each free shape does to the prediction.
 
-    Beside the noise stands what no model of a good rig gets right, ``imperfect`` (O,) N·m rms: small against the
-    noise, but much alike from sample to sample, and so the larger part of what hours of data leave in doubt.
+    Beside the noise stands what the model gets wrong with the motion: what it leaves of slow error, and at the least
+    what no model of a good rig gets right, ``imperfect`` (O,) N·m rms. It is small against the noise, but much alike
+    from sample to sample, and so the larger part of what hours of data leave in doubt. Shapes that are not fitted but
+    taken at a usual value may be anywhere in their typical range.
     """
     runs = laden(runs, fit, baseline)
     plain = stacked_columns(fit.causes, runs, baseline)
     columns = [c for c, _ in plain]
     left = [y - c @ fit.values for c, y in plain]
-    places, slopes = [], []
-    for cause, i, run in _free_shapes(fit.causes, len(runs)):
-        moved, step = _moved(fit.causes, cause, i, run)
-        ahead = stacked_columns(moved, runs, baseline)
-        slopes.append([((c @ fit.values - y) - (d @ fit.values - z)) / step
-                       for (c, y), (d, z) in zip(ahead, plain, strict=True)])  # fmt: skip
-        places.append((cause, i, run))
+    places = _shapes(fit.causes, len(runs), fitted=True)
+    slopes = [_slope(fit, place, runs, baseline, plain) for place in places]
     wide = [np.concatenate([c, *(s[r][:, :, np.newaxis] for s in slopes)], axis=2) for r, c in enumerate(columns)]
     weights = fit.weights
     gram = sum(np.einsum("mo,o,moi,moj->ij", run.usable, weights, a, a) for run, a in zip(runs, wide, strict=True))
@@ -51,19 +49,44 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
         np.einsum("mo,o,mo,moi->mi", run.usable, weights, e, a) for run, e, a in zip(runs, left, wide, strict=True)
     ]
     filling, critical = long_run_covariance([[s] for s in scores], gram.shape[0])
-    for observed, a in zip(runs, wide, strict=True):
-        alike = ALIKE_S * observed.motion.sample_rate_hz / observed.block.decimation
-        filling = filling + np.einsum("mo,o,moi,moj->ij", observed.usable, alike * (weights * imperfect) ** 2, a, a)
+    misfit = np.maximum(imperfect, slow_error(runs, left).excess)
+    for run, a in zip(runs, wide, strict=True):
+        alike = ALIKE_S * run.motion.sample_rate_hz / run.block.decimation
+        filling = filling + np.einsum("mo,o,moi,moj->ij", run.usable, alike * (weights * misfit) ** 2, a, a)
+    for place in _shapes(fit.causes, len(runs), fitted=False):
+        low, high = fit.causes[place[0]].effect.shape[place[1]].typical
+        assumed = _slope(fit, place, runs, baseline, plain)
+        pull = sum(
+            np.einsum("mo,o,moi,mo->i", run.usable, weights, a, s)
+            for run, a, s in zip(runs, wide, assumed, strict=True)
+        )
+        filling = filling + np.outer(pull, pull) * (high - low) ** 2 / 12.0
     inverse = np.linalg.pinv(gram, rcond=1e-13, hermitian=True)
-    return Uncertainty(inverse @ filling @ inverse, critical, tuple(places))
+    covariance = inverse @ filling @ inverse
+    for at, (number, i, r) in enumerate(places, start=len(fit.values)):
+        if i == 0:
+            cause = fit.causes[number]
+            covariance[at, at] += (cause.effect.known_to * cause.shapes[max(r, 0)][0]) ** 2
+    return Uncertainty(covariance, critical, tuple(places))
 
 
-def _free_shapes(causes: Sequence[Candidate], runs: int) -> list[tuple[int, int, int]]:
+def _slope(
+    fit: Fit, place: tuple[int, int, int], runs: Sequence[Run], baseline: Baseline,
+    plain: Sequence[tuple[NDArray, NDArray]],
+) -> list[NDArray]:  # fmt: skip
+    """Return what a shape does to the prediction, per unit of it, (m, O) of each run."""
+    moved, step = _moved(fit.causes, *place)
+    ahead = stacked_columns(moved, runs, baseline)
+    return [((c @ fit.values - y) - (d @ fit.values - z)) / step for (c, y), (d, z) in zip(ahead, plain, strict=True)]
+
+
+def _shapes(causes: Sequence[Candidate], runs: int, fitted: bool) -> list[tuple[int, int, int]]:
+    """Return each shape that is fitted, or not, as (cause, shape parameter, run); run -1 where all share it."""
     return [
         (number, i, run)
         for number, cause in enumerate(causes)
         for i, parameter in enumerate(cause.effect.shape)
-        if parameter.default is None and not parameter.forms
+        if (parameter.default is None) == fitted and not parameter.forms
         for run in (range(runs) if parameter.per_run else (-1,))
     ]
 

@@ -32,6 +32,7 @@ class Backlash(Effect):
     confirm = "hold the motor and shake the link by hand: it moves freely by the play"
     shape = (Parameter("play", "rad", "free travel from stop to stop", "p", (0.003, 0.06)),)
     motor_inertia = MOTOR_INERTIA
+    known_to = 0.2
 
     @spring
     def spring(twist, twist_rate, values):

@@ -47,6 +47,7 @@ class CuffCompliance(Effect):
     )  # fmt: skip
     at_cuff = True
     motor_inertia = MACHINE_INERTIA
+    known_to = 0.05
     swings = True
 
     @spring

@@ -107,6 +107,8 @@ class Effect(ABC):
     """True where ``reaction`` depends on acceleration: it then adds to the mass matrix."""
     motor_inertia: ClassVar[float] = 0.0
     """kg·m² on the motor's side of ``spring``."""
+    known_to: ClassVar[float] = 0.0
+    """Relative standard error that the effect's approximation of itself adds to its first shape, whatever the data."""
     at_cuff: ClassVar[bool] = False
     """True where ``spring`` stands between machine and limb, not between motor and link."""
     swings: ClassVar[bool] = False

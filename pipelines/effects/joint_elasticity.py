@@ -38,6 +38,7 @@ class JointElasticity(Effect):
         ),
     )  # fmt: skip
     motor_inertia = MOTOR_INERTIA
+    known_to = 0.08
     swings = True
 
     @spring
