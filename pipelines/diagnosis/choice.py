@@ -47,25 +47,28 @@ class Choice:
     refined: list[dict[tuple[str, ...], Ranked]]
     """By size of the set, the empty one first."""
     independent: NDArray
+    standby: tuple[Ranked, ...] = ()
+    """Sets as worthy as the named one that training hardly tells from it, best first."""
     freer: Fit | None = None
     """The named set with one of its causes in two shapes at once, where that was tried."""
     refuted: frozenset[tuple[str, ...]] = frozenset()
     """Sets that explain the training runs and fail on others."""
 
     def next_best(self) -> "Choice | None":
-        """Return the choice with the named set refuted, of the sets that training hardly tells from it; None without.
+        """Return the choice with the named set refuted and the next of those as good; None where there is none.
 
         So runs that are never fitted decide only between explanations that are as good as one another.
         """
+        if not self.standby:
+            return None
         refuted = self.refuted | {self.named.labels}
-        level = self.refined[len(self.named.labels)]
-        close = max(ranked.score for ranked in level.values()) - NEEDED
-        left = [ranked for labels, ranked in level.items() if labels not in refuted and ranked.score > close]
-        return replace(self, named=max(left, key=lambda r: r.score), freer=None, refuted=refuted) if left else None
+        return replace(self, named=self.standby[0], standby=self.standby[1:], freer=None, refuted=refuted)
 
     def none_left(self, empty: Fit) -> "Choice":
         """Return the choice of no cause, the named set refuted."""
-        return replace(self, named=Ranked(empty, 0.0), freer=None, refuted=self.refuted | {self.named.labels})
+        return replace(
+            self, named=Ranked(empty, 0.0), standby=(), freer=None, refuted=self.refuted | {self.named.labels}
+        )
 
     def alone(self, cause: str) -> float:
         """Return what a cause gains in log likelihood with no other beside it."""
@@ -92,8 +95,9 @@ def choose(bank: Bank, floor: Floor, evidence: Mapping[str, float]) -> Choice:
     named = Ranked(empty, 0.0)
     ranked = [{named.labels: named}]
     freer: list[Ranked] = []
+    standby: list[Ranked] = []
     for level in levels:
-        finalists = [_rank(scorer, s, empty) for s in _finalists(level, named, scorer.imperfect)]
+        finalists = [_rank(scorer, s, empty) for s in _finalists(level, named, scorer)]
         ranked.append({r.labels: r for r in finalists})
         if not finalists:
             break
@@ -101,26 +105,36 @@ def choose(bank: Bank, floor: Floor, evidence: Mapping[str, float]) -> Choice:
         worthy = [r for r in finalists if all(_worth_it(r, before, scorer) for before in (named, *freer))]
         if not worthy:
             break
-        named, freer = max(worthy, key=lambda r: r.score), []
-    return Choice(named, levels, ranked, independent, freer[0].fit if freer else None)
+        named, *others = sorted(worthy, key=lambda r: -r.score)
+        freer, standby = [], [r for r in others if r.score > named.score - NEEDED]
+    return Choice(named, levels, ranked, independent, tuple(standby), freer[0].fit if freer else None)
 
 
 def _freer(level: dict[tuple[str, ...], Scored], named: Ranked) -> list[Scored]:
     """Return the named set with one of its causes in two shapes at once, the best of such sets, if there is any."""
     made = [tuple(sorted((*named.labels, label))) for label in named.labels]
-    found = [level[labels] for labels in made if labels in level and not level[labels].bound]
+    found = [level[labels] for labels in made if labels in level and level[labels].admissible]
     return sorted(found, key=lambda s: -s.score)[:1]
 
 
-def _finalists(level: dict[tuple[str, ...], Scored], named: Ranked, imperfect: NDArray) -> list[Scored]:
+def _finalists(level: dict[tuple[str, ...], Scored], named: Ranked, scorer: Scorer) -> list[Scored]:
     """Return the sets that may be best once refined, those that would show at all first.
 
     Beside the best ones stands the best that extends what is named so far.
     """
+    known = known_besides(named.fit.causes, scorer.evidence)
+
+    def shows(s: Scored) -> bool:
+        causes = [scorer.bank.candidates[i] for i in s.chosen]
+        seen_otherwise = known_besides(causes, scorer.evidence) - known > NEEDED
+        return seen_otherwise or bool(np.any(_material(s.error, named.fit.rms, scorer.imperfect)))
+
     ordered = sorted(
-        ((labels, s) for labels, s in level.items() if len(set(labels)) == len(labels) and not s.bound),
-        key=lambda e: (not np.any(_material(e[1].error, named.fit.rms, imperfect)), -e[1].score),
+        ((labels, s) for labels, s in level.items() if len(set(labels)) == len(labels) and s.admissible),
+        key=lambda e: (not shows(e[1]), -e[1].score),
     )
+    if not ordered:
+        return []
     furthest = ordered[0][1].score - max(BEHIND, BEHIND_SHARE * ordered[0][1].score)
     near = [(labels, s) for labels, s in ordered[:FINALISTS] if s.score > furthest]
     extending = [(labels, s) for labels, s in ordered if set(named.labels) < set(labels)][:1]

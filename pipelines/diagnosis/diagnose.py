@@ -20,7 +20,7 @@ from pipelines.diagnosis.choice import (
     probabilities,
     rivals,
 )
-from pipelines.diagnosis.examined import Examined, Extended, evidence_in
+from pipelines.diagnosis.examined import Examined, Extended, heard_in
 from pipelines.diagnosis.faults import Fault, excluding, find_faults
 from pipelines.diagnosis.fit import Fit, fit, residuals_on
 from pipelines.diagnosis.fitted_model import model_of_run
@@ -136,7 +136,7 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
     report(SEARCH_SHARE, "combinations")
     left = residuals_on(empty, bank.runs, baseline)
     spoilt = any(fault.spoils for fault in faults)
-    evidence = evidence_in(bank.runs, left)
+    evidence = heard_in(bank.runs, left)
     choice = nothing_chosen(empty) if spoilt else choose(bank, noise_floor(bank.runs, left), evidence)
     before = Extended.of(empty, validate, baseline)
     examine = partial(Examined.of, before=before, validate=validate, baseline=baseline)

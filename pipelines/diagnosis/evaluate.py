@@ -4,7 +4,7 @@ Shared parameters come from training. What is tied to wall time, an onset or a p
 fits for itself: on odd seconds to be scored on even ones, and the other way round.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.candidates import Candidate, columns_under
 from pipelines.diagnosis.fit import Fit, laden
 from pipelines.diagnosis.observations import Baseline, Run
-from pipelines.diagnosis.scan import ALWAYS, NEVER, ONSETS
+from pipelines.diagnosis.scan import ALWAYS, NEVER
 from pipelines.model import Term
 
 STRETCH_S = 1.0
 """Of every second stretch a run's own onsets and phases are learnt, to be scored on the others."""
-FINER = 9
-"""Instants tried about the best onset of the first search."""
+COARSE, CLOSER_LOOKS = 20, 2
+"""Instants tried along a run, and how often six more are tried about the best, four times as closely."""
 ALIKE = 4.0
 """Weighted squared error within which two onsets explain a run alike."""
 
@@ -34,17 +34,21 @@ def _residual(fit: Fit, run: Run, baseline: Baseline) -> NDArray:
     if not any(effect.per_run and effect.explains(run.motion) for effect in effects):
         columns, measured = columns_under([_shared_term(c) for c in fit.causes], run, baseline)
         return measured - columns @ _shared_values(fit, baseline)[0]
-    left = np.zeros_like(run.measured)
     half = _halves(run)
-    for side in (0, 1):
-        learnt = run.usable & (half != side)[:, np.newaxis]
-        left[half == side] = _own(fit, run, baseline, learnt)[half == side]
+    sides = [half == side for side in (0, 1)]
+    learnt = _learn(fit, run, baseline, [run.usable & ~side[:, np.newaxis] for side in sides])
+    left = np.zeros_like(run.measured)
+    for side, (_, own, _) in zip(sides, learnt, strict=True):
+        left[side] = own[side]
     return left
 
 
 def _halves(run: Run) -> NDArray:
-    """Deal the blocks out to two halves, second by second: an onset is as well known as that."""
-    return np.floor(run.time / STRETCH_S).astype(int) % 2
+    """Deal the blocks out to two halves, second by second: an onset is as well known as that.
+
+    In Thue and Morse's order, which no rhythm shares.
+    """
+    return np.bitwise_count(np.floor((run.time - run.time[0]) / STRETCH_S).astype(np.int64)) % 2
 
 
 def _shared_term(cause: Candidate) -> Term:
@@ -67,7 +71,7 @@ def _shared_values(fit: Fit, baseline: Baseline) -> tuple[NDArray, NDArray]:
 
 def settled(fit: Fit, run: Run, baseline: Baseline) -> tuple[list[Term], NDArray]:
     """Return the causes as terms of a run's model with its own onsets and phases, and the baseline's values."""
-    values, _, terms = _learn(fit, laden([run], fit, baseline)[0], baseline, run.usable)
+    values, _, terms = _learn(fit, laden([run], fit, baseline)[0], baseline, [run.usable])[0]
     at = baseline.size
     filled = []
     for term in terms:
@@ -77,12 +81,12 @@ def settled(fit: Fit, run: Run, baseline: Baseline) -> tuple[list[Term], NDArray
     return filled, values[: baseline.size]
 
 
-def _own(fit: Fit, run: Run, baseline: Baseline, learnt: NDArray) -> NDArray:
-    return _learn(fit, run, baseline, learnt)[1]
+Learnt = tuple[NDArray, NDArray, list[Term]]
+"""Values, residual (m, O), and the terms with a run's own onsets."""
 
 
-def _learn(fit: Fit, run: Run, baseline: Baseline, learnt: NDArray) -> tuple[NDArray, NDArray, list[Term]]:
-    """Fit the run's own onsets and phases where ``learnt`` (m, O): values, residual (m, O), terms.
+def _learn(fit: Fit, run: Run, baseline: Baseline, masks: Sequence[NDArray]) -> list[Learnt]:
+    """Fit the run's own onsets and phases to those samples of each mask (m, O).
 
     Onsets that explain the learnt samples alike are as likely as one another, and the middle one is taken; but what
     was there all along, or never, needs no coincidence.
@@ -90,37 +94,51 @@ def _learn(fit: Fit, run: Run, baseline: Baseline, learnt: NDArray) -> tuple[NDA
     terms = [_shared_term(cause) for cause in fit.causes]
     dated = _onset(fit)
     if dated is None:
-        return _learn_amplitudes(fit, terms, run, baseline, learnt)[1:]
+        return [entry[1:] for entry in _learn_amplitudes(fit, terms, run, baseline, masks)]
+    tried: dict[float, list[tuple[float, NDArray, NDArray, list[Term]]]] = {}
 
-    def learn_from(instant: float) -> tuple[float, NDArray, NDArray, list[Term]]:
-        return _learn_amplitudes(fit, _beginning(terms, *dated, instant), run, baseline, learnt)
+    def look_at(instants: Iterable[float]) -> None:
+        for instant in set(instants) - set(tried):
+            begun = _beginning(terms, *dated, instant)
+            tried[instant] = _learn_amplitudes(fit, begun, run, baseline, masks)
 
-    simple = [learn_from(instant) for instant in (NEVER, ALWAYS)]
-    instants = np.linspace(run.time[0], run.time[-1], ONSETS + 2)[1:-1]
-    dating = {instant: learn_from(instant) for instant in instants}
-    best = min(dating, key=lambda instant: dating[instant][0])
-    apart = instants[1] - instants[0]
-    dating |= {instant: learn_from(instant) for instant in best + apart * np.linspace(-1.0, 1.0, FINER)}
-    alike = min(entry[0] for entry in (*simple, *dating.values())) + ALIKE
-    likely = [entry for entry in simple if entry[0] < alike][:1]
-    likely = likely or [dating[instant] for instant in sorted(dating) if dating[instant][0] < alike]
-    return likely[len(likely) // 2][1:]
+    instants = np.linspace(run.time[0], run.time[-1], COARSE + 2)[1:-1]
+    look_at([NEVER, ALWAYS, *instants])
+    for side in range(len(masks)):
+        apart = instants[1] - instants[0]
+        for _ in range(CLOSER_LOOKS):
+            apart /= 4.0
+            best = min(set(tried) - {NEVER, ALWAYS}, key=lambda instant: tried[instant][side][0])
+            look_at(best + apart * np.arange(-3, 4))
+    return [_likeliest({instant: entries[side] for instant, entries in tried.items()}) for side in range(len(masks))]
+
+
+def _likeliest(tried: dict[float, tuple[float, NDArray, NDArray, list[Term]]]) -> Learnt:
+    alike = min(entry[0] for entry in tried.values()) + ALIKE
+    for simple in (NEVER, ALWAYS):
+        if tried[simple][0] < alike:
+            return tried[simple][1:]
+    likely = [instant for instant in sorted(tried) if tried[instant][0] < alike]
+    return tried[likely[len(likely) // 2]][1:]
 
 
 def _learn_amplitudes(
-    fit: Fit, terms: list[Term], run: Run, baseline: Baseline, learnt: NDArray
-) -> tuple[float, NDArray, NDArray, list[Term]]:
-    """Fit the run's own amplitudes to terms of given shapes: squared error, values, residual (m, O), terms."""
+    fit: Fit, terms: list[Term], run: Run, baseline: Baseline, masks: Sequence[NDArray]
+) -> list[tuple[float, NDArray, NDArray, list[Term]]]:
+    """Fit the run's own amplitudes to terms of given shapes: of each mask squared error, values, residual, terms."""
     shared, own = _shared_values(fit, baseline)
     columns, measured = columns_under(terms, run, baseline)
-    values = shared.copy()
-    if own.any():
-        root = np.sqrt(fit.weights) * learnt
-        A = (columns[:, :, own] * root[:, :, np.newaxis]).reshape(-1, int(own.sum()))
-        values[own] = np.linalg.lstsq(A, ((measured - columns @ shared) * root).ravel(), rcond=1e-9)[0]
-    left = measured - columns @ values
-    squares = float(np.sum(fit.weights * np.sum(np.where(learnt, left, 0.0) ** 2, axis=0)))
-    return squares, values, left, terms
+    made = []
+    for learnt in masks:
+        values = shared.copy()
+        if own.any():
+            root = np.sqrt(fit.weights) * learnt
+            A = (columns[:, :, own] * root[:, :, np.newaxis]).reshape(-1, int(own.sum()))
+            values[own] = np.linalg.lstsq(A, ((measured - columns @ shared) * root).ravel(), rcond=1e-9)[0]
+        left = measured - columns @ values
+        squares = float(np.sum(fit.weights * np.sum(np.where(learnt, left, 0.0) ** 2, axis=0)))
+        made.append((squares, values, left, terms))
+    return made
 
 
 def _onset(fit: Fit) -> tuple[int, int] | None:

@@ -13,12 +13,11 @@ from pipelines.diagnosis.floor import Floor, noise_floor, slow_scatter
 from pipelines.diagnosis.gain import Errors, errors_of
 from pipelines.diagnosis.impacts import evidence_of_play
 from pipelines.diagnosis.observations import Baseline, Run
-from pipelines.diagnosis.search import known_besides
 from pipelines.diagnosis.slow import slow_error
 from pipelines.diagnosis.status import WANDERING, Standing
 from pipelines.diagnosis.tone import strongest_tone
 from pipelines.diagnosis.volition import evidence_of_will
-from pipelines.effects import Backlash, VoluntaryTorque
+from pipelines.effects import Backlash, Effect, VoluntaryTorque
 
 
 @dataclass(frozen=True)
@@ -62,8 +61,9 @@ class Examined:
         foreign = (hums or (wanders and not any(effect.per_run for effect in effects))) and not standing.rings(effects)
         # Play rings on as it likes, and a wearer pushes at will: what no model follows there is no reason to doubt
         # what was heard and felt in these runs too.
-        known = known_besides(made.causes, evidence_in(validate, before.residuals)) > NEEDED
-        holds_up = known or (not foreign and standing.held_up(effects))
+        known = {**heard_in(validate, before.residuals), **felt_in(validate, before.residuals)}
+        sure = [known.get(cause.label, 0.0) > NEEDED for cause in made.causes]
+        holds_up = (bool(sure) and all(sure)) or ((any(sure) or not foreign) and standing.held_up(effects))
         if not holds_up and not foreign and choice.freer is not None:
             # What is left may be the cause's own, in a form that takes two of ours.
             freer = Extended.of(choice.freer, validate, baseline)
@@ -71,15 +71,19 @@ class Examined:
         return cls(after, floor, standing, wanders or hums, holds_up)
 
 
-def evidence_in(runs: Sequence[Run], residuals: Sequence[NDArray]) -> dict[str, float]:
-    """Return what is known of causes besides what they do to the mean torque, by label."""
+def heard_in(runs: Sequence[Run], residuals: Sequence[NDArray]) -> dict[str, float]:
+    """Return the log likelihood that is known of play besides what it does to the mean torque, by label."""
+    return _by_label(Backlash, runs, evidence_of_play(runs, residuals, MOST_INDEPENDENT))
+
+
+def felt_in(runs: Sequence[Run], residuals: Sequence[NDArray]) -> dict[str, float]:
+    """Return that of a wearer's pushes. A rhythm fitted to them explains some of it: the two do not add up."""
+    return _by_label(VoluntaryTorque, runs, evidence_of_will(runs, residuals))
+
+
+def _by_label(effect: type[Effect], runs: Sequence[Run], gains: NDArray) -> dict[str, float]:
     joints = runs[0].motion.joints
-    known = {Backlash: evidence_of_play(runs, residuals, MOST_INDEPENDENT),
-             VoluntaryTorque: evidence_of_will(runs, residuals)}  # fmt: skip
-    return {
-        effect(joint=joint).label: float(gain)
-        for effect, gains in known.items() for joint, gain in zip(joints, gains, strict=True)
-    }  # fmt: skip
+    return {effect(joint=joint).label: float(gain) for joint, gain in zip(joints, gains, strict=True)}
 
 
 def _standing(before: Extended, after: Extended, floor: Floor, validate: Sequence[Run]) -> Standing:

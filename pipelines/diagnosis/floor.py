@@ -72,7 +72,7 @@ def slow_scatter(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray:
 def scatter(run: Run, residual: NDArray) -> NDArray:
     """Return differences of adjacent periods over the root of two, (k, O); NaN where either is not usable."""
     period = run.motion.period_s
-    if not period or run.time[-1] - run.time[0] < 2 * period:
+    if not period or not len(run.time) or run.time[-1] - run.time[0] < 2 * period:
         return np.zeros((0, residual.shape[1]))
     width = run.block.decimation / run.motion.sample_rate_hz
     shift = period / width

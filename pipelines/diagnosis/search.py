@@ -22,6 +22,8 @@ MOST = 3
 """Causes in a set."""
 SHAPE_COST = 2.0
 """What a shape parameter must gain, in units of log likelihood, for having been searched."""
+CHANCE = 2.0
+"""Log likelihood that a forbidden sign may gain by chance: the amplitude is nought then, within its noise."""
 IMPERFECTION = (0.009, 0.02)
 """Share of a drive's and of a cuff's torque that even a good model of a good machine leaves."""
 
@@ -36,7 +38,12 @@ class Scored:
     error: NDArray
     """(O,) root mean square held-out error, N·m."""
     bound: bool = False
-    """Whether an amplitude stands at nought, where physics forbids the sign that it would have."""
+    """Whether an amplitude stands at nought, where physics forbids the sign that it plainly would have."""
+
+    @property
+    def admissible(self) -> bool:
+        """Whether the set may be named as it is."""
+        return bool(np.isfinite(self.score)) and not self.bound
 
 
 def imperfection(gram: Gram) -> NDArray:
@@ -89,13 +96,14 @@ class Scorer:
         columns = self.bank.columns_of(chosen)
         gram = self.bank.gram.select(columns)
         forbidden = self._forbidden(gram, chosen)
-        bound = bool(forbidden.any())
-        if bound:
+        rms, bound = self._held_out(gram), False
+        if forbidden.any():
             # What is left of a cause whose amplitude is nought: of a spring, its preload; of most causes, nothing.
             gram = self.bank.gram.select(columns[~forbidden])
             if self._empty(forbidden, chosen) or self._still_forbidden(gram, forbidden, chosen):
                 return Scored(tuple(chosen), -np.inf, np.full(len(self.count), np.nan))
-        rms = self._held_out(gram)
+            free, rms = rms, self._held_out(gram)
+            bound = log_likelihood(free, rms, self.independent, self.imperfect) > CHANCE
         causes = [self.bank.candidates[i] for i in chosen]
         gain = log_likelihood(rms, self.plain, self.independent, self.imperfect)
         besides = known_besides(causes, self.evidence)
@@ -145,7 +153,7 @@ def best_of_each_label(bank: Bank, scored: Sequence[Scored]) -> dict[tuple[str, 
     best: dict[tuple[str, ...], Scored] = {}
     for s in scored:
         key = tuple(sorted(bank.candidates[i].label for i in s.chosen))
-        if key not in best or s.score > best[key].score:
+        if key not in best or (s.admissible, s.score) > (best[key].admissible, best[key].score):
             best[key] = s
     return best
 

@@ -90,23 +90,28 @@ class Standing:
 
     @property
     def _share_left(self) -> float:
-        """Share of all outputs' systematic power that is left."""
-        before = np.sum(self._power(self.slow_before.over(self.slow_after)))
-        return float(np.sum(self._power(self.slow_after)) / max(before, 1e-12))
+        """Share of all outputs' systematic power that is left; 1 where there was none."""
+        before, after = (np.sum(power) for power in self._powers())
+        return float(after / before) if before > 0 else 1.0
 
     def _left_at_the_worst(self) -> tuple[int, float]:
         """Return the joint where the systematic error was largest, and the share of its power that is left there."""
-        before = self._power(self.slow_before.over(self.slow_after))
+        before, after = self._powers()
         worst = int(np.argmax(before[: len(self.floor)]))
-        return worst, float(self._power(self.slow_after)[worst] / max(before[worst], 1e-12))
+        return worst, float(after[worst] / before[worst]) if before[worst] > 0 else 1.0
 
-    def _power(self, slow: SlowError) -> NDArray:
-        """Return the systematic power beyond a good rig's, in units of the floor's, (O,).
+    def _powers(self) -> tuple[NDArray, NDArray]:
+        """Return the systematic power before and after beyond a good rig's, in units of the floor's, (O,) each.
 
         A cuff's noise is so small that what is a little off in it always would outweigh what is missing in a drive.
+        Where nothing is beyond a good rig's, what there is counts.
         """
+        slow = self.slow_before.over(self.slow_after), self.slow_after
         good = imperfect_share(len(self.torque)) * self.torque
-        return np.asarray(np.maximum(slow.excess**2 - good**2, 0.0) / slow.floor**2)
+        if not np.any(slow[0].excess > good):
+            good = np.zeros_like(good)
+        before, after = (np.maximum(s.excess**2 - good**2, 0.0) / s.floor**2 for s in slow)
+        return before, after
 
     @property
     def trust(self) -> float:

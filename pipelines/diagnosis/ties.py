@@ -39,6 +39,15 @@ STRUCTURAL: dict[frozenset[str], Tie] = {
         "while the load pushes to one side only, play shifts the angle by a constant half of it",
         "move the joint through angles where the load changes sign, or shake the link by hand",
     ),
+    frozenset({"parallel_spring", "torque_offset"}): Tie(
+        "a soft spring that is far wound up adds little but a constant torque",
+        "let the joint rest with the drive off, and unhook the spring: an offset of the sensor stays",
+    ),
+    frozenset({"parallel_spring", "coulomb_asymmetry"}): Tie(
+        "a soft spring that is far wound up adds little but a constant torque, as friction does that differs with "
+        "direction while the joint always moves",
+        "unhook the spring, or let the joint rest: friction holds it, a spring moves it",
+    ),
     frozenset({"torque_drift", "torque_offset"}): Tie(
         "over runs this short a drift is an offset that differs from run to run",
         "record longer, or read the torque at rest before and after each run",

@@ -97,10 +97,11 @@ def test_a_drag_of_the_machines_own_and_noise_are_no_push(worn):
 
 
 def standing(before, after, floor=1.0, torque=20.0, samples=500.0):
-    """One joint's errors, the other at the floor; slow and all errors alike."""
-    floors = np.array([floor, floor])
-    errors = [SlowError(np.array([rms, floor]), floors, np.full(2, samples)) for rms in (before, after)]
-    return Standing(floors, errors[0].rms, errors[1].rms, *errors, np.array([torque, torque]))
+    """One joint's errors, the other at the floor, no cuffs; slow and all errors alike."""
+    floors = np.array([floor, floor, np.inf, np.inf])
+    errors = [SlowError(np.array([rms, floor, 0.0, 0.0]), floors, np.full(4, samples)) for rms in (before, after)]
+    drives = (e.rms[:2] for e in errors)
+    return Standing(floors[:2], *drives, *errors, np.array([torque, torque, 0.0, 0.0]))
 
 
 def test_what_is_a_little_off_in_every_cuff_does_not_outweigh_what_is_missing_in_a_drive():
@@ -122,6 +123,13 @@ def test_causes_are_dropped_where_plain_error_is_left_and_three_of_them_sooner()
     assert not standing(3.0, 1.5).held_up(springless * 3)
     assert standing(3.0, 2.2).held_up(play), "what rings is not followed to the end"
     assert standing(3.0, 2.2).held_up([TorqueDrift(joint="hip")]), "nor is what goes with wall time"
+
+
+def test_what_takes_nothing_away_is_no_cause_however_little_there_was():
+    drag = [EncoderOffset(joint="hip")]
+    assert not standing(1.1, 1.1, torque=100.0).held_up(drag)
+    assert not standing(1.0, 1.0, torque=100.0).held_up(drag)
+    assert standing(1.1, 1.0, torque=100.0).held_up(drag)
 
 
 def test_an_error_that_grows_on_other_runs_is_no_cause():
