@@ -95,7 +95,8 @@ class Diagnosis:
 def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = silent) -> Diagnosis:
     """Find what the rigid body with Coulomb and viscous friction gets wrong, and why.
 
-    Selection, shapes and shared parameters use ``train`` runs; every error is measured on ``validate`` runs.
+    Selection, shapes and shared parameters use ``train`` runs; every error is measured on ``validate`` runs, which
+    may refute a set, and then decide among those that training can hardly tell from it.
 
     Parameters
     ----------
@@ -116,7 +117,8 @@ def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = s
     if first.spoilt or not (first.status == "unknown_cause" or (first.unsteady and _rings(first))):
         return first
     second = _look([slower(m) for m in sound], faults, report)
-    # What failed on other runs may not come back through the slow door; what was only hidden in noise may.
+    # Slow motion shows a transmission that rang too loud, and what was only hidden in noise; what failed as anything
+    # else may not come back.
     hidden = bool(second.causes) and not first.choice.named.labels and not first.choice.refuted
     return second if _rings(second) or hidden else first
 

@@ -1,7 +1,7 @@
 """What a model leaves of the validation runs, which no fit has seen.
 
 Shared parameters come from training. What is tied to wall time, an onset or a phase, each validation run
-fits for itself: on odd seconds to be scored on even ones, and the other way round.
+fits for itself: on one half of its seconds to be scored on the other, and the other way round.
 """
 
 from collections.abc import Iterable, Sequence
