@@ -190,26 +190,28 @@ def _finding(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -
             f"the {joint}'s torque error is {size}.{described}"
         )
     named = "; and ".join(_in_words(cause) for cause in causes)
+    most = int(((before**2 - after**2) / floor**2).argmax())
     return (
-        f"Missing from the simulation: {named}. With {'it' if len(causes) == 1 else 'them'} the {joint}'s torque error "
-        f"falls from {size}, to {after[worst]:.2f} N·m, {_remains(d, worst)}."
+        f"Missing from the simulation: {named}. With {'it' if len(causes) == 1 else 'them'} the "
+        f"{d.baseline.joints[most]}'s torque error falls from {before[most]:.2f} N·m, "
+        f"{before[most] / floor[most]:.2f} times the noise floor, to {after[most]:.2f} N·m, {_remains(d, most)}."
     )
 
 
-def _remains(d: Diagnosis, worst: int) -> str:
-    """Say how far the worst joint is from the floor, and at which other joints something stays unexplained."""
+def _remains(d: Diagnosis, told: int) -> str:
+    """Say how far the joint told of is from the floor, and at which other joints something stays unexplained."""
     ratio = d.standing.extended / d.standing.floor
     left = [
         share is not None and share > EXPLAINED and times > AT_FLOOR
         for share, times in zip(d.standing.unexplained, ratio, strict=True)
     ]
-    said = f"{'still ' if left[worst] else ''}{ratio[worst]:.2f} times the floor"
+    said = f"{'still ' if left[told] else ''}{ratio[told]:.2f} times the floor"
     others = [
         f"; the {d.baseline.joints[j]}'s is then {d.standing.extended[j]:.2f} N·m, {times:.2f} times its floor"
         for j, times in enumerate(ratio)
-        if left[j] and j != worst
+        if left[j] and j != told
     ]
-    return (said if ratio[worst] > AT_FLOOR else "which is noise") + "".join(others)
+    return (said if ratio[told] > AT_FLOOR else "which is noise") + "".join(others)
 
 
 def _in_words(cause: dict[str, Any]) -> str:

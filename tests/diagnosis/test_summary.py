@@ -54,6 +54,16 @@ def test_what_is_left_at_the_other_joint_is_said_to_be_there_and_how_much(stuck)
     )
 
 
+def test_the_gain_is_told_where_it_is_made_and_not_where_the_error_is_largest(stuck):
+    floor, before, after = np.array([0.3, 0.3]), np.array([0.9, 0.4]), np.array([0.9, 0.305])
+    made = replace(stuck.standing, floor=floor, baseline=before, extended=after)
+    said = _finding(replace(stuck, standing=made, status="partly_explained"), [SPRING], None)
+    assert (
+        "the knee's torque error falls from 0.40 N·m, 1.33 times the noise floor, to 0.30 N·m, which is noise; " in said
+    )
+    assert said.endswith("the hip's is then 0.90 N·m, 3.00 times its floor.")
+
+
 def test_a_floor_that_no_repetition_shows_is_said_to_be_a_guess(stuck):
     assert "guess" not in verdict(stuck)["summary"]
     without_periods = replace(stuck, floor=replace(stuck.floor, from_periods=False))
