@@ -98,10 +98,10 @@ def _show(said: dict[str, Any], output: Path) -> None:
 
 
 def _in_words(parameter: dict[str, Any]) -> str:
-    """Return a parameter with its interval; what was chosen among a few values has none."""
+    """Return a parameter with its interval; what was assumed, or chosen among a few values, has none."""
     low, high = parameter["ci95"]
     unit = "" if parameter["unit"] == "1" else f" {parameter['unit']}"
-    sure = "as chosen among a few values" if low == high else f"{low:.4g} … {high:.4g}"
+    sure = "taken, not fitted" if low == high else f"{low:.4g} … {high:.4g}"
     return f"{parameter['name']} {parameter['value']:.4g}{unit} ({sure})"
 
 

@@ -10,7 +10,7 @@ from exoid_cli.diagnose import _in_words
     [
         (1.932, "N·m", [1.9, 2.0], "play 1.932 N·m (1.9 … 2)"),
         (0.9457, "1", [0.9383, 0.9531], "play 0.9457 (0.9383 … 0.9531)"),
-        (60.0, "1/rad²", [60.0, 60.0], "play 60 1/rad² (as chosen among a few values)"),
+        (60.0, "1/rad²", [60.0, 60.0], "play 60 1/rad² (taken, not fitted)"),
     ],
     ids=["measured", "a pure number", "chosen"],
 )
