@@ -1,6 +1,6 @@
 """Which set of causes is named, how likely each is, and what cannot be told from it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -63,6 +63,14 @@ class Choice:
             return None
         refuted = self.refuted | {self.named.labels}
         return replace(self, named=self.standby[0], standby=self.standby[1:], freer=None, refuted=refuted)
+
+    def just(self, causes: Sequence[str]) -> "Choice | None":
+        """Return the choice of some of the named causes, the others refuted; None where that is no other set."""
+        labels = tuple(sorted(causes))
+        ranked = self.refined[len(labels)].get(labels) if labels else None
+        if ranked is None or labels == self.named.labels:
+            return None
+        return replace(self, named=ranked, standby=(), freer=None, refuted=self.refuted | {self.named.labels})
 
     def none_left(self, empty: Fit) -> "Choice":
         """Return the choice of no cause, the named set refuted."""

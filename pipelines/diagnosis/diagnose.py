@@ -144,8 +144,9 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
     examine = partial(Examined.of, before=before, validate=validate, baseline=baseline)
     examined = examine(choice)
     while choice.named.labels and not examined.holds_up:
-        # What the training runs promised does not hold on others: the next of those they can hardly tell from it.
-        choice = choice.next_best() or choice.none_left(empty)
+        # What the training runs promised does not hold on others: the next of those they can hardly tell from it, or
+        # else what was heard or felt needs no other beside it.
+        choice = choice.next_best() or choice.just(examined.sure) or choice.none_left(empty)
         examined = examine(choice)
     after, floor, standing = examined.after, examined.floor, examined.standing
     report(0.95, "intervals")

@@ -47,6 +47,8 @@ class Examined:
     """Whether something hums, or does not repeat with the motion."""
     holds_up: bool
     """Whether its causes may stay named."""
+    sure: tuple[str, ...]
+    """Labels of those that were heard or felt in the validation runs themselves."""
 
     @classmethod
     def of(cls, choice: Choice, before: Extended, validate: Sequence[Run], baseline: Baseline) -> "Examined":
@@ -62,13 +64,14 @@ class Examined:
         # Play rings on as it likes, and a wearer pushes at will: what no model follows there is no reason to doubt
         # what was heard and felt in these runs too.
         known = {**heard_in(validate, before.residuals), **felt_in(validate, before.residuals)}
-        sure = [known.get(cause.label, 0.0) > NEEDED for cause in made.causes]
-        holds_up = (bool(sure) and all(sure)) or ((any(sure) or not foreign) and standing.held_up(effects))
+        sure = tuple(cause.label for cause in made.causes if known.get(cause.label, 0.0) > NEEDED)
+        all_sure = bool(sure) and len(sure) == len(made.causes)
+        holds_up = all_sure or ((bool(sure) or not foreign) and standing.held_up(effects))
         if not holds_up and not foreign and choice.freer is not None:
             # What is left may be the cause's own, in a form that takes two of ours.
             freer = Extended.of(choice.freer, validate, baseline)
             holds_up = standing.takes_enough and _standing(before, freer, floor, validate).held_up(effects)
-        return cls(after, floor, standing, wanders or hums, holds_up)
+        return cls(after, floor, standing, wanders or hums, holds_up, sure)
 
 
 def heard_in(runs: Sequence[Run], residuals: Sequence[NDArray]) -> dict[str, float]:

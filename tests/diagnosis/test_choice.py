@@ -33,6 +33,17 @@ def test_a_refuted_set_gives_way_to_those_as_good_and_then_to_nothing():
     assert none.refuted == {("quadratic_drag@knee",), ("stribeck_friction@knee",)}
 
 
+def test_what_was_heard_stays_when_what_stood_beside_it_is_refuted():
+    drag, both = ranked(QuadraticDrag(joint="knee"), 50.0), ranked(QuadraticDrag(joint="knee"), 60.0)
+    play = Candidate(StribeckFriction(joint="hip"), ((),))
+    both = Ranked(replace(both.fit, causes=(*both.fit.causes, play)), 60.0)
+    choice = Choice(both, [], [{}, {drag.labels: drag}, {both.labels: both}], np.ones(2))
+    assert choice.just(["quadratic_drag@knee"]).named is drag
+    assert choice.just(["quadratic_drag@knee"]).refuted == {both.labels}
+    assert choice.just([]) is None
+    assert choice.just(both.labels) is None, "that is what was refuted"
+
+
 @pytest.fixture(scope="module")
 def offset():
     """A bank of a leg whose hip torque is read 3 N·m too high."""
