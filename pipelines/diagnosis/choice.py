@@ -59,24 +59,21 @@ class Choice:
 
         So runs that are never fitted decide only between explanations that are as good as one another.
         """
-        if not self.standby:
-            return None
-        refuted = self.refuted | {self.named.labels}
-        return replace(self, named=self.standby[0], standby=self.standby[1:], freer=None, refuted=refuted)
+        return replace(self._instead(self.standby[0]), standby=self.standby[1:]) if self.standby else None
 
     def just(self, causes: Sequence[str]) -> "Choice | None":
         """Return the choice of some of the named causes, the others refuted; None where that is no other set."""
         labels = tuple(sorted(causes))
         ranked = self.refined[len(labels)].get(labels) if labels else None
-        if ranked is None or labels == self.named.labels:
-            return None
-        return replace(self, named=ranked, standby=(), freer=None, refuted=self.refuted | {self.named.labels})
+        return None if ranked is None or labels == self.named.labels else self._instead(ranked)
 
     def none_left(self, empty: Fit) -> "Choice":
         """Return the choice of no cause, the named set refuted."""
-        return replace(
-            self, named=Ranked(empty, 0.0), standby=(), freer=None, refuted=self.refuted | {self.named.labels}
-        )
+        return self._instead(Ranked(empty, 0.0))
+
+    def _instead(self, named: Ranked) -> "Choice":
+        """Return the choice of another set, the one named so far refuted."""
+        return replace(self, named=named, standby=(), freer=None, refuted=self.refuted | {self.named.labels})
 
     def alone(self, cause: str) -> float:
         """Return what a cause gains in log likelihood with no other beside it."""

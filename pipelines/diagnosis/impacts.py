@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 
+from pipelines.diagnosis.floor import faster
 from pipelines.diagnosis.observations import Run
 
 SLOW_S = 0.2
@@ -35,7 +35,7 @@ def evidence_of_play(runs: Sequence[Run], residuals: Sequence[NDArray], independ
     joints = len(runs[0].motion.joints)
     gains = np.zeros(joints)
     for j in range(joints):
-        parts = [_squares(run, residual[:, j], j) for run, residual in zip(runs, residuals, strict=True)]
+        parts = [_squares(run, residual, j) for run, residual in zip(runs, residuals, strict=True)]
         near, far = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
         if min(len(near), len(far)) < FEWEST or not near.mean() > LOUDER * far.mean() > 0:
             continue
@@ -46,13 +46,11 @@ def evidence_of_play(runs: Sequence[Run], residuals: Sequence[NDArray], independ
 
 
 def _squares(run: Run, residual: NDArray, j: int) -> tuple[NDArray, NDArray]:
-    """Return the squares of what is fast in one joint's residual (m,), near changes of the load's sign and off."""
+    """Return the squares of what is fast in a residual (m, O) at one joint, near changes of the load's sign and off."""
     assert run.motion.load is not None, "bursts are sought where the load is known"
     spacing = run.block.decimation / run.motion.sample_rate_hz
-    usable = run.usable[:, j]
-    width = max(3, round(SLOW_S / spacing))
-    known = np.maximum(uniform_filter1d(usable.astype(float), width, mode="nearest"), 1e-9)
-    fast = residual - uniform_filter1d(np.where(usable, residual, 0.0), width, mode="nearest") / known
+    fast = faster(run, residual, SLOW_S)[:, j]
+    usable = ~np.isnan(fast)
     positive = run.average(run.motion.load)[:, j] > 0
     near = np.zeros(len(residual), dtype=bool)
     for at in np.flatnonzero(np.diff(positive)):
