@@ -26,7 +26,7 @@ from exoid_cli.effects import effects
 from exoid_cli.filter import filter_
 from exoid_cli.identify import identify
 from exoid_cli.init import init
-from exoid_cli.rig import rig
+from exoid_cli.rig_group import rig
 from exoid_cli.settings import settings
 from exoid_cli.show import show
 from exoid_cli.simulate import simulate
@@ -53,7 +53,7 @@ app.command("simulate", short_help="Simulate the identified leg, or replay a rec
 app.command("show", short_help="Say what a file is, and what is in it.")(show)
 app.command("effects", short_help="List the effects a model can have, or explain one.")(effects)
 app.command("detect", short_help="Say which causes a motion would reveal.")(detect)
-app.command("rig", short_help="Serve a virtual rig over Modbus TCP.")(rig)
+app.add_typer(rig, name="rig", short_help="Serve a virtual rig.")
 app.add_typer(settings, name="settings", short_help="Work with an experiment's settings.")
 
 

@@ -1,4 +1,4 @@
-"""``exoid rig``: a virtual rig on this machine, to be recorded like a real one."""
+"""``exoid rig serve``: a virtual rig on this machine, to be recorded like a real one."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -24,7 +24,7 @@ def rig(
 
     \b
     Example:
-      exoid rig rigs/real_time.toml --run exo_alone --port 5020
+      exoid rig serve rigs/real_time.toml --run exo_alone --port 5020
     """
     from pipelines.rig.server import serve_file
 

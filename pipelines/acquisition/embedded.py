@@ -21,7 +21,7 @@ END_S = 3.0
 def embedded(rig: RigSettings, path: Path, run: RunSettings, sample_rate_hz: float) -> Iterator[RigSettings]:
     """Run the virtual rig of a file; yields the rig's settings with the port that its devices listen on."""
     command = [
-        sys.executable, "-m", "exoid_cli.app", "rig", str(path), "--run", run.run, "--seed", str(run.seed),
+        sys.executable, "-m", "exoid_cli.app", "rig", "serve", str(path), "--run", run.run, "--seed", str(run.seed),
         "--sample-rate-hz", str(sample_rate_hz), "--port", "0", "--until-input-ends",
     ]  # fmt: skip
     with tempfile.TemporaryFile() as complaints:
