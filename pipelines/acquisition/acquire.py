@@ -13,11 +13,12 @@ import numpy as np
 
 from pipelines.acquisition.columns import columns_of
 from pipelines.acquisition.embedded import embedded
-from pipelines.acquisition.journal import Journal, journal_of, read_journal, refuse_leftover
+from pipelines.acquisition.journal import Journal, JournalFile, journal_of, refuse_leftover
 from pipelines.acquisition.loop import Loop, Progress, Report
 from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.pace import urgent
 from pipelines.acquisition.plan import check_start, check_trajectory, make_plan
+from pipelines.acquisition.recorded import account_of, place_for, write_recording
 from pipelines.contracts import RECORDING
 from pipelines.contracts.provenance import describe
 from pipelines.errors import DeviceError, ExoidError, about
@@ -76,8 +77,8 @@ def acquire(
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # what it would print, our errors say
     place = embedded(rig, rig_path, run, sample_rate_hz) if rig.embedded else nullcontext(rig)
     with place as present, nullcontext() if rig.clock == "lockstep" else urgent():
-        abort, gaps = asyncio.run(_record(present, run, trajectory, journal, metadata, sample_rate_hz, report))
-    return _finish(output, journal, abort, gaps)
+        asyncio.run(_record(present, run, trajectory, journal, metadata, sample_rate_hz, report))
+    return _finish(output, journal)
 
 
 async def _record(
@@ -88,8 +89,8 @@ async def _record(
     metadata: dict[str, Any],
     rate: float,
     report: Report,
-) -> tuple[str | None, list[tuple[float, int]]]:
-    """Move the leg and write the journal; return why the run was stopped early, None if it was not, and its gaps."""
+) -> None:
+    """Move the leg and write the journal, which says at its end why the run was stopped early, if it was."""
     machine = Machine(rig, with_sensors=run.run == "with_human")
     report(Progress(duration_s=run.duration_s))
     with _signals() as stopped_by:
@@ -104,11 +105,12 @@ async def _record(
                 with Journal(path, ["time_s", *columns_of(machine)], metadata) as journal:
                     loop = Loop(machine, plan, journal, rate, report, stopped_by, sent=start)
                     abort = await loop.run()
+                    journal.end(abort)
             except OSError as error:  # a full disk must not hide that a drive could not be disabled
                 raise DeviceError(
-                    f"{path}: cannot be written ({error}); make room{f'. {abort}' if abort else ''}"
+                    f"{path}: cannot be written ({error}); make room, then `exoid recover {path}` makes a recording "
+                    f"of what is in it{f'. {abort}' if abort else ''}"
                 ) from error
-            return abort, loop.gaps
         finally:
             machine.close()
 
@@ -131,34 +133,26 @@ def _signals() -> Iterator[list[str]]:
                 loop.remove_signal_handler(number)
 
 
-def _finish(output: Path, journal: Path, abort: str | None, gaps: list[tuple[float, int]]) -> Outcome:
+def _finish(output: Path, path: Path) -> Outcome:
     """Turn the journal into a recording; raise DeviceError where the run was stopped."""
-    frame, metadata = read_journal(journal)
-    if abort and frame.empty:
-        journal.unlink()
+    journal = JournalFile(path)
+    account = account_of(journal)
+    abort, samples = account.abort, account.samples
+    if abort and not samples:
+        path.unlink()
         raise DeviceError(f"{abort}; the leg was stopped before the recording began")
-    metadata |= {"gaps": gaps} | ({"abort": abort} if abort else {})
-    path = _aborted(output) if abort else output
+    place = place_for(output, abort)
     try:
-        RECORDING.write(path, frame, metadata)
+        write_recording(journal, place, account)
     except (ExoidError, OSError) as error:
         raise DeviceError(
-            f"{abort or 'the run is complete'}; its {len(frame)} samples are in {journal}, but could not be written as "
-            f"a recording: {error}"
+            f"{abort or 'the run is complete'}; its {samples} samples are in {path}, but could not be written as a "
+            f"recording: {error}; once that is mended, `exoid recover {path}` makes one"
         ) from error
-    journal.unlink()
+    path.unlink()
     if abort:
-        raise DeviceError(f"{abort}; the leg was stopped, its {len(frame)} samples so far are in {path}")
-    return Outcome(path, len(frame), sum(count for _, count in gaps))
-
-
-def _aborted(output: Path) -> Path:
-    """Return a name for what a stopped run recorded, beside the output and not taken."""
-    path, number = output.with_name(f"{output.stem}.aborted{output.suffix}"), 1
-    while path.exists():
-        number += 1
-        path = output.with_name(f"{output.stem}.aborted-{number}{output.suffix}")
-    return path
+        raise DeviceError(f"{abort}; the leg was stopped, its {samples} samples so far are in {place}")
+    return Outcome(place, samples, account.missed)
 
 
 def _metadata(

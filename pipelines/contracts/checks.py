@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -14,7 +15,23 @@ from pipelines.errors import ContractError
 LARGEST_ANGLE_RAD = 3 * np.pi
 
 
-def convert(column: pa.ChunkedArray, dtype: pa.DataType, where: str) -> pa.ChunkedArray:
+@dataclass(frozen=True)
+class Place:
+    """Where values stand: in a column of a source, from a row on, as messages name it."""
+
+    source: str
+    column: str
+    first_row: int = 0
+
+    def __str__(self) -> str:
+        return f"{self.source}: column {self.column}"
+
+    def row(self, k: int) -> str:
+        """Name the place of the ``k``-th of the values."""
+        return f"{self}, row {self.first_row + k}"
+
+
+def convert(column: pa.ChunkedArray, dtype: pa.DataType, where: Place) -> pa.ChunkedArray:
     """Return the column in the contract's type where nothing is lost by it; refuse it otherwise.
 
     Other tools write float32, integers, decimals or large strings where the contract has float64, int64 or
@@ -63,7 +80,7 @@ def is_text(dtype: pa.DataType) -> bool:
     return pa.types.is_string(dtype) or pa.types.is_large_string(dtype) or pa.types.is_string_view(dtype)
 
 
-def refuse_missing(column: pa.ChunkedArray, nullable: bool, where: str) -> None:
+def refuse_missing(column: pa.ChunkedArray, nullable: bool, where: Place) -> None:
     """Refuse infinities, and, unless ``nullable``, missing values (null or NaN)."""
     missing = pc.is_null(column, nan_is_null=True).to_numpy()
     if not nullable and missing.any():
@@ -72,41 +89,41 @@ def refuse_missing(column: pa.ChunkedArray, nullable: bool, where: str) -> None:
         found, expected = (
             ("NaN", "a finite number") if number else ("null", f"a value of type {type_name(column.type)}")
         )
-        raise ContractError(f"{where}, row {row}: found {found}, expected {expected}; {_MEND_ROWS}")
+        raise ContractError(f"{where.row(row)}: found {found}, expected {expected}; {_MEND_ROWS}")
     if pa.types.is_floating(column.type):
         infinite = np.isinf(column.to_numpy())
         if infinite.any():
             row = int(np.argmax(infinite))
             raise ContractError(
-                f"{where}, row {row}: found {column[row].as_py()}, expected a finite number; {_MEND_ROWS}"
+                f"{where.row(row)}: found {column[row].as_py()}, expected a finite number; {_MEND_ROWS}"
             )
 
 
 _MEND_ROWS = "mend or drop the row and write the file again"
 
 
-def refuse_unknown_values(column: pa.ChunkedArray, choices: Sequence[str], where: str) -> None:
+def refuse_unknown_values(column: pa.ChunkedArray, choices: Sequence[str], where: Place) -> None:
     """Refuse text that is none of the choices."""
     strange = pc.invert(pc.is_in(column, value_set=pa.array(choices))).to_numpy() & column.is_valid().to_numpy()
     if strange.any():
         row = int(np.argmax(strange))
         raise ContractError(
-            f"{where}, row {row}: found {column[row].as_py()!r}, expected one of {', '.join(choices)}; mend the value"
+            f"{where.row(row)}: found {column[row].as_py()!r}, expected one of {', '.join(choices)}; mend the value"
         )
 
 
-def refuse_degrees(column: pa.ChunkedArray, where: str) -> None:
+def refuse_degrees(column: pa.ChunkedArray, where: Place) -> None:
     """Refuse angles that no leg reaches in radians."""
     size = np.nan_to_num(np.abs(column.to_numpy()))
     row = int(np.argmax(size > LARGEST_ANGLE_RAD))
     if size[row] > LARGEST_ANGLE_RAD:
         raise ContractError(
-            f"{where}, row {row}: found {column[row].as_py():.6g}, which looks like degrees; "
+            f"{where.row(row)}: found {column[row].as_py():.6g}, which looks like degrees; "
             "expected radians, multiply by pi/180"
         )
 
 
-def refuse_time_that_does_not_increase(frame: pd.DataFrame, time: str, within: Sequence[str], where: str) -> None:
+def refuse_time_that_does_not_increase(frame: pd.DataFrame, time: str, within: Sequence[str], where: Place) -> None:
     """Refuse time that stands still or goes back; it may start anew where a column of ``within`` changes."""
     seconds = frame[time].to_numpy()
     stands = np.diff(seconds) <= 0.0
@@ -116,6 +133,6 @@ def refuse_time_that_does_not_increase(frame: pd.DataFrame, time: str, within: S
     if stands.any():
         row = int(np.argmax(stands)) + 1
         raise ContractError(
-            f"{where}, row {row}: found {float(seconds[row])!r} after {float(seconds[row - 1])!r}, "
+            f"{where.row(row)}: found {float(seconds[row])!r} after {float(seconds[row - 1])!r}, "
             "expected strictly increasing time; sort the rows and drop repeated ones"
         )

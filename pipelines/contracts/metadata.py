@@ -91,5 +91,6 @@ class RunKeys(TableKeys):
     trajectory: str | None = None
     gaps: list[tuple[Finite, Annotated[int, Field(gt=0)]]] | None = None
     abort: str | None = None
+    recovered: bool | None = None
     controller: dict[str, Controller] | None = None
     geometry: Geometry | None = None

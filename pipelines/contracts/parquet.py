@@ -1,8 +1,9 @@
 """Parquet files with exoid's metadata: opened with a clear refusal, written whole or not at all."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -31,13 +32,17 @@ def load(path: Path) -> tuple[pa.Table, dict[str, Any]]:
     return table, _metadata(table.schema, path)
 
 
-def save(path: Path, table: pa.Table, metadata: Mapping[str, Any]) -> None:
-    """Write a table and its metadata under ``path``, atomically."""
+def save(path: Path, pieces: Iterable[pa.Table], metadata: Mapping[str, Any]) -> None:
+    """Write a table that comes in pieces, with its metadata, under ``path``, atomically."""
+    pieces = iter(pieces)
+    first = next(pieces)  # what is wrong with it is told before a folder or a file is made
     refuse_place(path, metadata["contract"])
-    text = to_json(metadata, str(path))
+    schema = first.schema.with_metadata({KEY: to_json(metadata, str(path)).encode()})
     with whole_file(path) as temporary:
         temporary.touch()  # else Arrow would complain of the temporary name, in its own words
-        pq.write_table(table.replace_schema_metadata({KEY: text.encode()}), temporary, compression="zstd")
+        with pq.ParquetWriter(temporary, schema, compression="zstd") as writer:
+            for piece in chain([first], pieces):
+                writer.write_table(piece.replace_schema_metadata(schema.metadata))
 
 
 def refuse_place(path: Path, contract: str) -> None:
@@ -86,8 +91,8 @@ def _refuse_what_is_no_file(path: Path) -> None:
 def _what_is_wrong_with_the_bytes(path: Path) -> str:
     if (start := _start(path)) == STREAM:
         return (
-            f"is an Arrow stream: the journal of a run that was killed, with {_whole_rows(path)} whole samples; "
-            "read it with pyarrow.ipc.open_stream, batch by batch, see docs/rig.md"
+            f"is the journal of a run that was killed or still goes on, with {_whole_rows(path)} whole samples; "
+            f"`exoid recover {path}` makes a recording of it"
         )
     if start != MAGIC:
         return f"is not a Parquet file (it starts with {start!r}, expected {MAGIC!r}); name a file that exoid wrote"

@@ -1,6 +1,6 @@
 """A data contract as code: columns with unit, meaning and type, checked on reading and on writing."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -105,9 +105,13 @@ class Contract:
 
     def write(self, path: Path | str, frame: pd.DataFrame, metadata: Mapping[str, Any]) -> None:
         """Check a table and write it atomically; ``contract`` is added to the metadata."""
+        self.write_pieces(path, [self._to_arrow(frame, str(path))], metadata)
+
+    def write_pieces(self, path: Path | str, pieces: Iterable[pa.Table], metadata: Mapping[str, Any]) -> None:
+        """Write a table as ``write`` does, but piece by piece, so that it need never be in memory as a whole."""
         path = Path(path)
         metadata = {**metadata, "contract": self.label}
-        parquet.save(path, self._conform(self._to_arrow(frame, str(path)), metadata, str(path)), metadata)
+        parquet.save(path, self._conformed(pieces, metadata, str(path)), metadata)
 
     def refuse_place(self, path: Path) -> None:
         """Raise a ContractError where this table could not be written: before the work, not after it."""
@@ -147,20 +151,38 @@ class Contract:
 
     def _conform(self, table: pa.Table, metadata: Mapping[str, Any], source: str) -> pa.Table:
         """Return the table with every known column in its type, unit and meaning attached; refuse what cannot be."""
+        (conformed,) = self._conformed([table], metadata, source)
+        return conformed
+
+    def _conformed(self, pieces: Iterable[pa.Table], metadata: Mapping[str, Any], source: str) -> Iterator[pa.Table]:
+        """Do the same with a table that comes in pieces; empty ones are left out."""
         self._check_metadata(metadata, source)
-        if table.num_rows == 0:
+        columns, rows, seam = self.columns_for(joints_of(metadata)), 0, None
+        for piece in pieces:
+            if not piece.num_rows:
+                continue
+            for column in columns:
+                piece = self._conform_column(piece, column, source, rows)
+            self._check_rows(piece, seam, metadata, source, rows)
+            yield piece
+            # Its last row, so that the seam to the next piece is looked at too.
+            rows, seam = rows + piece.num_rows, piece.slice(piece.num_rows - 1)
+        if not rows:
             raise ContractError(f"{source}: holds no rows, expected at least one; `{self.made_by}` makes it again")
-        for column in self.columns_for(joints_of(metadata)):
-            table = self._conform_column(table, column, source)
-        frame = table.to_pandas()
+
+    def _check_rows(
+        self, piece: pa.Table, seam: pa.Table | None, metadata: Mapping[str, Any], source: str, first_row: int
+    ) -> None:
+        """Check what a row must keep with the one before it, and the contract's own rules."""
         if self.time:
-            where = f"{source}: column {self.time}"
+            rows = pa.concat_tables([seam, piece]) if seam else piece
+            frame = rows.select([self.time, *self.restarts_with]).to_pandas()
+            where = checks.Place(source, self.time, first_row - (1 if seam else 0))
             checks.refuse_time_that_does_not_increase(frame, self.time, self.restarts_with, where)
         for rule in self.rules:
-            rule(frame, metadata, source)
-        return table
+            rule(piece.to_pandas(), metadata, source)
 
-    def _conform_column(self, table: pa.Table, column: Column, source: str) -> pa.Table:
+    def _conform_column(self, table: pa.Table, column: Column, source: str, first_row: int) -> pa.Table:
         index = table.schema.get_field_index(column.name)
         if index < 0:
             if not column.required:
@@ -169,7 +191,7 @@ class Contract:
                 f"{source}: column {column.name} is missing, expected {_described(column)}; "
                 f"a {self.label} table must have it"
             )
-        where = f"{source}: column {column.name}"
+        where = checks.Place(source, column.name, first_row)
         values = checks.convert(table.column(index), column.dtype, where)
         checks.refuse_missing(values, column.nullable, where)
         if column.choices:

@@ -10,9 +10,10 @@ import time
 import numpy as np
 import pytest
 
-from pipelines.acquisition.journal import journal_of, read_journal
+from pipelines.acquisition.journal import journal_of
 from pipelines.contracts import RECORDING
 from pipelines.settings import datasets
+from tests.acquisition.journals import read_journal
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from pymodbus.constants import ExcCodes
 
 from pipelines.acquisition.device import Device as Line
-from pipelines.acquisition.journal import journal_of, read_journal
+from pipelines.acquisition.journal import journal_of
 from pipelines.acquisition.machine import Reading, Row
 from pipelines.acquisition.plan import make_plan
 from pipelines.acquisition.safety import HOLD_SAMPLES, Limits, refuse_leap, slowing
@@ -18,6 +18,7 @@ from pipelines.contracts import RECORDING
 from pipelines.errors import DeviceError, InputError
 from pipelines.rig.server import READ_WRITE, Drive, Sensor
 from pipelines.settings.rig import load_rig
+from tests.acquisition.journals import read_journal
 
 RATE = 200.0
 
@@ -214,7 +215,7 @@ def test_a_full_disk_stops_the_leg_and_is_told(stopped, monkeypatch):
 
     monkeypatch.setattr("pipelines.acquisition.journal.Journal.flush", full)
     why = stopped(watchdog_s=0.5, duration_s=4.0)
-    assert "test.parquet.journal: cannot be written ([Errno 28] No space left on device); make room" in why
+    assert "test.parquet.journal: cannot be written ([Errno 28] No space left on device); make room, then" in why
 
 
 def test_a_rig_that_stops_half_way_leaves_the_record(stopped, tmp_path):

@@ -54,7 +54,7 @@ def test_a_file_that_breaks_its_contract_is_shown_and_then_refused(exoid, tmp_pa
     import pyarrow as pa
 
     path = tmp_path / "bad.parquet"
-    parquet.save(path, pa.table({"time_s": [0.0, 1.0]}), {"contract": "trajectory/1"})
+    parquet.save(path, [pa.table({"time_s": [0.0, 1.0]})], {"contract": "trajectory/1"})
     outcome = exoid("show", path)
     assert outcome.code == 2
     assert "trajectory/1" in outcome.out
@@ -103,6 +103,6 @@ def test_nan_counts_as_missing_and_is_in_no_range(exoid, tmp_path):
     import pyarrow as pa
 
     path = tmp_path / "nan.parquet"
-    parquet.save(path, pa.table({"time_s": [0.0, float("nan"), None, 1.0]}), {"contract": "trajectory/1"})
+    parquet.save(path, [pa.table({"time_s": [0.0, float("nan"), None, 1.0]})], {"contract": "trajectory/1"})
     (column,) = json.loads(exoid("show", path, "--json").out)["columns"]
     assert (column["nulls"], column["min"], column["max"]) == (2, 0.0, 1.0)

@@ -1,6 +1,7 @@
 """Every refusal of a reader or writer, by the full text that a user sees."""
 
 from decimal import Decimal
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -145,7 +146,7 @@ def test_a_file_of_another_contract_is_refused(tmp_path, swinging_leg, entry, to
 
 def test_an_unknown_contract_is_told_with_the_known_ones(tmp_path, swinging_leg):
     path = tmp_path / "a.parquet"
-    storage.save(path, pa.Table.from_pandas(swinging_leg), {"contract": "gait/1"})
+    storage.save(path, [pa.Table.from_pandas(swinging_leg)], {"contract": "gait/1"})
     assert refusal(contract_of, path) == (
         f"{path}: holds gait/1, which exoid does not know; it knows trajectory/1, recording/1, motion/1, "
         "parameters/1, residuals/1, candidates/1, simulation/1"
@@ -232,7 +233,7 @@ def test_a_table_that_breaks_its_contract_is_refused(swinging_leg, run_metadata,
 def test_reading_refuses_what_writing_refuses(tmp_path, swinging_leg, run_metadata):
     swinging_leg.loc[12, "hip_angle_rad"] = np.nan
     path = tmp_path / "a.parquet"
-    storage.save(path, pa.Table.from_pandas(swinging_leg), {**run_metadata, "contract": "recording/1"})
+    storage.save(path, [pa.Table.from_pandas(swinging_leg)], {**run_metadata, "contract": "recording/1"})
     assert refusal(RECORDING.read, path).startswith(f"{path}: column hip_angle_rad, row 12: found NaN")
 
 
@@ -336,11 +337,10 @@ def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(
     RECORDING.write(path, swinging_leg, run_metadata)
     before = path.read_bytes()
 
-    def half_written(table, where, **options):
-        where.write_bytes(b"PAR1 half")
+    def half_written(writer, table):
         raise error
 
-    monkeypatch.setattr(storage.pq, "write_table", half_written)
+    monkeypatch.setattr(storage.pq.ParquetWriter, "write_table", half_written)
     with pytest.raises(type(error)):
         RECORDING.write(path, swinging_leg, run_metadata)
     assert path.read_bytes() == before
@@ -371,6 +371,36 @@ def test_a_journal_is_recognised_and_its_whole_samples_are_counted(tmp_path):
         stream.write_batch(batch)
     path.write_bytes(path.read_bytes()[:-40])
     assert refusal(storage.load, path) == (
-        f"{path}: is an Arrow stream: the journal of a run that was killed, with 3 whole samples; "
-        "read it with pyarrow.ipc.open_stream, batch by batch, see docs/rig.md"
+        f"{path}: is the journal of a run that was killed or still goes on, with 3 whole samples; "
+        f"`exoid recover {path}` makes a recording of it"
     )
+
+
+def in_pieces(frame, *ends):
+    """Cut a frame into tables, each from one row to the next of ``ends``."""
+    cuts = [0, *ends, len(frame)]
+    return [pa.Table.from_pandas(frame.iloc[a:b], preserve_index=False) for a, b in pairwise(cuts)]
+
+
+def test_a_table_written_in_pieces_is_the_table_written_at_once(tmp_path, swinging_leg, run_metadata):
+    RECORDING.write(tmp_path / "whole.parquet", swinging_leg, run_metadata)
+    RECORDING.write_pieces(tmp_path / "pieces.parquet", in_pieces(swinging_leg, 1, 1, 7), run_metadata)
+    whole, pieces = (RECORDING.read(tmp_path / name) for name in ("whole.parquet", "pieces.parquet"))
+    assert pieces.frame.equals(whole.frame)
+    assert pieces.metadata == whole.metadata
+    assert pq.read_schema(tmp_path / "pieces.parquet").equals(pq.read_schema(tmp_path / "whole.parquet"), True)
+
+
+@pytest.mark.parametrize(
+    ("column", "row", "value"),
+    [("time_s", 7, 0.0), ("time_s", 8, 0.0), ("hip_angle_rad", 8, np.nan), ("knee_angle_rad", 9, 30.0)],
+)
+def test_what_is_refused_in_a_whole_table_is_refused_alike_in_pieces_and_leaves_nothing(
+    tmp_path, swinging_leg, run_metadata, column, row, value
+):
+    path = tmp_path / "a.parquet"
+    swinging_leg.loc[row, column] = value
+    at_once = refusal(RECORDING.write, path, swinging_leg, run_metadata)
+    assert f"row {row}: found" in at_once
+    assert refusal(RECORDING.write_pieces, path, in_pieces(swinging_leg, 7), run_metadata) == at_once
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,61 @@
+"""``exoid recover``: a whole recording of what a killed run left."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from exoid_cli.console import console
+from pipelines.errors import InputError
+
+if TYPE_CHECKING:
+    from pipelines.acquisition.recover import Recovered
+
+
+def recover(
+    journals: Annotated[list[Path], typer.Argument(help="Journals that killed runs left, or folders of them.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="The recording to write, of one.")] = None,
+) -> None:
+    """Make a whole recording of what a killed run left, and say what is missing.
+
+    The journal goes once the recording is written. A file that is there is never overwritten.
+
+    \b
+    Example:
+      exoid recover recordings/with_human_train.parquet.journal
+    """
+    from pipelines.acquisition.recover import journals_in
+    from pipelines.acquisition.recover import recover as make_recording
+
+    found = [journal for place in journals for journal in journals_in(place)]
+    if output and len(found) > 1:
+        raise InputError(f"-o: names one recording, but there are {len(found)} journals; leave it out")
+    made, refused = [], list[InputError]()
+    for journal in found:
+        try:
+            made.append(make_recording(journal, output))
+            console.say(_told(made[-1]))
+        except InputError as error:  # one that is of no use must not keep the others from being recovered
+            refused.append(error)
+    console.emit([_as_json(one) for one in made])
+    for error in refused[:-1]:
+        console.fail(str(error))
+    if refused:
+        raise refused[-1]
+
+
+def _told(one: "Recovered") -> str:
+    account, text = one.account, f"{one.path}: {one.account.samples} samples"
+    if account.cut_off:
+        seconds = account.cut_off / account.rate_hz
+        text += f"; {account.cut_off} more ({seconds:.3f} s) were planned"
+    text += f"; {account.missed} are missing in {len(account.gaps)} gaps" if account.gaps else "; no gaps"
+    return f"{text}; {account.abort or 'the run had ended, only its recording was not written'}"
+
+
+def _as_json(one: "Recovered") -> dict:
+    account = one.account
+    return {
+        "path": one.path, "samples": account.samples, "planned": account.planned, "cut_off": account.cut_off,
+        "gaps": account.gaps, "abort": account.abort,
+    }  # fmt: skip

@@ -1,0 +1,87 @@
+"""A recording made of a journal, whether its run has ended, was stopped or was killed; an hour takes no more memory."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipelines.acquisition.journal import ABORT, JournalFile
+from pipelines.contracts import RECORDING
+
+PIECE_ROWS = 32768
+"""Samples that are held in memory at once."""
+
+
+@dataclass(frozen=True)
+class Account:
+    """What a journal holds of its run, and what is missing."""
+
+    samples: int
+    planned: int
+    """Samples that the run was to have."""
+    rate_hz: float
+    gaps: list[tuple[float, int]]
+    """First missing time, s, and number of missing samples; what an early end left out is none."""
+    abort: str | None
+    """Why the run was stopped early, None if it was not."""
+
+    @property
+    def missed(self) -> int:
+        """Samples missing in gaps."""
+        return sum(count for _, count in self.gaps)
+
+    @property
+    def cut_off(self) -> int:
+        """Samples missing at the end."""
+        return self.planned - self.samples - self.missed
+
+
+def account_of(journal: JournalFile) -> Account:
+    """Go through a journal and say what is there; the device's counter tells what is not."""
+    rate_hz = journal.metadata["sample_rate_hz"]
+    seconds = journal.metadata["config"]["run"]["duration_s"]
+    planned, samples, reached = round(seconds * rate_hz), 0, 0
+    gaps, offset, last_words = list[tuple[float, int]](), None, None
+    for batch in journal.batches():
+        last_words = batch.last_words
+        if not batch.rows.num_rows:
+            continue
+        sequence = batch.rows.column("sequence").to_numpy()
+        if offset is None:
+            offset = round(batch.rows.column("time_s")[0].as_py() * rate_hz) - sequence[0]
+        index = sequence + offset
+        found, samples = _gaps(np.concatenate([[reached - 1], index]), rate_hz), samples + len(index)
+        gaps, reached = gaps + found, int(index[-1]) + 1
+    if last_words is None:
+        return Account(samples, planned, rate_hz, gaps, f"killed {reached / rate_hz:.3f} s into {seconds:g} s")
+    abort = last_words[ABORT].decode() or None
+    if not abort:
+        gaps = gaps + _gaps(np.array([reached - 1, planned]), rate_hz)
+    return Account(samples, planned, rate_hz, gaps, abort)
+
+
+def _gaps(index: np.ndarray, rate_hz: float) -> list[tuple[float, int]]:
+    """Return what is missing between samples whose numbers (n,) count from the run's beginning."""
+    before = np.flatnonzero(np.diff(index) > 1)
+    return [((int(index[k]) + 1) / rate_hz, int(index[k + 1] - index[k]) - 1) for k in before]
+
+
+def write_recording(journal: JournalFile, path: Path, account: Account, **more: Any) -> None:
+    """Write what a journal holds as ``recording/1``; ``more`` goes into its metadata."""
+    metadata = journal.metadata | {"gaps": account.gaps} | ({"abort": account.abort} if account.abort else {}) | more
+    RECORDING.write_pieces(path, journal.pieces(PIECE_ROWS), metadata)
+
+
+def place_for(output: Path, abort: str | None) -> Path:
+    """Return the name of a recording: of a stopped run one beside the output that is not taken.
+
+    So nobody, make included, takes what a run left for all that it was to bring.
+    """
+    if not abort:
+        return output
+    path, number = output.with_name(f"{output.stem}.aborted{output.suffix}"), 1
+    while path.exists():
+        number += 1
+        path = output.with_name(f"{output.stem}.aborted-{number}{output.suffix}")
+    return path

@@ -1,0 +1,54 @@
+"""What a killed run left, made a whole recording."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipelines.acquisition.journal import ENDING, JournalFile, locked
+from pipelines.acquisition.recorded import Account, account_of, place_for, write_recording
+from pipelines.errors import InputError
+
+
+@dataclass(frozen=True)
+class Recovered:
+    """A recording that was made of a journal."""
+
+    path: Path
+    account: Account
+
+
+def journals_in(place: Path) -> list[Path]:
+    """Return the journals below a folder; a file stands for itself."""
+    if not place.is_dir():
+        return [place]
+    found = sorted(place.rglob(f"*{ENDING}"))
+    if not found:
+        raise InputError(f"{place}: holds no journal (*{ENDING}) of a run; there is nothing to recover")
+    return found
+
+
+def recover(path: Path, output: Path | None = None) -> Recovered:
+    """Make a recording of a journal that was cut off anywhere, and remove the journal.
+
+    Parameters
+    ----------
+    path : Path
+        The journal.
+    output : Path, optional
+        The recording; else what `exoid acquire` would have called it, ``<run>.aborted.parquet`` for a run that was
+        killed. A file that is there is never overwritten.
+    """
+    if not path.exists():
+        raise InputError(f"{path}: no such file; `exoid recover` takes the journal that a killed run left")
+    with locked(path) as free:
+        if not free:
+            raise InputError(f"{path}: a run is recording there now; wait for its end, or stop it with Ctrl-C")
+        journal = JournalFile(path)
+        account = account_of(journal)
+        if not account.samples:
+            raise InputError(f"{path}: holds no sample, the run ended before its recording began; delete it")
+        output = output or place_for(path.with_name(path.name.removesuffix(ENDING)), account.abort)
+        if output.exists():
+            raise InputError(f"{output}: is there already and is not overwritten; name another file with -o")
+        write_recording(journal, output, account, recovered=True)
+        path.unlink()
+    return Recovered(output, account)

@@ -1,0 +1,12 @@
+"""Journals, read as tests want them."""
+
+import pyarrow as pa
+
+from pipelines.acquisition.journal import JournalFile
+
+
+def read_journal(path):
+    """Return all rows of a journal as a frame, and its metadata."""
+    journal = JournalFile(path)
+    pieces = [journal.schema.empty_table(), *journal.pieces(1000)]
+    return pa.concat_tables(pieces).to_pandas(), journal.metadata

@@ -1,0 +1,183 @@
+"""What a killed run left becomes a whole recording, and what is missing is said."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from pipelines.acquisition.journal import Journal, JournalFile, journal_of, refuse_leftover
+from pipelines.acquisition.recover import journals_in, recover
+from pipelines.contracts import RECORDING
+from pipelines.errors import ContractError, InputError
+
+RATE = 200.0
+COLUMNS = ["time_s", *(f"{joint}_{q}" for joint in ("hip", "knee") for q in ("angle_rad", "torque_nm")), "sequence"]
+METADATA = {
+    "run": "exo_alone", "purpose": "train", "sample_rate_hz": RATE, "config": {"run": {"duration_s": 1.0}},
+}  # fmt: skip
+
+
+def row(index):
+    return [index / RATE, 0.001 * index, 1.0, -0.001 * index, 2.0, 7000 + index]
+
+
+def journal_with(output, indices, flush_every=20):
+    """Begin a journal as a run does, with samples of these numbers."""
+    journal = Journal(journal_of(output), COLUMNS, METADATA)
+    for k, index in enumerate(indices):
+        journal.append(row(index))
+        if k % flush_every == flush_every - 1:
+            journal.flush()
+    return journal
+
+
+@pytest.fixture
+def killed(tmp_path):
+    """The journal of a run of 200 samples that was killed before sample 150, and nobody knows it."""
+    output = tmp_path / "one.parquet"
+    journal = journal_with(output, [*range(40), *range(43, 150)])
+    journal.flush()
+    journal._file.close()  # as the system does for a process that is no more
+    return journal_of(output)
+
+
+def test_a_killed_run_is_a_recording_that_tells_what_is_missing(killed, tmp_path):
+    made = recover(killed)
+    table = RECORDING.read(tmp_path / "one.aborted.parquet")
+    assert made.path == table.path
+    assert (made.account.samples, made.account.missed, made.account.cut_off) == (147, 3, 50)
+    assert table.frame["sequence"].tolist() == [7000 + k for k in (*range(40), *range(43, 150))]
+    assert table.metadata["gaps"] == [[0.2, 3]]
+    assert table.metadata["abort"] == "killed 0.750 s into 1 s"
+    assert table.metadata["recovered"] is True
+    assert not killed.exists()
+
+
+def test_wherever_a_journal_was_cut_off_all_whole_batches_are_recovered(killed, tmp_path):
+    whole, found = killed.read_bytes(), []
+    for cut in range(0, len(whole), 307):
+        killed.write_bytes(whole[:cut])
+        try:
+            recover(killed, tmp_path / f"{cut}.parquet")
+            found.append(len(RECORDING.read(tmp_path / f"{cut}.parquet").frame))
+        except InputError as error:
+            assert "not even its head was written" in str(error) or "holds no sample" in str(error)
+            found.append(0)
+    assert found == sorted(found)
+    assert set(found) == set(range(0, 141, 20))  # the last batch, of 7, is never whole here
+
+
+def test_samples_that_were_missed_before_the_first_one_kept_are_a_gap(tmp_path):
+    output = tmp_path / "one.parquet"
+    journal_with(output, range(2, 30)).close()
+    recover(journal_of(output))
+    assert RECORDING.read(tmp_path / "one.aborted.parquet").metadata["gaps"] == [[0.0, 2]]
+
+
+@pytest.mark.parametrize(
+    ("abort", "name", "gaps"), [(None, "one.parquet", [[0.95, 10]]), ("the cat came", "one.aborted.parquet", [])]
+)
+def test_a_run_that_ended_but_could_not_be_written_is_recovered_with_its_own_reason(tmp_path, abort, name, gaps):
+    output = tmp_path / "one.parquet"
+    journal = journal_with(output, range(190))
+    journal.end(abort)
+    journal.close()
+    assert recover(journal_of(output)).path == tmp_path / name
+    metadata = RECORDING.read(tmp_path / name).metadata
+    assert (metadata.get("abort"), metadata["gaps"]) == (abort, gaps)
+
+
+def test_nothing_is_overwritten(killed, tmp_path):
+    (tmp_path / "taken.parquet").write_text("a month of work")
+    with pytest.raises(InputError) as caught:
+        recover(killed, tmp_path / "taken.parquet")
+    assert str(caught.value) == (
+        f"{tmp_path / 'taken.parquet'}: is there already and is not overwritten; name another file with -o"
+    )
+    (tmp_path / "one.aborted.parquet").write_text("another")
+    assert recover(killed).path == tmp_path / "one.aborted-2.parquet"
+
+
+HOLD = """\
+import sys
+from pathlib import Path
+from pipelines.acquisition.journal import Journal
+journal = Journal(Path(sys.argv[1]), ["time_s"], {"run": "exo_alone"})
+print("recording", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_a_journal_that_another_process_writes_is_left_alone_until_that_is_killed(tmp_path):
+    path = tmp_path / "one.parquet.journal"
+    process = subprocess.Popen(
+        [sys.executable, "-c", HOLD, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout.readline() == "recording\n"
+    for refuse, words in ((recover, "a run is recording there now"), (refuse_leftover, "another run is recording")):
+        with pytest.raises(InputError, match=words):
+            refuse(path)
+    process.kill()
+    process.communicate()
+    with pytest.raises(InputError, match="of a run exo_alone that was killed; `exoid recover "):
+        refuse_leftover(path)
+
+
+def test_a_folder_stands_for_the_journals_below_it(killed, tmp_path):
+    assert journals_in(tmp_path) == [killed]
+    assert journals_in(killed) == [killed]
+    recover(killed)
+    with pytest.raises(InputError, match="holds no journal"):
+        journals_in(tmp_path)
+
+
+def test_what_keeps_no_contract_is_refused_and_the_journal_stays(tmp_path):
+    output = tmp_path / "one.parquet"
+    journal_with(output, [*range(50), 49, *range(51, 60)], flush_every=25).close()
+    with pytest.raises(ContractError, match=r"column time_s, row 50: found 0.245 after 0.245"):
+        recover(journal_of(output))
+    assert [path.name for path in tmp_path.iterdir()] == ["one.parquet.journal"]
+
+
+class FullAfter:
+    """A file on a disk that is full after so many bytes."""
+
+    def __init__(self, file, room):
+        self._file, self._room = file, room
+
+    def __getattr__(self, name):
+        return getattr(self._file, name)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._file.close()
+
+    def write(self, data):
+        if not (taken := min(len(data), self._room - self._file.tell())):
+            raise OSError(28, "No space left on device")
+        return self._file.write(data[:taken])
+
+
+def test_a_disk_that_fills_up_half_way_through_a_batch_costs_no_earlier_and_no_later_sample(tmp_path):
+    output = tmp_path / "one.parquet"
+    journal = journal_with(output, range(40))
+    file = journal._file
+    journal._file = FullAfter(file, file.tell() + 700)
+    with pytest.raises(OSError, match="No space left"):
+        for index in range(40, 60):
+            journal.append(row(index))
+        journal.flush()
+    assert sum(batch.rows.num_rows for batch in JournalFile(journal_of(output)).batches()) == 40
+    journal._file = file  # somebody made room
+    journal.close()
+    recover(journal_of(output))
+    assert len(RECORDING.read(tmp_path / "one.aborted.parquet").frame) == 60
+
+
+def test_the_values_survive_to_the_last_bit(killed, tmp_path):
+    recover(killed)
+    frame = RECORDING.read(tmp_path / "one.aborted.parquet").frame
+    assert np.array_equal(frame["hip_angle_rad"], [0.001 * k for k in (*range(40), *range(43, 150))])
