@@ -38,8 +38,8 @@ def recover(
         except InputError as error:  # one that is of no use must not keep the others from being recovered
             refused.append(error)
     console.emit([_as_json(one) for one in made])
-    for error in refused[:-1]:
-        console.fail(str(error))
+    for refusal in refused[:-1]:
+        console.fail(str(refusal))
     if refused:
         raise refused[-1]
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from pipelines.acquisition.columns import columns_of
 from pipelines.acquisition.embedded import embedded
-from pipelines.acquisition.journal import Journal, JournalFile, journal_of, refuse_leftover
+from pipelines.acquisition.journal import Journal, JournalFile, journal_of, locked, refuse_leftover
 from pipelines.acquisition.loop import Loop, Progress, Report
 from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.pace import urgent
@@ -78,7 +78,8 @@ def acquire(
     place = embedded(rig, rig_path, run, sample_rate_hz) if rig.embedded else nullcontext(rig)
     with place as present, nullcontext() if rig.clock == "lockstep" else urgent():
         asyncio.run(_record(present, run, trajectory, journal, metadata, sample_rate_hz, report))
-    return _finish(output, journal)
+    with locked(journal):
+        return _finish(output, journal)
 
 
 async def _record(
