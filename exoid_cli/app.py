@@ -55,7 +55,7 @@ app.command("simulate", short_help="Simulate the identified leg, or replay a rec
 app.command("show", short_help="Say what a file is, and what is in it.")(show)
 app.command("effects", short_help="List the effects a model can have, or explain one.")(effects)
 app.command("detect", short_help="Say which causes a motion would reveal.")(detect)
-app.add_typer(rig, name="rig", short_help="Serve a virtual rig.")
+app.add_typer(rig, name="rig", short_help="Check a rig, or serve a virtual one.")
 app.add_typer(settings, name="settings", short_help="Work with an experiment's settings.")
 
 

@@ -6,6 +6,7 @@ import typer
 from typer.core import TyperGroup
 
 from exoid_cli.rig import rig as serve
+from exoid_cli.rig_check import check
 
 
 class _ServesAFile(TyperGroup):
@@ -19,8 +20,9 @@ class _ServesAFile(TyperGroup):
 
 rig = typer.Typer(
     cls=_ServesAFile,
-    help="Work with a rig file. `exoid rig FILE` serves it.\n\n"
+    help="Check a rig, or serve a virtual one. `exoid rig FILE` serves.\n\n"
     "\b\nExample:\n  exoid rig serve rigs/real_time.toml --port 5020",
     rich_markup_mode=None,
 )
 rig.command("serve", short_help="Serve a virtual rig over Modbus TCP.")(serve)
+rig.command("check", short_help="Say whether a rig is what its file says.")(check)

@@ -41,7 +41,7 @@ class Samples:
     reference: NDArray
     """(n, J) rad, set-point at the window's end."""
     forces: NDArray
-    """(n, 4, 3) N; all zero with nobody in the machine."""
+    """(n, 4, 3) N; zeros and noise alone with nobody in the machine."""
     truth: NDArray
     """(n, 4, J) link angle, speed, acceleration, motor angle: what no device knows, for tests."""
 
@@ -90,6 +90,8 @@ class Plant:
         self._loop = loop_at_rest(self._assembly, np.array(settings.rest_rad))
         self._scratch = workspace(len(JOINTS)), stages(len(JOINTS), len(self._loop.memory))
         self._noise = np.random.default_rng(seed)
+        # Of its own: what an empty machine's sensors say must not change what its drives do.
+        self._unfelt = np.random.default_rng([seed, 1])
         self._ripple = np.zeros(len(JOINTS))
         self._temperature = np.full(len(JOINTS), settings.temperature.ambient_c)
         self._zeros = np.random.default_rng(settings.seed).normal(0.0, settings.cuff.zero_n, (4, 3))
@@ -129,7 +131,7 @@ class Plant:
             torque=torque,
             temperature=self._warm(torque, period),
             reference=reference,
-            forces=self._felt(human, truth) if self.has_human else np.zeros((n, 4, 3)),
+            forces=self._felt(human, truth) if self.has_human else self._noise_alone(n),
             truth=truth,
         )
 
@@ -151,6 +153,9 @@ class Plant:
     def _felt(self, human_torque: NDArray, truth: NDArray) -> NDArray:
         forces = cuff_forces(human_torque, truth[:, Q], self.settings)
         return forces + self._zeros + self._noise.normal(0.0, self.settings.cuff.noise_n, forces.shape)
+
+    def _noise_alone(self, n: int) -> NDArray:
+        return self._zeros + self._unfelt.normal(0.0, self.settings.cuff.noise_n, (n, 4, 3))
 
 
 def term_of(effect: PlantEffect, source: str) -> Term:

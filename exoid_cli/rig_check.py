@@ -1,0 +1,130 @@
+"""``exoid rig check``: is the rig what its file says."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from exoid_cli.console import console
+
+if TYPE_CHECKING:
+    from pipelines.acquisition.check.latency import Latency
+    from pipelines.acquisition.check.look import DeviceReport, RigReport
+    from pipelines.acquisition.check.rate import Rate
+
+BLOCKS = " ▁▂▃▄▅▆▇█"
+FORCES = ("force_x", "force_y", "force_z")
+DRIVE = {"angle": "angle rad", "velocity": "rad/s", "current": "current A", "temperature": "°C"}
+
+
+def check(
+    file: Annotated[Path, typer.Argument(help="The rig's description.")],
+    config: Annotated[Path | None, typer.Option(help="An exoid.toml, for the rate its experiment samples at.")] = None,
+    rate_hz: Annotated[float | None, typer.Option(min=1.0, help="Samples a second that are wanted.")] = None,
+    run: Annotated[
+        Literal["exo_alone", "with_human"],
+        typer.Option(help="Whether somebody is in the machine; only an empty one shows its sensors' zeros."),
+    ] = "exo_alone",
+) -> None:
+    """Ask every device of a rig and say what is wrong; nothing is moved.
+
+    \b
+    Example:
+      exoid rig check rigs/real_time.toml --rate-hz 200
+    """
+    from pipelines.acquisition.check.check import check_rig
+    from pipelines.errors import DeviceError
+    from pipelines.settings import Experiment
+
+    if rate_hz is None and config:
+        rate_hz = Experiment.load(config).acquire.sample_rate_hz
+    console.say(f"{file}: asking every device, moving nothing")
+    report = check_rig(file, rate_hz, run)
+    console.emit(report.as_json())
+    _show(report)
+    if report.findings:
+        count = len(report.findings)
+        console.say("\nWhat is wrong")
+        for finding in report.findings:
+            console.say(f"- {finding}")
+        raise DeviceError(f"{file}: {count} {'thing is' if count == 1 else 'things are'} not as the file says")
+    console.say("\nNothing is wrong.")
+
+
+def _show(report: "RigReport") -> None:
+    console.say("\nOne request at a time")
+    rows = [(device.name, _identity(device), *_times(device.latency)) for device in report.devices]
+    console.table(
+        ("device", "identity", "min ms", "median", "99 %", "max", "log scale"),
+        rows,
+        numbers="min ms, median, 99 %, max",
+    )
+    drives = [device for device in report.devices if "angle" in device.values]
+    if drives:
+        console.say("\nDrives, disabled")
+        console.table(
+            ("", *DRIVE.values(), "samples/s", "clock s/s"), map(_drive, drives),
+            numbers=", ".join((*DRIVE.values(), "samples/s", "clock s/s")),
+        )  # fmt: skip
+    sensors = [device for device in report.devices if FORCES[0] in device.values]
+    if sensors:
+        console.say("\nSensors, mean ± noise in N")
+        console.table(("", "x", "y", "z", "samples/s"), map(_sensor, sensors), numbers="x, y, z, samples/s")
+    for what, rate in (("all devices", report.together), ("the drives alone", report.drives_alone)):
+        if rate:
+            _show_rate(what, rate, report.rate_hz)
+
+
+def _identity(device: "DeviceReport") -> str:
+    if not device.connected:
+        return "no connection"
+    wrong = [entry for entry in device.identity if entry["found"] != entry["expected"]]
+    if wrong:
+        return ", ".join(f"0x{entry['found']:04X}, expected 0x{entry['expected']:04X}" for entry in wrong)
+    return "as expected" if device.identity else "none asked for"
+
+
+def _times(latency: "Latency | None") -> tuple[str, ...]:
+    if latency is None:
+        return ("", "", "", "", "")
+    numbers = (latency.least, latency.median, latency.p99, latency.most)
+    return (*(f"{number * 1e3:.2f}" for number in numbers), _small(latency.histogram))
+
+
+def _small(histogram: tuple[int, ...]) -> str:
+    """Draw a histogram on one line."""
+    most = max(histogram)
+    return "".join(BLOCKS[-(-count * (len(BLOCKS) - 1) // most)] for count in histogram)
+
+
+def _drive(device: "DeviceReport") -> list[Any]:
+    values = [f"{device.values[name]:.3f}" if name in device.values else "" for name in DRIVE]
+    return [device.name, *values, *_clock(device)]
+
+
+def _sensor(device: "DeviceReport") -> list[Any]:
+    forces = [f"{device.values[axis]:.2f} ± {device.noise[axis]:.2f}" for axis in FORCES]
+    return [device.name, *forces, _clock(device)[0]]
+
+
+def _clock(device: "DeviceReport") -> tuple[str, str]:
+    clock = device.clock
+    if clock is None:
+        return "", ""
+    rates = (clock.counter_hz, ".1f"), (clock.clock_rate, ".4f")
+    told = [format(rate, form) if rate is not None else "" for rate, form in rates]
+    return told[0], told[1]
+
+
+def _show_rate(what: str, rate: "Rate", wanted_hz: float | None) -> None:
+    wanted = f", wanted {wanted_hz:g}; {rate.late:.1%} of the cycles take longer than a sample" if wanted_hz else ""
+    console.say(f"\nCycles of {what}: {rate.cycles_hz:.0f} a second{wanted}")
+    cycle = rate.cycle
+    steps = len(cycle.histogram)
+    edges = [cycle.least * (cycle.most / cycle.least) ** (k / steps) * 1e3 for k in range(steps + 1)]
+    bars = [(k, count) for k, count in enumerate(cycle.histogram) if count]
+    rows = [
+        (f"{edges[k]:.2f} to {edges[k + 1]:.2f} ms", count, "█" * -(-count * 30 // max(cycle.histogram)))
+        for k, count in bars
+    ]
+    console.table(("duration", "cycles", ""), rows, numbers="cycles")

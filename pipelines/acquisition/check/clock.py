@@ -1,0 +1,169 @@
+"""Whether the sample counter counts, and the device's clock tells the time of its counter and of the host."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.acquisition.check.finding import Finding
+from pipelines.acquisition.check.interpretation import remedy
+from pipelines.acquisition.check.probe import Probe, Series
+from pipelines.settings.rig import DIMENSION, UNITS
+
+TOLERANCE = 0.05
+"""How far rates may differ: acquisition refuses a run beyond it."""
+RATES_HZ = (0.5, 1e5)
+"""Sample rates that a device may have, where none is known."""
+OFTEN = 3.0
+"""Answers for each step of the counter from which on a step of more than one is a step of the device's own."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """How a device counts samples and time."""
+
+    counter_hz: float | None
+    """Samples a second of the host's clock; None in lockstep, and where it stands still."""
+    clock_rate: float | None
+    """Seconds of the device's clock in a second; None where it has none."""
+    step: float
+    """Typical step of the counter."""
+
+
+def measure_clock(probe: Probe, series: Series, seconds: float) -> Clock:
+    """Sum up counter and clock over ``seconds``, the time from the first answer to the last."""
+    counter = series.counted("sequence")
+    steps = np.diff(counter)
+    steps = steps[steps != 0]
+    moved = float(counter[-1] - counter[0])
+    clock_rate = None
+    if "time" in series.block.registers and seconds > 0:
+        time = series.counted("time")
+        clock_rate = float(time[-1] - time[0]) / seconds
+    return Clock(
+        moved / seconds if moved and not probe.in_lockstep else None,
+        clock_rate,
+        float(np.median(steps)) if len(steps) else 0.0,
+    )
+
+
+def check_clock(probe: Probe, series: Series, clock: Clock, seconds: float, rate_hz: float | None) -> Iterator[Finding]:
+    """Yield what is wrong with the counter, else what is wrong with the clock.
+
+    Parameters
+    ----------
+    series : Series
+        Answers over a second or more, several of each sample where the line is fast enough.
+    seconds : float
+        From the first answer to the last: the host's, in lockstep the samples' own.
+    rate_hz : float, optional
+        Samples a second that the device is to have; in lockstep one a step.
+    """
+    wrong = list(_counter(probe, series, clock, seconds, rate_hz))
+    yield from wrong
+    if not wrong and "time" in series.block.registers:
+        yield from _time(probe, series, clock, seconds)
+
+
+def _counter(probe: Probe, series: Series, clock: Clock, seconds: float, rate_hz: float | None) -> Iterator[Finding]:
+    counter, where = series.counted("sequence"), f"{probe.map_path}.read.sequence"
+    steps = np.diff(counter)
+    if _counts(counter, seconds, rate_hz):
+        changes = np.count_nonzero(steps)
+        if clock.step > 1 and not probe.in_lockstep and len(steps) > OFTEN * changes:
+            yield Finding(
+                probe.name,
+                f"its counter goes up by {clock.step:g} at a time, expected 1 for each sample; correct "
+                f"{where}.scale, or let the device count samples",
+            )
+        return
+    mended = remedy("sequence", "", where, series, lambda v: _counts(v, seconds, rate_hz), counts=True)
+    if mended:
+        yield Finding(probe.name, f"its counter reads {counter[0]:.6g}, then {counter[-1]:.6g}; {mended}")
+    elif not steps.any():
+        others = np.delete(series.words, _places(series, "sequence"), axis=1)
+        alive = "though other registers change" if (others != others[0]).any() else "and nothing else changes either"
+        yield Finding(
+            probe.name,
+            f"its counter stands still at {counter[-1]:g} for {seconds:.2g} s, {alive}; is it sampling? "
+            f"Else correct {where}",
+        )
+    elif (steps < 0).any():
+        yield Finding(
+            probe.name,
+            f"its counter goes back, from {counter[:-1][steps < 0][0]:g} to {counter[1:][steps < 0][0]:g}; "
+            f"compare {where} with the device's manual",
+        )
+    else:
+        found, expected = (counter[-1] - counter[0]) / seconds, f"{rate_hz:g}" if rate_hz else "a sample rate"
+        yield Finding(
+            probe.name,
+            f"its counter goes up by {found:.4g} a second, expected {expected}; set the device's rate or "
+            f"acquire.sample_rate_hz, or correct {where}",
+        )
+
+
+def _counts(counter: NDArray, seconds: float, rate_hz: float | None) -> bool:
+    """Tell whether a counter (n,) goes up, at the rate that is known."""
+    if not np.isfinite(counter).all() or (np.diff(counter) < 0).any():
+        return False
+    found = (counter[-1] - counter[0]) / seconds
+    if rate_hz is None:
+        return bool(RATES_HZ[0] <= found <= RATES_HZ[1])
+    # A sample more or less at either end.
+    return bool(abs(found - rate_hz) <= TOLERANCE * rate_hz + 2.0 / seconds)
+
+
+def _time(probe: Probe, series: Series, clock: Clock, seconds: float) -> Iterator[Finding]:
+    time, where = series.counted("time"), f"{probe.map_path}.read.time"
+    if _keeps_time(time, seconds):
+        return
+    register, rate = series.block.registers["time"], clock.clock_rate or 0.0
+    reference = "by its counter" if probe.in_lockstep else "of this computer's clock"
+    found = f"its clock goes on by {rate:.4g} s in each second {reference}"
+    for unit in DIMENSION["time"]:
+        if rate and abs(rate * UNITS[unit] / UNITS[register.unit] - 1.0) <= TOLERANCE:
+            yield Finding(probe.name, f'{found}; with unit = "{unit}" the two agree: correct {where}')
+            return
+    mended = remedy("time", " s", where, series, lambda v: _keeps_time(v, seconds), counts=True)
+    yield Finding(
+        probe.name, f"{found}; {mended or f'compare {where} with the manual: scale = ' + _scale(register, rate)}"
+    )
+
+
+def _scale(register, rate: float) -> str:
+    return f"{register.scale / rate:.3g} would agree" if rate > 0 else "no scale would agree"
+
+
+def _keeps_time(time: NDArray, seconds: float) -> bool:
+    if not np.isfinite(time).all() or (np.diff(time) < 0).any():
+        return False
+    # A sample more or less at either end.
+    return bool(abs(time[-1] - time[0] - seconds) <= TOLERANCE * seconds + 2.0 * np.diff(time).max(initial=0.0))
+
+
+def check_latch(probe: Probe, series: Series) -> Iterator[Finding]:
+    """Yield a finding where registers change while the counter does not: they are not latched at one instant."""
+    if len(series.fresh) < 2:  # a counter that stands still says nothing of a latch
+        return
+    same = np.diff(series.words[:, _places(series, "sequence")], axis=0) == 0
+    latched = [name for name in series.block.names if name not in ("sequence", "status")]
+    kept = same.all(axis=1)
+    torn = [
+        name
+        for name in latched
+        if (kept & (np.diff(series.words[:, _places(series, name)], axis=0) != 0).any(axis=1)).any()
+    ]
+    if torn:
+        yield Finding(
+            probe.name,
+            f"{', '.join(torn)} changed while the sample counter did not: a block is not latched at one "
+            "instant; read the registers that the device latches, see its manual",
+        )
+
+
+def _places(series: Series, name: str) -> list[int]:
+    register = series.block.registers[name]
+    start = register.address - series.block.address
+    return list(range(start, start + register.registers))

@@ -1,0 +1,95 @@
+"""Other meanings of the same bits: what a value would be if its register were described another way."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import product
+from typing import get_args
+
+from numpy.typing import NDArray
+
+from pipelines.acquisition.check.probe import Series
+from pipelines.registers import Block
+from pipelines.settings.rig import DIMENSION, REGISTERS, Register, RegisterType
+
+MOST_NAMED = 2
+_COST = {"word_order": 1, "type": 2}
+
+
+@dataclass(frozen=True)
+class Interpretation:
+    """A register as it might have to be described."""
+
+    register: Register
+    bytes_swapped: bool
+    change: str
+    """What differs from the rig file, as one would write it there."""
+    cost: int
+    """How far it is from the rig file: slips of the pen come before another kind of number."""
+
+
+def interpretations(name: str, block: Block) -> Iterator[Interpretation]:
+    """Yield every other description of a register, the likeliest slips first."""
+    found = [Interpretation(*key) for key in _all(name, block)]
+    return iter(sorted((one for one in found if one.cost), key=lambda one: one.cost))
+
+
+def _all(name: str, block: Block) -> Iterator[tuple[Register, bool, str, int]]:
+    was = block.registers[name]
+    taken = {
+        a for other, r in block.registers.items() if other != name for a in range(r.address, r.address + r.registers)
+    }
+    for kind, order, swapped in product(get_args(RegisterType), ("big", "little"), (False, True)):
+        end = was.address + REGISTERS[kind]
+        if end > block.address + block.count or taken & set(range(was.address, end)):
+            continue
+        if REGISTERS[kind] == 1 and order != was.word_order:
+            continue
+        update: dict = {}
+        if order != was.word_order:
+            update["word_order"] = order
+        if kind != was.type:
+            update["type"] = kind
+        cost = 2 * swapped + sum(_COST.get(key, 2) for key in update) + (REGISTERS[kind] != REGISTERS[was.type])
+        if kind.startswith("float") and not was.type.startswith("float") and was.scale != 1.0:
+            update["scale"] = 1.0  # a float needs no counts: it comes in its unit
+        yield was.model_copy(update=update), swapped, _written(update, swapped), cost
+    for unit in DIMENSION[name]:
+        if unit != was.unit:
+            yield was.model_copy(update={"unit": unit}), False, _written({"unit": unit}, False), 1
+
+
+def _written(update: dict, swapped: bool) -> str:
+    keys = [f'{key} = "{value}"' if isinstance(value, str) else f"{key} = {value:g}" for key, value in update.items()]
+    return " and ".join(keys + ["the two bytes of each register swapped"] * swapped)
+
+
+def remedy(
+    name: str, unit: str, where: str, series: Series, plausible: Callable[[NDArray], bool], *, counts: bool = False
+) -> str | None:
+    """Say which other description of a register would be plausible, and what to correct; None where none is.
+
+    Parameters
+    ----------
+    unit : str
+        SI unit of the quantity, for the sentence.
+    where : str
+        The register in the rig file.
+    plausible : callable
+        Given values (n,), tells whether they can be true.
+    counts : bool
+        Whether values are to be carried on where their register wraps.
+    """
+    best: list[tuple[Interpretation, float]] = []
+    for one in interpretations(name, series.block):
+        if best and one.cost > best[0][0].cost:
+            break
+        values = (series.counted if counts else series.of)(name, one.register, bytes_swapped=one.bytes_swapped)
+        # A row of zeros can always be true, and explains nothing.
+        if values.any() and plausible(values):
+            best.append((one, float(values[-1])))
+    if not best:
+        return None
+    named = ", or ".join(f"with {one.change} it would be {value:.4g}{unit}" for one, value in best[:MOST_NAMED])
+    if all(one.bytes_swapped for one, _ in best[:MOST_NAMED]):
+        return f"{named}: Modbus sends the high byte first; set the device to that, then compare {where}"
+    return f"{named}: correct {where}"

@@ -1,0 +1,219 @@
+"""A rig against its file: every device is asked, nothing is moved."""
+
+import asyncio
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+
+import numpy as np
+
+from pipelines.acquisition.check.agreement import check_velocity
+from pipelines.acquisition.check.clock import TOLERANCE, Clock, check_clock, check_latch, measure_clock
+from pipelines.acquisition.check.finding import Finding
+from pipelines.acquisition.check.latency import Latency
+from pipelines.acquisition.check.plausible import check_registers
+from pipelines.acquisition.check.probe import Probe, Series
+from pipelines.acquisition.check.rate import Rate, check_rate, cycles
+from pipelines.acquisition.check.zeros import check_zeros
+from pipelines.acquisition.machine import Drive, Machine, Sensor
+from pipelines.errors import DeviceError
+from pipelines.settings.rig import RigSettings
+
+READS = 200
+READS_S = 2.0
+"""Readings of each device alone, and how long they may take."""
+TOGETHER_S = 2.0
+DRIVES_S = 1.0
+"""How long all devices are asked together, and the drives alone."""
+SLOW = 0.5
+"""Share of a sample that a typical answer may take: a run asks a device twice in each."""
+
+
+@dataclass
+class DeviceReport:
+    """What was found out about one device."""
+
+    name: str
+    label: str
+    connected: bool = False
+    identity: list[dict[str, int]] = field(default_factory=list)
+    """``address``, ``expected``, ``found``."""
+    latency: Latency | None = None
+    clock: Clock | None = None
+    values: dict[str, float] = field(default_factory=dict)
+    """Mean of each register, SI units."""
+    noise: dict[str, float] = field(default_factory=dict)
+    """Standard deviation of each."""
+
+    def as_json(self) -> dict:
+        """Return it as JSON objects."""
+        return asdict(self) | {"latency": self.latency.as_json() if self.latency else None}
+
+
+@dataclass
+class RigReport:
+    """What was found out about a rig."""
+
+    rate_hz: float | None
+    """The rate that is wanted."""
+    devices: list[DeviceReport] = field(default_factory=list)
+    together: Rate | None = None
+    drives_alone: Rate | None = None
+    findings: list[Finding] = field(default_factory=list)
+
+    def as_json(self) -> dict:
+        """Return it as JSON objects."""
+        rates = {"together": self.together, "drives_alone": self.drives_alone}
+        return {
+            "rate_hz": self.rate_hz,
+            "devices": [device.as_json() for device in self.devices],
+            **{
+                name: {"cycles_hz": rate.cycles_hz, "late": rate.late, "cycle": rate.cycle.as_json()} if rate else None
+                for name, rate in rates.items()
+            },
+            "findings": [asdict(finding) for finding in self.findings],
+        }
+
+
+def probes_of(machine: Machine) -> list[Probe]:
+    """Return a probe of each device, drives first."""
+    parts: list[Drive | Sensor] = [*machine.drives, *machine.sensors]
+    return [Probe(part, machine.rig.clock == "lockstep") for part in parts]
+
+
+async def look(machine: Machine, rate_hz: float | None, *, alone: bool) -> RigReport:
+    """Ask every device of a rig and judge the answers; in real time nothing is written.
+
+    Parameters
+    ----------
+    machine : Machine
+        Not yet connected; left connected.
+    rate_hz : float, optional
+        Samples a second that are wanted.
+    alone : bool
+        Whether nobody is in the machine.
+    """
+    report = RigReport(rate_hz)
+    present: dict[Probe, tuple[DeviceReport, Series]] = {}
+    for probe in probes_of(machine):
+        device = DeviceReport(probe.name, probe.part.device.label)
+        report.devices.append(device)
+        try:
+            await _meet(probe, device)
+        except DeviceError as error:
+            report.findings.append(_told_by(error, [probe]))
+        else:
+            still = probe.taken()
+            device.latency = Latency.of(still.answered - still.asked)
+            present[probe] = device, still
+    # In lockstep the drives go on together or not at all.
+    if len(present) == len(report.devices) or machine.rig.clock == "real_time":
+        report.findings += await _ask_together(list(present), report)
+    for probe, (device, still) in present.items():
+        report.findings += _judged(probe, device, still, probe.taken(), machine.rig, rate_hz, alone=alone)
+    report.findings += _counters_differ([device for device, _ in present.values()])
+    return report
+
+
+async def _meet(probe: Probe, report: DeviceReport) -> None:
+    """Connect, read the identity, and read one device many times."""
+    device, loop = probe.part.device, asyncio.get_running_loop()
+    await device.connect()
+    report.connected = True
+    for entry in probe.part.map.identity:
+        (found,) = await device.read(entry.address, 1)
+        report.identity.append({"address": entry.address, "expected": entry.value, "found": found})
+    await device.check_identity(probe.part.map.identity)
+    until = loop.time() + READS_S
+    for k in range(READS):
+        if k and loop.time() > until:
+            break
+        await probe.read()
+
+
+async def _ask_together(present: Sequence[Probe], report: RigReport) -> list[Finding]:
+    """Time whole cycles, with all devices and with the drives alone."""
+    drives = [probe for probe in present if probe.is_drive]
+    if not drives:
+        return []
+    try:
+        report.together = await cycles(present, TOGETHER_S, report.rate_hz)
+        report.drives_alone = await cycles(drives, DRIVES_S, report.rate_hz)
+    except DeviceError as error:
+        return [_told_by(error, present)]
+    if drives[0].in_lockstep or report.rate_hz is None:
+        return []
+    return list(check_rate(report.together, report.drives_alone, report.rate_hz))
+
+
+def _told_by(error: DeviceError, probes: Sequence[Probe]) -> Finding:
+    """Return the complaint of one of the devices as a finding."""
+    for probe in probes:
+        if str(error).startswith(probe.part.device.label):
+            return Finding(probe.name, str(error).removeprefix(f"{probe.part.device.label}: "))
+    return Finding("rig", str(error))
+
+
+def _judged(
+    probe: Probe,
+    report: DeviceReport,
+    still: Series,
+    together: Series,
+    rig: RigSettings,
+    rate_hz: float | None,
+    *,
+    alone: bool,
+) -> list[Finding]:
+    """Judge the answers of one device: those to itself alone, and those in cycles, sample after sample."""
+    findings: list[Finding] = []
+    series = together if len(together.asked) else still
+    assert report.latency
+    seconds = float(series.answered[-1] - series.answered[0])
+    if probe.in_lockstep and rate_hz:
+        seconds = (len(series.asked) - 1) * probe.every / rate_hz
+    elif rate_hz and report.latency.median > SLOW * probe.every / rate_hz:
+        findings.append(
+            Finding(
+                probe.name,
+                f"takes {report.latency.median * 1e3:.3g} ms to answer, too long for a sample of "
+                f"{rate_hz:g} Hz ({probe.every * 1e3 / rate_hz:.3g} ms); give it a line of its own, raise its baud "
+                "rate, or ask less often",
+            )
+        )
+    if series is together:
+        report.clock = measure_clock(probe, series, seconds)
+        findings += check_clock(probe, series, report.clock, seconds, rate_hz)
+    if not probe.in_lockstep:
+        findings += check_latch(probe, series)
+    wrong = list(check_registers(probe, series, rig))
+    findings += wrong
+    if not probe.is_drive:
+        findings += check_zeros(probe, series, rig.safety.cuff_force_n, alone=alone)
+    elif not {finding.quantity for finding in wrong} & {"angle", "velocity"}:
+        findings += _velocity(probe, series, rate_hz)
+    for name in series.block.names:
+        values = series.of(name)[series.fresh]
+        report.values[name], report.noise[name] = float(np.mean(values)), float(np.std(values))
+    return findings
+
+
+def _velocity(probe: Probe, series: Series, rate_hz: float | None) -> Iterator[Finding]:
+    register = series.block.registers.get("velocity")
+    if register is None:
+        return
+    fresh = series.fresh
+    t = np.arange(len(fresh)) / rate_hz if probe.in_lockstep and rate_hz else series.answered[fresh]
+    q, dq = series.of("angle")[fresh], series.of("velocity")[fresh]
+    yield from check_velocity(probe.name, f"{probe.map_path}.read", register, t, q, dq)
+
+
+def _counters_differ(devices: Sequence[DeviceReport]) -> Iterator[Finding]:
+    """Yield drives that do not sample as often as the first one: a run waits for all of them."""
+    drives = [(d.name, d.clock.counter_hz) for d in devices if d.name.startswith("drive") and d.clock]
+    for name, found in drives[1:]:
+        first = drives[0][1]
+        if first and found and abs(found / first - 1.0) > TOLERANCE:
+            yield Finding(
+                name,
+                f"samples {found:.4g} times a second, {drives[0][0]} {first:.4g}; let all drives sample at one "
+                "rate, on one synchronising signal if they have it",
+            )

@@ -1,0 +1,132 @@
+"""Whether what a register says can be true of a leg that nobody moves."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.acquisition.check.finding import Finding
+from pipelines.acquisition.check.interpretation import remedy
+from pipelines.acquisition.check.probe import Probe, Series
+from pipelines.acquisition.machine import Drive
+from pipelines.settings.rig import DriveSettings, RigSettings
+
+TEMPERATURE_C = (-20.0, 150.0)
+TORQUE_AT_REST = 0.1
+"""Share of a joint's torque limit that its current may tell while its drive is disabled."""
+SPEED_AT_REST = 2.0
+"""Share of a joint's speed limit that a leg which swings out may have."""
+STEP_RAD = 0.01
+"""What an encoder may do between two samples at rest, beyond what the speed limit allows."""
+TURN_RAD = np.pi
+"""An angle further from zero is not of a leg that stands outside its limits."""
+TINY, HUGE = 1e-20, 1e20
+"""No device tells anything smaller or greater: such floats are misread words."""
+SI = {"angle": " rad", "reference": " rad", "velocity": " rad/s", "current": " A", "temperature": " °C"}
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """What a register may hold at rest."""
+
+    low: float = -HUGE
+    high: float = HUGE
+    words: str = ""
+    """The range, as a clause of a sentence."""
+    otherwise: str = "compare {where} with the device's manual"
+    """What to do where no other description of the register explains its values."""
+    fastest: float = np.inf
+    """Greatest change a second."""
+
+    def holds(self, values: NDArray) -> NDArray:
+        """Mark the values (n,) that can be true."""
+        return natural(values) & (values >= self.low) & (values <= self.high)
+
+    def leaps(self, values: NDArray, seconds: NDArray) -> bool:
+        """Tell whether values (n,) at instants (n,) change faster than anything that moves."""
+        with np.errstate(invalid="ignore", over="ignore"):
+            return bool((np.abs(np.diff(values)) > self.fastest * np.diff(seconds) + STEP_RAD).any())
+
+
+def check_registers(probe: Probe, series: Series, rig: RigSettings) -> Iterator[Finding]:
+    """Yield what cannot be true of any register but counter and clock; ``series`` holds at least one answer."""
+    if isinstance(probe.part, Drive):
+        yield from _faults(probe, probe.part, series)
+        expected = _of_drive(probe.part.settings, probe.in_lockstep)
+    else:
+        expected = _of_sensor(rig)
+    for name in series.block.names:
+        if name not in ("sequence", "time", "status"):
+            yield from _judged(probe, name, series, expected.get(name, Expectation()))
+
+
+def natural(values: NDArray) -> NDArray:
+    """Mark the values (n,) that are numbers of a size that nature has."""
+    size = np.abs(values)
+    return np.isfinite(values) & ((size == 0.0) | ((size > TINY) & (size < HUGE)))
+
+
+def _of_drive(drive: DriveSettings, in_lockstep: bool) -> dict[str, Expectation]:
+    low, high = drive.angle_rad
+    speed, current = SPEED_AT_REST * drive.speed_rad_s, TORQUE_AT_REST * drive.torque_nm / drive.torque_per_ampere
+    return {
+        "angle": Expectation(
+            low,
+            high,
+            f"outside its limits {low:g} to {high:g} rad",
+            "move the leg within its limits, or correct the encoder's zero ({where}.offset)",
+            fastest=np.inf if in_lockstep else speed,  # the host's clock tells nothing of a leg in lockstep
+        ),
+        "velocity": Expectation(-speed, speed, f"expected less than {speed:g} rad/s of a leg that nobody moves"),
+        "current": Expectation(
+            -current,
+            current,
+            f"expected less than {current:.2g} A of a drive that is disabled ({TORQUE_AT_REST:.0%} of its torque_nm)",
+            "does another master drive it? Disable it there, or compare {where} with the device's manual",
+        ),
+        "temperature": Expectation(
+            *TEMPERATURE_C,
+            f"expected {TEMPERATURE_C[0]:g} to {TEMPERATURE_C[1]:g} °C",
+        ),
+    }
+
+
+def _of_sensor(rig: RigSettings) -> dict[str, Expectation]:
+    limit = rig.safety.cuff_force_n
+    words = f"expected less than safety.cuff_force_n, {limit:g} N, of a cuff that nobody presses"
+    return dict.fromkeys(("force_x", "force_y", "force_z"), Expectation(-limit, limit, words))
+
+
+def _judged(probe: Probe, name: str, series: Series, expected: Expectation) -> Iterator[Finding]:
+    values, seconds = series.of(name), series.answered
+    good, leaps = expected.holds(values), expected.leaps(values, seconds)
+    if good.all() and not leaps:
+        return
+    value = float(values[~good][0]) if not good.all() else float(values[-1])
+    unit, where = SI.get(name, " N"), f"{probe.map_path}.read.{name}"
+    why = expected.words if not good.all() else "and leaps from one reading to the next"
+    if not natural(values).all():
+        why = "which no device means"
+    # A leg that stands a little outside its limits is not a register misread.
+    misread = name != "angle" or leaps or abs(value) > TURN_RAD or not np.isfinite(value)
+    mended = None
+    if misread:
+        mended = remedy(
+            name, unit, where, series, lambda v: bool(expected.holds(v).all() and not expected.leaps(v, seconds))
+        )
+    todo = mended or expected.otherwise.format(where=where)
+    yield Finding(probe.name, f"{name} reads {value:.4g}{unit}, {why}; {todo}", name)
+
+
+def _faults(probe: Probe, drive: Drive, series: Series) -> Iterator[Finding]:
+    if "status" not in series.block.registers:
+        return
+    status = int(series.of("status")[-1])
+    if bits := status & drive.map.fault_mask:
+        yield Finding(
+            probe.name,
+            f"reports a fault (status 0x{status:04X}, of which 0x{bits:04X} mean a fault); see the drive's manual and "
+            f"clear it, or correct {probe.map_path}.fault_mask",
+            "status",
+        )

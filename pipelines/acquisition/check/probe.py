@@ -1,0 +1,103 @@
+"""One device under check: asked, but not believed. What it answers is kept as words."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.acquisition.machine import Counter, Drive, Sensor
+from pipelines.registers import Block
+from pipelines.settings.rig import Register, registers_of
+
+
+@dataclass(frozen=True)
+class Series:
+    """Answers of one device, each with when it was asked for and when it came (host's clock, s)."""
+
+    block: Block
+    asked: NDArray
+    """(n,) s."""
+    answered: NDArray
+    """(n,) s."""
+    words: NDArray
+    """(n, registers of the block)."""
+
+    def of(self, name: str, register: Register | None = None, *, bytes_swapped: bool = False) -> NDArray:
+        """Return a quantity's values (n,) in SI units; read as another ``register`` would, where one is given."""
+        register = register or self.block.registers[name]
+        one = Block({name: register})
+        start = register.address - self.block.address
+        words = self.words[:, start : start + one.count]
+        if bytes_swapped:
+            words = (words >> 8) | ((words & 0xFF) << 8)
+        return np.array([one.decode(row)[name] for row in words.tolist()])
+
+    def counted(self, name: str, register: Register | None = None, *, bytes_swapped: bool = False) -> NDArray:
+        """Return the values (n,) of a counter or clock, carried on where its register wraps."""
+        on = Counter(Block({name: register or self.block.registers[name]}).span(name))
+        return np.array([on(value) for value in self.of(name, register, bytes_swapped=bytes_swapped)])
+
+    @property
+    def fresh(self) -> NDArray:
+        """Indices of the first answer with each new sample."""
+        register = self.block.registers["sequence"]
+        start = register.address - self.block.address
+        counter = self.words[:, start : start + register.registers]
+        return np.flatnonzero(np.r_[True, (np.diff(counter, axis=0) != 0).any(axis=1)])
+
+
+class Probe:
+    """A drive or sensor of the rig, as the check asks it."""
+
+    def __init__(self, part: Drive | Sensor, in_lockstep: bool) -> None:
+        self.part = part
+        self.is_drive = isinstance(part, Drive)
+        self.in_lockstep = in_lockstep
+        self.block = Block(registers_of(part.map.read))
+        kind, place = ("drive", part.settings.joint) if isinstance(part, Drive) else ("sensor", part.settings.cuff)
+        self.name = f"{kind} {place}"
+        self.place: str = place
+        self.map_path = f"map.{kind}.{part.settings.map}"
+        self.every = part.settings.every if isinstance(part, Sensor) else 1
+        """Cycles of a run from one reading to the next."""
+        self._answers: list[tuple[float, float, list[int]]] = []
+        self._last = [0] * self.block.count
+
+    async def read(self) -> None:
+        """Read the block and keep the answer; moves nothing."""
+        asked = time.perf_counter()
+        self._keep(asked, await self.part.device.read(self.block.address, self.block.count))
+
+    async def step(self) -> None:
+        """Let a drive in lockstep go on to its next sample, its torque away; read any other device."""
+        if not (self.in_lockstep and isinstance(self.part, Drive)):
+            return await self.read()
+        asked = time.perf_counter()
+        words = self.part.tell.encode({"reference": self.angle(), "control": self.part.map.disable})
+        self._keep(asked, await self.part.device.exchange(self.part.tell, words, self.part.told))
+
+    async def count(self) -> None:
+        """Read the sample counter alone, as a run does before each sample."""
+        counter = self.block.registers["sequence"]
+        await self.part.device.read(counter.address, counter.registers)
+
+    def angle(self) -> float:
+        """Return the angle that was read last, one that can be sent back: a drive that is disabled ignores it."""
+        angle = self.last()["angle"]
+        return angle if abs(angle) < 1e3 else 0.0
+
+    def last(self) -> dict[str, float]:
+        """Return the values that were read last, SI units."""
+        return self.block.decode(self._last)
+
+    def taken(self) -> Series:
+        """Return what was kept since the last time, and forget it."""
+        answers, self._answers = self._answers, []
+        asked, answered, words = zip(*answers, strict=True) if answers else ((), (), ())
+        shaped = np.array(words, dtype=np.int64).reshape(len(answers), self.block.count)
+        return Series(self.block, np.array(asked), np.array(answered), shaped)
+
+    def _keep(self, asked: float, words: list[int]) -> None:
+        self._answers.append((asked, time.perf_counter(), words))
+        self._last = words

@@ -1,0 +1,62 @@
+"""What a force sensor says while nobody presses it: its zero, its noise, whether it lives."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.acquisition.check.finding import Finding
+from pipelines.acquisition.check.plausible import natural
+from pipelines.acquisition.check.probe import Probe, Series
+from pipelines.registers import raw_range
+
+AXES = ("force_x", "force_y", "force_z")
+ZERO_SHARE = 0.05
+"""Share of ``safety.cuff_force_n`` that a zero may eat up."""
+ENOUGH = 20
+"""Fresh samples from which on a sensor without noise is not believed."""
+NEAR_END = 0.999
+
+
+def check_zeros(probe: Probe, series: Series, limit_n: float, *, alone: bool) -> Iterator[Finding]:
+    """Yield what is wrong with a sensor's zeros.
+
+    Parameters
+    ----------
+    limit_n : float
+        Highest force that a cuff may have.
+    alone : bool
+        Whether nobody is in the machine; else the forces' means are no zeros.
+    """
+    forces = fresh_forces(series)
+    if not all(natural(forces[:, i]).all() for i in range(len(AXES))):
+        return  # the registers are to be mended first
+    where = f"{probe.map_path}.read"
+    for i, axis in enumerate(AXES):
+        mean, full = float(forces[:, i].mean()), raw_range(series.block.registers[axis])
+        scale, offset = series.block.registers[axis].si
+        if full and np.mean(np.abs((forces[:, i] - offset) / scale) >= NEAR_END * full[1]) > 0.5:
+            yield Finding(
+                probe.name,
+                f"{axis} is saturated at {mean:.4g} N, the end of its register; check the sensor's cable "
+                f"and amplifier, or compare {where}.{axis} with its manual",
+            )
+        elif alone and abs(mean) > ZERO_SHARE * limit_n:
+            most = ZERO_SHARE * limit_n
+            yield Finding(
+                probe.name,
+                f"{axis} is {mean:.4g} N with nobody in the machine, expected within ±{most:g} N ({ZERO_SHARE:.0%} of "
+                f"safety.cuff_force_n); tare the sensor, or correct {where}.{axis}.offset",
+            )
+    if len(forces) >= ENOUGH and not np.ptp(forces, axis=0).any():
+        told = ", ".join(f"{force:.4g}" for force in forces[0])
+        yield Finding(
+            probe.name,
+            f"all three forces are constant ({told} N) over {len(forces)} samples, without any noise; is "
+            "the sensor connected, and are these its live registers?",
+        )
+
+
+def fresh_forces(series: Series) -> NDArray:
+    """Return the forces of each new sample, (n, 3) N."""
+    return np.column_stack([series.of(axis) for axis in AXES])[series.fresh]

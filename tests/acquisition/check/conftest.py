@@ -1,0 +1,48 @@
+import socket
+
+import pytest
+
+from pipelines.acquisition.check import look
+from pipelines.acquisition.check.check import check_rig
+from pipelines.rig import server
+
+
+@pytest.fixture
+def checked(rig_file, serve, monkeypatch):
+    """Check a rig that swings out, against a rig file; returns the report.
+
+    ``believed`` are changes of the file, not of the rig that is there; ``served`` are changes of both.
+    """
+
+    def run(shipped="plain", believed=None, served=None, fault=None, rate_hz=None, run="exo_alone", **changes):
+        replace = dict(served or {})
+        if shipped == "real_time":  # slow, for a busy computer
+            replace["[plant]\n"] = "[plant]\nsample_rate_hz = 40.0\n"
+        monkeypatch.setattr(look, "TOGETHER_S", 1.5 if shipped == "real_time" else 0.3)
+        monkeypatch.setattr(look, "DRIVES_S", 0.1)
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            port = probe.getsockname()[1]
+        changes = {"watchdog_s": 2.0, "rest_rad": "[0.4, -0.6]", **changes}
+        rig = rig_file(shipped, port, replace, **changes)
+        seen = rig_file(shipped, port, replace | (believed or {}), **changes)
+        with serve(rig, port, run, fault=fault):
+            return check_rig(seen, rate_hz, run)
+
+    return run
+
+
+@pytest.fixture
+def altered(monkeypatch):
+    """Let devices tell something else than they measured: ``change(device, values)`` alters the values in place."""
+
+    def alter(change):
+        put = server.Device._put
+
+        def altered_put(self, block, values):
+            change(self, values)
+            put(self, block, values)
+
+        monkeypatch.setattr(server.Device, "_put", altered_put)
+
+    return alter

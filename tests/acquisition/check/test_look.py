@@ -1,0 +1,154 @@
+"""What is wrong with a rig is found without moving it, and said in words."""
+
+import time
+
+import pytest
+
+from pipelines.rig import server
+
+ANGLE = 'angle = { address = 104, type = "int32", scale = 1e-6, unit = "rad" }'
+TIME = 'time = { address = 102, type = "uint32", unit = "us" }'
+VELOCITY = 'velocity = { address = 106, type = "int32", scale = 1e-5, unit = "rad/s" }'
+FORCE_Y = 'force_y = { address = 104, type = "float32", unit = "N" }'
+TEMPERATURE = 'temperature = { address = 112, type = "int16", scale = 0.1, unit = "°C" }'
+
+
+def told(report):
+    return "\n".join(map(str, report.findings))
+
+
+@pytest.mark.parametrize("shipped", ["plain", "real_time"])
+@pytest.mark.parametrize("run", ["exo_alone", "with_human"])
+def test_nothing_is_said_of_a_right_rig(checked, shipped, run):
+    report = checked(shipped, run=run)
+    # A busy computer is a slow line, rightly.
+    assert [str(finding) for finding in report.findings if finding.device != "rig"] == []
+    assert len(report.devices) == 6
+    for device in report.devices:
+        assert device.connected and all(entry["found"] == entry["expected"] for entry in device.identity)
+        assert 0 < device.latency.least <= device.latency.median <= device.latency.p99 <= device.latency.most
+        assert sum(device.latency.histogram) == device.latency.count
+
+
+def test_nothing_is_written_to_a_real_rig(checked):
+    functions = set()
+
+    def note(device, function, written):
+        functions.add((function, written is not None))
+
+    checked("real_time", fault=note)
+    assert functions == {(3, False)}
+
+
+@pytest.mark.parametrize(
+    ("was", "believed", "words"),
+    [
+        (ANGLE, ANGLE.replace("scale", 'word_order = "little", scale'),
+         ["angle reads", 'with word_order = "big" it would be', "correct map.drive.servo.read.angle"]),
+        (FORCE_Y, FORCE_Y.replace("unit", 'word_order = "little", unit'),
+         ["force_y reads", 'with word_order = "big" it would be', "correct map.sensor.force.read.force_y"]),
+        (FORCE_Y, FORCE_Y.replace("float32", "int32"),
+         ["force_y reads", 'with type = "float32" it would be']),
+        (TIME, TIME.replace('"us"', '"ms"'),
+         ["its clock goes on by 1000 s in each second by its counter", 'with unit = "us" the two agree']),
+        (VELOCITY, VELOCITY.replace("1e-5", "-1e-5"),
+         ["velocity is negative where the angle grows", "turn the sign of map.drive.servo.read.velocity.scale"]),
+        (VELOCITY, VELOCITY.replace('"rad/s"', '"deg/s"'),
+         ["velocity is 0.01", "times the rate of change", 'with unit = "rad/s" the two agree']),
+        (TEMPERATURE, TEMPERATURE.replace("0.1", "10.0"), ["temperature reads 2400 °C, expected -20 to 150 °C"]),
+        (FORCE_Y, FORCE_Y.replace("unit", "offset = 60.0, unit"),
+         ["force_y is 6", "N with nobody in the machine, expected within ±20 N", "tare the sensor"]),
+    ],
+    ids=["word order", "word order of a float", "type", "unit of time", "sign", "unit of velocity", "hot", "offset"],
+)  # fmt: skip
+def test_a_register_described_wrongly_is_found_by_what_it_reads(checked, was, believed, words):
+    said = told(checked(believed={was: believed}))
+    assert [word for word in words if word not in said] == [], said
+
+
+def test_degrees_taken_for_radians_are_found_by_the_limits(checked):
+    in_degrees = ANGLE.replace("1e-6", "1e-4").replace('"rad"', '"deg"')
+    said = told(checked(served={ANGLE: in_degrees}, believed={in_degrees: in_degrees.replace('"deg"', '"rad"')}))
+    assert "outside its limits -0.35 to 1.75 rad" in said
+    assert 'with unit = "deg" it would be' in said
+
+
+def test_swapped_bytes_are_told_from_swapped_words(checked, monkeypatch):
+    put = server.Device._put
+
+    def swapped(self, block, values):
+        put(self, block, values)
+        if isinstance(self, server.Sensor):
+            start = block.address - self.first
+            words = self.registers[start : start + block.count]
+            self.registers[start : start + block.count] = [(w >> 8) | ((w & 0xFF) << 8) for w in words]
+
+    monkeypatch.setattr(server.Device, "_put", swapped)
+    report = checked()
+    about_force = [str(finding) for finding in report.findings if "force_y" in finding.quantity]
+    assert len(about_force) == 4
+    assert all("with the two bytes of each register swapped it would be" in said for said in about_force)
+    assert not [finding for finding in report.findings if finding.device.startswith("drive")]
+
+
+def test_a_counter_that_stands_still_is_found(checked, altered):
+    altered(lambda device, values: values.update(sequence=7.0))
+    assert "drive hip: its counter stands still at 7 for" in told(checked("real_time"))
+
+
+def test_registers_that_are_not_latched_with_the_counter_are_found(checked, altered):
+    asked = iter(range(10**9))
+    altered(lambda device, values: "angle" in values and values.update(angle=0.1 + 1e-5 * next(asked)))
+    assert "angle changed while the sample counter did not" in told(checked("real_time"))
+
+
+def test_a_rate_that_the_devices_do_not_have_is_found(checked):
+    said = told(checked("real_time", rate_hz=80.0))
+    assert "drive hip: its counter goes up by 4" in said or "drive hip: its counter goes up by 3" in said
+    assert "a second, expected 80" in said
+
+
+def test_a_slow_device_and_a_slow_line_are_found(checked):
+    def slow(device, function, written):
+        if device.unit == 13:
+            time.sleep(0.03)
+
+    said = told(checked("real_time", fault=slow))
+    assert "sensor shank_front: takes" in said
+    assert "ms to answer, too long for a sample of 40 Hz (25 ms)" in said
+    assert "rig: all devices can be asked" in said
+    assert "raise `every` of the sensors" in said
+
+
+@pytest.mark.parametrize("shipped", ["plain", "real_time"])
+def test_an_absent_device_is_said_to_be_absent_and_the_others_are_checked(checked, shipped):
+    believed = {'unit = 12\nmap = "force"': 'unit = 99\nmap = "force"'}
+    report = checked(shipped, believed=believed, watchdog_s=0.5)
+    assert [finding.device for finding in report.findings] == ["sensor thigh_back"]
+    assert [device.latency is not None for device in report.devices] == [True, True, True, False, True, True]
+
+
+def test_a_rig_that_is_off_is_said_to_refuse(checked, rig_file):
+    from pipelines.acquisition.check.check import check_rig
+
+    report = check_rig(rig_file("real_time", 1))
+    assert len(report.findings) == 6
+    assert "refuses the connection; check that the rig is on" in told(report)
+
+
+def test_another_device_is_told_by_its_identity_and_not_judged_further(checked):
+    report = checked(believed={"value = 0x4653": "value = 0x4654"})
+    assert len(report.findings) == 4
+    assert "identity register 0 holds 0x4653, expected 0x4654" in told(report)
+
+
+def test_a_sensor_that_is_frozen_is_found(checked, altered):
+    altered(lambda device, values: "force_x" in values and values.update(force_x=1.0, force_y=2.0, force_z=3.0))
+    assert "all three forces are constant (1, 2, 3 N)" in told(checked())
+
+
+def test_a_fault_and_a_current_at_rest_are_found(checked, altered):
+    altered(lambda device, values: "status" in values and values.update(status=8.0, current=9.0))
+    said = told(checked())
+    assert "reports a fault (status 0x0008, of which 0x0008 mean a fault)" in said
+    assert "current reads 9 A, expected less than" in said
