@@ -1,9 +1,9 @@
 """One run on a rig, from the first connection to the recording."""
 
-import asyncio
 import logging
 import signal
-from collections.abc import Iterator
+import traceback
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,11 +14,12 @@ import numpy as np
 from pipelines.acquisition.columns import columns_of
 from pipelines.acquisition.embedded import embedded
 from pipelines.acquisition.journal import Journal, JournalFile, journal_of, locked, refuse_leftover
-from pipelines.acquisition.loop import Loop, Progress, Report
+from pipelines.acquisition.loop import Loop, Progress, Report, run_to_its_end
 from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.pace import urgent
 from pipelines.acquisition.plan import check_start, check_trajectory, make_plan
 from pipelines.acquisition.recorded import account_of, place_for, write_recording
+from pipelines.acquisition.states import State, Supervisor
 from pipelines.contracts import RECORDING
 from pipelines.contracts.provenance import describe
 from pipelines.errors import DeviceError, ExoidError, about
@@ -26,6 +27,9 @@ from pipelines.mechanics.trajectory import Trajectory, read_trajectory
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.mechanism import MechanismSettings
 from pipelines.settings.rig import RigSettings, load_rig
+
+
+EMERGENCY = "USE THE EMERGENCY STOP"
 
 
 @dataclass(frozen=True)
@@ -76,44 +80,46 @@ def acquire(
     metadata |= describe([trajectory_path, rig_path], {"run": run.model_dump(mode="json"), "rig": rig.public()})
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # what it would print, our errors say
     place = embedded(rig, rig_path, run, sample_rate_hz) if rig.embedded else nullcontext(rig)
-    with place as present, nullcontext() if rig.clock == "lockstep" else urgent():
-        asyncio.run(_record(present, run, trajectory, journal, metadata, sample_rate_hz, report))
-    with locked(journal):
-        return _finish(output, journal)
+    with place as present, nullcontext() if rig.clock == "lockstep" else urgent(), _signals() as stopped_by:
+        sensors = present.sensor if run.run == "with_human" else ()
+        supervisor = Supervisor(present, sample_rate_hz, sensors)
+        run_to_its_end(_record(supervisor, run, trajectory, journal, metadata, report, stopped_by), supervisor.abort)
+        with locked(journal):
+            return _finish(output, journal, supervisor)
 
 
 async def _record(
-    rig: RigSettings,
+    supervisor: Supervisor,
     run: RunSettings,
     trajectory: Trajectory,
     path: Path,
     metadata: dict[str, Any],
-    rate: float,
     report: Report,
+    stopped_by: Sequence[str],
 ) -> None:
     """Move the leg and write the journal, which says at its end why the run was stopped early, if it was."""
+    rig = supervisor.rig
     machine = Machine(rig, with_sensors=run.run == "with_human")
     report(Progress(duration_s=run.duration_s))
-    with _signals() as stopped_by:
+    try:
+        supervisor.check()
+        await machine.connect()
+        start = np.array((await machine.look()).angle)
+        if why := check_start(rig, start):
+            raise DeviceError(why)
+        plan = make_plan(rig, trajectory, start, run.duration_s, supervisor.rate)
+        supervisor.take(plan, start)
         try:
-            await machine.connect()
-            start = np.array((await machine.look()).angle)
-            if why := check_start(rig, start):
-                raise DeviceError(why)
-            plan = make_plan(rig, trajectory, start, run.duration_s, rate)
-            abort = None
-            try:
-                with Journal(path, ["time_s", *columns_of(machine)], metadata) as journal:
-                    loop = Loop(machine, plan, journal, rate, report, stopped_by, sent=start)
-                    abort = await loop.run()
-                    journal.end(abort)
-            except OSError as error:  # a full disk must not hide that a drive could not be disabled
-                raise DeviceError(
-                    f"{path}: cannot be written ({error}); make room, then `exoid recover {path}` makes a recording "
-                    f"of what is in it{f'. {abort}' if abort else ''}"
-                ) from error
-        finally:
-            machine.close()
+            with Journal(path, ["time_s", *columns_of(machine)], metadata) as journal:
+                await Loop(machine, supervisor, plan, journal, report, stopped_by).run()
+                journal.end(supervisor.why)
+        except OSError as error:  # a full disk must not hide that a drive could not be disabled
+            raise DeviceError(
+                f"{path}: cannot be written ({error}); make room, then `exoid recover {path}` makes a recording "
+                f"of what is in it{f'. {_outcome(supervisor)}' if supervisor.why else ''}"
+            ) from error
+    finally:
+        machine.close()
 
 
 @contextmanager
@@ -121,39 +127,57 @@ def _signals() -> Iterator[list[str]]:
     """Collect the names of signals that ask for a stop, so that the loop and nothing else acts on them."""
     # A terminal that is closed must not leave a drive enabled either.
     names = {signal.SIGINT: "Ctrl-C", signal.SIGTERM: "SIGTERM", signal.SIGHUP: "SIGHUP", signal.SIGQUIT: "SIGQUIT"}
-    loop, came = asyncio.get_running_loop(), list[str]()
-    # Outside a process's main thread nobody can catch signals, and nobody is sent them.
-    with suppress(NotImplementedError, RuntimeError, ValueError):
-        for number, name in names.items():
-            loop.add_signal_handler(number, came.append, name)
+    came, before = list[str](), {}
+    with suppress(ValueError):  # outside a process's main thread nobody can catch signals, and nobody is sent them
+        for number in names:
+            before[number] = signal.signal(number, lambda number, frame: came.append(names[signal.Signals(number)]))
     try:
         yield came
     finally:
-        with suppress(NotImplementedError, RuntimeError, ValueError):
-            for number in names:
-                loop.remove_signal_handler(number)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
-def _finish(output: Path, path: Path) -> Outcome:
-    """Turn the journal into a recording; raise DeviceError where the run was stopped."""
+def _finish(output: Path, path: Path, supervisor: Supervisor) -> Outcome:
+    """Turn the journal into a recording; raise where the run was stopped, or exoid was at fault."""
     journal = JournalFile(path)
     account = account_of(journal)
-    abort, samples = account.abort, account.samples
-    if abort and not samples:
+    place, samples = place_for(output, account.abort), account.samples
+    kind, told = DeviceError, _outcome(supervisor)
+    if supervisor.fault:
+        kind, told = ExoidError, f"{told}; please report it with {_keep_traceback(supervisor.fault, place)}"
+    if account.abort and not samples:
         path.unlink()
-        raise DeviceError(f"{abort}; the leg was stopped before the recording began")
-    place = place_for(output, abort)
+        raise kind(f"{told} before the recording began") from supervisor.fault
     try:
         write_recording(journal, place, account)
     except (ExoidError, OSError) as error:
-        raise DeviceError(
-            f"{abort or 'the run is complete'}; its {samples} samples are in {path}, but could not be written as a "
-            f"recording: {error}; once that is mended, `exoid recover {path}` makes one"
+        raise kind(
+            f"{told}; its {samples} samples are in {path}, but could not be written as a recording: {error}; once "
+            f"that is mended, `exoid recover {path}` makes one"
         ) from error
     path.unlink()
-    if abort:
-        raise DeviceError(f"{abort}; the leg was stopped, its {samples} samples so far are in {place}")
+    if account.abort:
+        raise kind(f"{told}, its {samples} samples so far are in {place}") from supervisor.fault
     return Outcome(place, samples, account.missed)
+
+
+def _outcome(supervisor: Supervisor) -> str:
+    """Return in words how a run ended."""
+    if supervisor.why is None:
+        return "the run is complete"
+    return f"{supervisor.why}; {'the leg was stopped' if supervisor.state is State.DISABLED else EMERGENCY}"
+
+
+def _keep_traceback(fault: BaseException, recording: Path) -> str:
+    """Write the traceback of a fault of exoid's own beside a recording; return where."""
+    log = recording.with_suffix(".log")
+    try:
+        with open(log, "a", encoding="utf-8") as file:
+            file.writelines(traceback.format_exception(fault))
+    except OSError as error:
+        return f"this, as {log} cannot be written: {error}"
+    return str(log)
 
 
 def _metadata(

@@ -1,16 +1,14 @@
-"""What stops a run, and how a drive is stopped."""
+"""What may be measured, what may be sent, and how set-points slow down."""
 
-import asyncio
-import time
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.acquisition.machine import Drive, Row
+from pipelines.acquisition.machine import Row
 from pipelines.errors import DeviceError
 from pipelines.mechanics.motion import CUFFS
-from pipelines.settings.rig import RigSettings, SensorSettings
+from pipelines.settings.rig import DriveSettings, RigSettings, SensorSettings
 
 ROUNDING_RAD = 1e-9
 HOLD_SAMPLES = 20
@@ -76,13 +74,13 @@ class Limits:
         )
 
 
-def refuse_leap(rig: RigSettings, last: NDArray, reference: NDArray, elapsed_s: float) -> None:
+def refuse_leap(drives: Sequence[DriveSettings], last: NDArray, reference: NDArray, elapsed_s: float) -> None:
     """Stand between the plan and the wire: refuse set-points (J,) rad that no planned motion may ask for.
 
     Whatever went wrong before, each is a number, within its joint's limits, and no further from the ``last``
     one than its speed limit allows in the time between.
     """
-    for drive, before, angle in zip(rig.drive, last, reference, strict=True):
+    for drive, before, angle in zip(drives, last, reference, strict=True):
         low, high = drive.angle_rad
         if not low <= angle <= high:
             raise DeviceError(
@@ -94,45 +92,6 @@ def refuse_leap(rig: RigSettings, last: NDArray, reference: NDArray, elapsed_s: 
                 f"{drive.joint}: a set-point of {angle:.3f} rad was due {elapsed_s:.3f} s after {before:.3f} rad, "
                 f"faster than its limit of {drive.speed_rad_s:g} rad/s; it was not sent"
             )
-
-
-async def stop(
-    drive: Drive, reference: float, speed: float, deceleration: float, sample_rate_hz: float, at_once: asyncio.Event
-) -> str | None:
-    """Bring one drive to rest and take its torque away, whatever happens to the others.
-
-    Parameters
-    ----------
-    reference, speed : float
-        Last set-point that was sent, rad, and its speed, rad/s.
-    deceleration : float
-        rad/s².
-    at_once : asyncio.Event
-        Set where slowing down would go on pressing: every drive is then disabled without it.
-
-    Returns
-    -------
-    str or None
-        Why it could not be disabled.
-    """
-    last, due = reference, time.perf_counter()
-    try:
-        for last in slowing(reference, speed, deceleration, sample_rate_hz, drive.settings.angle_rad).tolist():
-            if at_once.is_set():
-                break
-            found = await drive.exchange(last)
-            if not abs(found.torque) <= drive.settings.torque_nm:
-                at_once.set()
-            # On the host's clock: the device's counter may be what has failed.
-            due += 0.0 if drive.in_lockstep else 1.0 / sample_rate_hz
-            await asyncio.sleep(max(0.0, due - time.perf_counter()))
-    except Exception:  # whatever it is, the drive may still hear that it shall disable
-        pass
-    try:
-        await drive.disable(last)
-    except Exception as error:  # one drive's failure must not hide another's
-        return str(error) if isinstance(error, DeviceError) else f"{drive.device.label}: {error!r}"
-    return None
 
 
 def slowing(

@@ -1,0 +1,221 @@
+"""The safety state machine: the one place that decides what the drives are told, and when nothing more.
+
+It is pure: it neither waits nor reads nor sends. ``loop`` tells it what came and when, and sends what it returns.
+docs/safety.md draws it.
+"""
+
+from asyncio import CancelledError
+from collections.abc import Iterator, Sequence
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.acquisition.machine import Row
+from pipelines.acquisition.plan import Plan
+from pipelines.acquisition.safety import Limits, refuse_leap, slowing
+from pipelines.acquisition.watch import Watch
+from pipelines.errors import DeviceError
+from pipelines.settings.rig import RigSettings, SensorSettings
+
+REST_RAD = 0.02
+"""How far the leg may have moved between the plan and the moment at which the drives are enabled."""
+
+
+class State(StrEnum):
+    """Where a run is."""
+
+    IDLE = "idle"
+    CHECK = "check"
+    RAMP = "ramp"
+    RUN = "run"
+    RAMP_DOWN = "ramp down"
+    ABORT = "abort"
+    DISABLED = "disabled"
+
+
+TRANSITIONS = {
+    State.IDLE: {State.CHECK},
+    State.CHECK: {State.RAMP, State.ABORT},
+    State.RAMP: {State.RUN, State.ABORT},
+    State.RUN: {State.RAMP_DOWN, State.ABORT},
+    State.RAMP_DOWN: {State.DISABLED, State.ABORT},
+    State.ABORT: {State.DISABLED},
+    State.DISABLED: set[State](),
+}
+"""Where each state may lead. Abort and disabled lead to no set-point of the plan any more."""
+
+FOLLOWING = (State.RAMP, State.RUN, State.RAMP_DOWN)
+"""The states in which the drives are sent the plan, in its order."""
+
+
+class Supervisor:
+    """The state of one run, what was sent last, and why it was stopped."""
+
+    def __init__(self, rig: RigSettings, sample_rate_hz: float, sensors: Sequence[SensorSettings] = ()) -> None:
+        """Supervise a run on a rig; ``sensors`` are the cuff sensors that are read."""
+        self.rig = rig
+        self.rate = sample_rate_hz
+        self.state = State.IDLE
+        self.why: str | None = None
+        """The first reason to stop early; None while there is none."""
+        self.fault: BaseException | None = None
+        """The first error that was exoid's own."""
+        self.sent = np.zeros(len(rig.drive))
+        """(J,) last set-points, rad; to begin with, where the leg stands."""
+        self.sent_at = 0.0
+        """When they were sent, host's clock, s."""
+        self.pressing = False
+        """Whether slowing down would go on pressing: the drives are then disabled without it."""
+        self._limits = Limits(rig, sample_rate_hz, sensors)
+        self._watch = Watch(rig, sample_rate_hz)
+        self._speed = np.zeros_like(self.sent)
+        self._path = self.sent[np.newaxis]
+        self._index = 0
+        self._first = 0
+
+    def check(self) -> None:
+        """Begin to look at the devices."""
+        self._go(State.CHECK)
+
+    def take(self, plan: Plan, start: NDArray) -> None:
+        """Take the plan, and where the leg stood when it was made, (J,) rad."""
+        self._plan = plan
+        self._path = np.vstack([start, plan.reference])
+        self.sent = self._path[0].copy()
+
+    def check_rest(self, row: Row) -> None:
+        """Refuse to enable drives whose leg no longer stands where the plan begins, or breaks a limit."""
+        for drive, planned, found in zip(self.rig.drive, self.sent, row.angle, strict=True):
+            # The drive goes from where the leg stands to its first set-point within one sample.
+            if not abs(found - planned) <= min(REST_RAD, drive.speed_rad_s / self.rate):
+                raise DeviceError(
+                    f"the {drive.joint} moved from {planned:.3f} to {found:.3f} rad before its drive was enabled; keep "
+                    "the leg still and start again"
+                )
+        if why := self._limits.violation(row):
+            raise DeviceError(why)
+
+    def rest(self, now: float) -> NDArray:
+        """Return the set-points (J,) rad with which the drives are enabled: where the leg stands."""
+        self._refuse_after_abort()
+        self._send(self._path[0], np.zeros_like(self.sent), 0.0, now)
+        return self.sent
+
+    def begin(self, row: Row, now: float) -> None:
+        """Follow the plan from the first sample on at which the drives are enabled."""
+        self._refuse_after_abort()
+        self._first = row.sequence
+        self._watch.begin(row, now)
+        self._go(State.RAMP)
+
+    def next(self, found: int, now: float) -> NDArray:
+        """Return the set-points (J,) rad to be sent now that sample ``found`` is latched.
+
+        Raises
+        ------
+        DeviceError
+            Where nothing more may be sent.
+        """
+        self._refuse_after_abort()
+        self._watch.look(found, now)
+        index = min(found - self._first, len(self._path) - 1)
+        while self.state is not self._due(index):
+            self._go(FOLLOWING[FOLLOWING.index(self.state) + 1])
+        elapsed = (index - self._index) / self.rate
+        if self.rig.clock == "real_time":  # a counter that leaps does not make time go by
+            elapsed = min(elapsed, now - self.sent_at + 1.0 / self.rate)
+        step = self._path[index] - self._path[max(index - 1, 0)]
+        self._send(self._path[index], step * self.rate, elapsed, now)
+        self._index = index
+        return self.sent
+
+    def judge(self, row: Row, now: float) -> bool:
+        """Tell whether a sample is a new one; raise DeviceError where it is reason to stop."""
+        self._refuse_after_abort()
+        if not self._watch.take(row, now):
+            return False
+        if why := self._limits.violation(row):
+            raise DeviceError(why)
+        return True
+
+    def has_followed(self, row: Row) -> bool:
+        """Tell whether the plan is at its end with a sample."""
+        # What is sent while a sample is latched is reached at the end of the next one.
+        return row.sequence - self._first >= len(self._path)
+
+    def index(self, row: Row) -> int:
+        """Return which set-point of the plan a sample carries; outside the plan before and after it."""
+        return row.sequence - self._first - 2
+
+    def abort(self, error: BaseException) -> None:
+        """Stop, whatever it was; the first reason is kept."""
+        ours = not isinstance(error, DeviceError | KeyboardInterrupt | SystemExit | CancelledError)
+        if ours and self.fault is None:
+            self.fault = error
+        if self.why is None:
+            self.why = _reason(error)
+        if State.ABORT in TRANSITIONS[self.state]:
+            self._go(State.ABORT)
+
+    def stopping(self, joint: int) -> Iterator[float]:
+        """Yield the set-points, rad, that bring one drive to rest and hold it there, one a sample."""
+        drive, speed = self.rig.drive[joint], float(self._speed[joint])
+        deceleration = self.rig.safety.deceleration_rad_s2
+        of_joint = slice(joint, joint + 1)
+        for reference in slowing(self.sent[joint], speed, deceleration, self.rate, drive.angle_rad):
+            if self.pressing:
+                return
+            refuse_leap([drive], self.sent[of_joint], np.array([reference]), 1.0 / self.rate)
+            self.sent[joint] = reference
+            yield float(reference)
+
+    def feel(self, joint: int, torque: float) -> None:
+        """Heed the torque (N·m) of a drive that is being stopped."""
+        self.pressing |= not abs(torque) <= self.rig.drive[joint].torque_nm
+
+    def feel_cuffs(self, forces: NDArray) -> None:
+        """Heed the cuff forces (4, 3) N while the drives are being stopped."""
+        self.pressing |= self._limits.force_violation(forces) is not None
+
+    def finish(self, complaints: Sequence[str]) -> None:
+        """Note that the drives were told to disable; ``complaints`` are of those that may not have taken it.
+
+        Disabled is what is known to be: with a complaint a run ends in abort.
+        """
+        if not complaints:
+            self._go(State.DISABLED)
+            return
+        self.why = f"{self.why or 'the run is complete'}; and could not be disabled: {'; '.join(complaints)}"
+        if self.state is not State.ABORT:
+            self._go(State.ABORT)
+
+    def _go(self, state: State) -> None:
+        assert state in TRANSITIONS[self.state], f"there is no way from {self.state} to {state}"
+        self.state = state
+
+    def _due(self, index: int) -> State:
+        """Return the state to which a set-point of the path belongs; its first is where the leg stood."""
+        if index - 1 < self._plan.first:
+            return State.RAMP
+        return State.RUN if index - 1 < self._plan.stop else State.RAMP_DOWN
+
+    def _refuse_after_abort(self) -> None:
+        if self.why is not None:
+            raise DeviceError(self.why)
+
+    def _send(self, reference: NDArray, speed: NDArray, elapsed_s: float, now: float) -> None:
+        """Let set-points pass, and remember how they move, in case they must be slowed down."""
+        refuse_leap(self.rig.drive, self.sent, reference, elapsed_s)
+        self.sent, self._speed, self.sent_at = reference.copy(), speed, now
+
+
+def _reason(error: BaseException) -> str:
+    """Return in words why a run is stopped."""
+    if isinstance(error, DeviceError):
+        return str(error)
+    if isinstance(error, KeyboardInterrupt):
+        return "stopped by Ctrl-C"
+    if isinstance(error, SystemExit | CancelledError):
+        return "stopped by the program that called exoid"
+    return f"a fault of exoid's own ({error!r})"

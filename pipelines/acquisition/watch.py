@@ -1,0 +1,71 @@
+"""Whether samples keep coming, and the machine's counter and clock go on as they should."""
+
+from math import ceil
+
+from pipelines.acquisition.machine import Row
+from pipelines.errors import DeviceError
+from pipelines.settings.rig import RigSettings
+
+RATE_SAMPLES = 50
+RATE_TOLERANCE = 0.05
+"""How far the devices' clock may be from the rate that was asked for, and after how many samples that is looked at."""
+
+
+class Watch:
+    """The first drive's counter and clock, which are the machine's; times ``now`` are the host's, s."""
+
+    def __init__(self, rig: RigSettings, sample_rate_hz: float) -> None:
+        drive = rig.drive[0]
+        self._label = f"drive {drive.joint} ({drive.host}:{drive.port}, unit {drive.unit})"
+        self._rate = sample_rate_hz
+        self._longest_s = rig.safety.watchdog_s
+        self._most = 1 + ceil(self._longest_s * sample_rate_hz)
+
+    def begin(self, row: Row, now: float) -> None:
+        """Begin with a sample."""
+        self._first = self._last = row
+        self._fresh = now
+
+    def look(self, found: int, now: float) -> None:
+        """Refuse to go on after too long a wait, or with a counter that runs backwards or leaps."""
+        waited, last = now - self._fresh, self._last.sequence
+        if waited > self._longest_s:
+            raise DeviceError(
+                f"watchdog: no new sample from {self._label} for {waited:.3f} s, allowed are {self._longest_s:g} s; "
+                "its counter stands still, or this computer is too busy"
+            )
+        if found < last:
+            raise DeviceError(f"{self._label}: its sample counter went back from {last} to {found}; was it restarted?")
+        if found > last + self._most:
+            raise DeviceError(
+                f"{self._label}: its sample counter leapt from {last} to {found}, expected at most {self._most} "
+                f"samples within the watchdog's {self._longest_s:g} s; was it restarted?"
+            )
+
+    def take(self, row: Row, now: float) -> bool:
+        """Tell whether a sample is a new one; refuse one that does not go on from the last."""
+        self.look(row.sequence, now)
+        if row.sequence == self._last.sequence:
+            return False
+        self._check_clock(row)
+        if row.sequence - self._first.sequence >= RATE_SAMPLES:
+            self._check_rate(row)
+        self._last, self._fresh = row, now
+        return True
+
+    def _check_clock(self, row: Row) -> None:
+        """Refuse a device clock that does not go on with the samples."""
+        if not row.time > self._last.time:
+            raise DeviceError(
+                f"{self._label}: its clock went from {self._last.time:.6f} to {row.time:.6f} s while its counter went "
+                f"from {self._last.sequence} to {row.sequence}; was it restarted?"
+            )
+
+    def _check_rate(self, row: Row) -> None:
+        """Refuse a device clock that does not tell the sample rate; a wrong unit in the rig file shows here."""
+        found = (row.sequence - self._first.sequence) / max(row.time - self._first.time, 1e-9)
+        if not abs(found / self._rate - 1.0) <= RATE_TOLERANCE:
+            raise DeviceError(
+                f"{self._label}: samples {found:.4g} times a second by its own clock, expected {self._rate:g}; "
+                "correct acquire.sample_rate_hz, or the unit of time in the rig file"
+            )
