@@ -49,6 +49,8 @@ def acquire(
     sample_rate_hz: float = 200.0,
     mechanism: MechanismSettings | None = None,
     report: Report = lambda progress: None,
+    *,
+    reset_faults: bool = False,
 ) -> Outcome:
     """Record one run.
 
@@ -67,6 +69,8 @@ def acquire(
         Geometry, where the rig file does not say it.
     report : callable
         Called about ten times a second with the progress.
+    reset_faults : bool
+        Clear the faults that drives report before the run, with the control word that the rig file has for it.
     """
     rig = load_rig(rig_path)
     trajectory = read_trajectory(trajectory_path)
@@ -83,7 +87,8 @@ def acquire(
     with place as present, nullcontext() if rig.clock == "lockstep" else urgent(), _signals() as stopped_by:
         sensors = present.sensor if run.run == "with_human" else ()
         supervisor = Supervisor(present, sample_rate_hz, sensors)
-        run_to_its_end(_record(supervisor, run, trajectory, journal, metadata, report, stopped_by), supervisor.abort)
+        recording = _record(supervisor, run, trajectory, journal, metadata, report, stopped_by, reset_faults)
+        run_to_its_end(recording, supervisor.abort)
         with locked(journal):
             return _finish(output, journal, supervisor)
 
@@ -96,6 +101,7 @@ async def _record(
     metadata: dict[str, Any],
     report: Report,
     stopped_by: Sequence[str],
+    reset_faults: bool,
 ) -> None:
     """Move the leg and write the journal, which says at its end why the run was stopped early, if it was."""
     rig = supervisor.rig
@@ -104,6 +110,8 @@ async def _record(
     try:
         supervisor.check()
         await machine.connect()
+        if reset_faults:
+            await machine.reset_faults()
         start = np.array((await machine.look()).angle)
         if why := check_start(rig, start):
             raise DeviceError(why)
@@ -145,7 +153,7 @@ def _finish(output: Path, path: Path, supervisor: Supervisor) -> Outcome:
     place, samples = place_for(output, account.abort), account.samples
     kind, told = DeviceError, _outcome(supervisor)
     if supervisor.fault:
-        kind, told = ExoidError, f"{told}; please report it with {_keep_traceback(supervisor.fault, place)}"
+        kind, told = ExoidError, f"please report {_keep_traceback(supervisor.fault, place)}: {told}"
     if account.abort and not samples:
         path.unlink()
         raise kind(f"{told} before the recording began") from supervisor.fault

@@ -93,9 +93,14 @@ class Loop:
                 self._tell()
 
     async def _enable(self) -> Row:
-        """Enable the drives where the leg stands; return the first sample from then on."""
-        self._heed_signals()
-        row = await self._exchange(self.supervisor.rest(time.monotonic()))
+        """Enable the drives where the leg stands; return the first sample at which they say that they are."""
+        began = time.monotonic()
+        while True:
+            self._heed_signals()
+            row = await self._exchange(self.supervisor.rest(time.monotonic()))
+            if self.supervisor.enabled(row, time.monotonic() - began):
+                break
+            await asyncio.sleep(1.0 / self._rate)
         self._enabled_at = self._reported = time.monotonic()
         self.supervisor.begin(row, self._enabled_at)
         return row
@@ -173,12 +178,12 @@ class Loop:
         drive, period = self.machine.drives[joint], 1.0 / self._rate
         due = self.supervisor.sent_at + period
         try:
-            for reference in self.supervisor.stopping(joint):
+            for reference, halt in self.supervisor.stopping(joint):
                 # On the host's clock: the device's counter may be what has failed. What is late is not caught up
                 # with, so that set-points never come faster than samples.
                 await asyncio.sleep(0.0 if drive.in_lockstep else max(0.0, due - time.monotonic()))
                 due = max(due, time.monotonic()) + period
-                self.supervisor.feel(joint, (await drive.exchange(reference)).torque)
+                self.supervisor.feel(joint, (await drive.exchange(reference, halt=halt)).torque)
         except BaseException as error:  # whatever it is, the drive may still hear that it shall disable
             self.supervisor.abort(error)
         return await self._disable(joint)

@@ -2,19 +2,23 @@
 
 import asyncio
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.acquisition.device import Device
-from pipelines.errors import DeviceError
+from pipelines.errors import DeviceError, SettingsError
 from pipelines.mechanics.motion import CUFFS
 from pipelines.registers import Block
 from pipelines.settings.rig import DriveSettings, RigSettings, SensorSettings, registers_of
 
 LAG_PAUSE_S = 0.0002
 """Before a drive is asked again that has not latched its sample yet."""
+
+STATUS_PAUSE_S = 0.002
+"""Before a drive is asked again whether it has taken a control word."""
 
 LOOKS = 9
 """Readings from which the distance between the drives' counters is taken."""
@@ -49,6 +53,8 @@ class Reading:
     velocity: float
     temperature: float
     reference: float
+    enabled: bool | None = None
+    """Whether the drive says that it follows its set-point; None for one that does not say."""
 
 
 class Drive:
@@ -62,6 +68,9 @@ class Drive:
         self.told = Block(registers_of(self.map.read))
         self.tell = Block(registers_of(self.map.write))
         self._counter = Block({"sequence": self.map.read.sequence})
+        self._status = Block({"status": self.map.read.status or self.map.read.sequence})
+        self._beats, self._beats_span = 0, int(self.tell.span("heartbeat")) if self.map.write.heartbeat else 1
+        self._patience_s = rig.safety.watchdog_s
         self._sequence = Counter(self.told.span("sequence"))
         self._time = Counter(self.told.span("time"))
         self._sent = np.nan
@@ -77,24 +86,57 @@ class Drive:
         words = await self.device.read(self._counter.address, self._counter.count)
         return int(self._sequence(self._decoded(self._counter, words)["sequence"]))
 
-    async def exchange(self, reference: float, *, enable: bool = True) -> Reading:
-        """Send a set-point (rad) and return the sample that is latched."""
+    async def exchange(self, reference: float, *, halt: bool = False) -> Reading:
+        """Send a set-point (rad) and return the sample that is latched; ``halt`` where the leg is to stand there."""
         self.touched = True
-        control = self.map.enable if enable else self.map.disable
-        words = self.tell.encode({"reference": reference, "control": control})
-        reading = self._reading(await self.device.exchange(self.tell, words, self.told))
+        control = self.map.enable if self.map.halt is None or not halt else self.map.halt
+        reading = self._reading(await self.device.exchange(self.tell, self._words(reference, control), self.told))
         self._sent = reference
         return reading
 
     async def disable(self, reference: float) -> None:
-        """Take the torque away; where the line fails, once more on a new one."""
-        words = self.tell.encode({"reference": reference, "control": self.map.disable})
+        """Take the torque away, and make sure of it."""
+        await self.device.write(self.tell, self._words(reference, self.map.disable))
+        if self.map.enabled_mask:
+            await self._until(lambda status: not self._is_enabled(status), "to disable", "see its manual")
+
+    async def reset_fault(self) -> None:
+        """Clear a fault; a drive that reports none is told nothing."""
+        told = self._decoded(self.told, await self.device.read(self.told.address, self.told.count))
+        if not int(told.get("status", 0)) & self.map.fault_mask:
+            return
+        if self.map.fault_reset is None:
+            raise SettingsError(
+                f"map.drive.{self.settings.map}.fault_reset: missing, but {self.device.label} reports a fault that is "
+                "to be reset; give its control word, see the drive's manual"
+            )
         try:
-            await self.device.write(self.tell, words)
-        except DeviceError:
-            self.device.close()
-            await self.device.connect()
-            await self.device.write(self.tell, words)
+            await self.device.write(self.tell, self._words(told["angle"], self.map.fault_reset))
+            await self._until(lambda status: not status & self.map.fault_mask, "to reset its fault", "see its manual")
+        finally:
+            await self.device.write(self.tell, self._words(told["angle"], self.map.disable))
+
+    def _words(self, reference: float, control: int) -> list[int]:
+        self._beats = (self._beats + 1) % self._beats_span
+        return self.tell.encode({"reference": reference, "control": control, "heartbeat": self._beats})
+
+    def _is_enabled(self, status: int) -> bool:
+        return status & self.map.enabled_mask == self.map.enabled_value
+
+    async def _until(self, has_taken: Callable[[int], bool], what: str, remedy: str) -> None:
+        """Read the status word until it shows that a control word was taken."""
+        until = time.monotonic() + self._patience_s
+        while True:
+            words = await self.device.read(self._status.address, self._status.count)
+            status = int(self._decoded(self._status, words)["status"])
+            if has_taken(status):
+                return
+            if time.monotonic() > until:
+                raise DeviceError(
+                    f"{self.device.label}: was told {what}, but its status word is still 0x{status:04X} after "
+                    f"{self._patience_s:g} s; {remedy}"
+                )
+            await asyncio.sleep(STATUS_PAUSE_S)
 
     def _decoded(self, block: Block, words: list[int]) -> dict[str, float]:
         """Decode words; whatever is counted with must be a number."""
@@ -109,10 +151,12 @@ class Drive:
 
     def _reading(self, words: list[int]) -> Reading:
         told = self._decoded(self.told, words)
-        if fault := int(told.get("status", 0)) & self.map.fault_mask:
+        status = int(told.get("status", 0))
+        if fault := status & self.map.fault_mask:
+            reset = "" if self.map.fault_reset is None else ", with --reset-faults where the drive is to clear it"
             raise DeviceError(
                 f"{self.device.label}: reports a fault (status bits 0x{fault:04X}); see the drive's manual, "
-                "clear the fault and start again"
+                f"clear the fault and start again{reset}"
             )
         return Reading(
             sequence=int(self._sequence(told["sequence"])),
@@ -123,6 +167,7 @@ class Drive:
             velocity=told.get("velocity", np.nan),
             temperature=told.get("temperature", np.nan),
             reference=told.get("reference", self._sent),
+            enabled=self._is_enabled(status) if self.map.enabled_mask else None,
         )
 
 
@@ -184,6 +229,11 @@ class Machine:
         for part in self._parts:
             await part.device.connect()
             await part.device.check_identity(part.map.identity)
+
+    async def reset_faults(self) -> None:
+        """Clear the faults that drives report."""
+        for drive in self.drives:
+            await drive.reset_fault()
 
     def close(self) -> None:
         """Close every line."""

@@ -102,6 +102,19 @@ class Supervisor:
         self._send(self._path[0], np.zeros_like(self.sent), 0.0, now)
         return self.sent
 
+    def enabled(self, row: Row, waited_s: float) -> bool:
+        """Tell whether every drive says that it is enabled, as far as it tells; refuse to wait too long for it."""
+        idle = [drive for drive, found in zip(self.rig.drive, row.drives, strict=True) if found.enabled is False]
+        if idle and waited_s > self.rig.safety.watchdog_s:
+            raise DeviceError(
+                f"drive {idle[0].joint}: was told to enable, but its status word does not say that it is after "
+                f"{self.rig.safety.watchdog_s:g} s; see the drive's manual, or correct enabled_mask and enabled_value "
+                "in the rig file"
+            )
+        if why := self._limits.violation(row):
+            raise DeviceError(why)
+        return not idle
+
     def begin(self, row: Row, now: float) -> None:
         """Follow the plan from the first sample on at which the drives are enabled."""
         self._refuse_after_abort()
@@ -135,6 +148,12 @@ class Supervisor:
         self._refuse_after_abort()
         if not self._watch.take(row, now):
             return False
+        for drive, reading in zip(self.rig.drive, row.drives, strict=True):
+            if reading.enabled is False:
+                raise DeviceError(
+                    f"drive {drive.joint}: its status word says that it is no longer enabled; was the emergency stop "
+                    "pressed?"
+                )
         if why := self._limits.violation(row):
             raise DeviceError(why)
         return True
@@ -158,8 +177,11 @@ class Supervisor:
         if State.ABORT in TRANSITIONS[self.state]:
             self._go(State.ABORT)
 
-    def stopping(self, joint: int) -> Iterator[float]:
-        """Yield the set-points, rad, that bring one drive to rest and hold it there, one a sample."""
+    def stopping(self, joint: int) -> Iterator[tuple[float, bool]]:
+        """Yield the set-points, rad, that bring one drive to rest and hold it there, and whether it is to halt there.
+
+        One a sample; no more as soon as holding on would go on pressing.
+        """
         drive, speed = self.rig.drive[joint], float(self._speed[joint])
         deceleration = self.rig.safety.deceleration_rad_s2
         of_joint = slice(joint, joint + 1)
@@ -167,8 +189,8 @@ class Supervisor:
             if self.pressing:
                 return
             refuse_leap([drive], self.sent[of_joint], np.array([reference]), 1.0 / self.rate)
-            self.sent[joint] = reference
-            yield float(reference)
+            halt, self.sent[joint] = reference == self.sent[joint], reference
+            yield float(reference), halt
 
     def feel(self, joint: int, torque: float) -> None:
         """Heed the torque (N·m) of a drive that is being stopped."""

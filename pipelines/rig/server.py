@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 from pymodbus.constants import ExcCodes
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
@@ -27,6 +28,7 @@ from pipelines.mechanics.motion import CUFFS
 from pipelines.registers import Block
 from pipelines.rig.plant import JOINTS, Plant, Samples
 from pipelines.rig.sealed import hidden_effects
+from pipelines.rig.servo import Servo
 from pipelines.settings.rig import (
     DriveMap,
     DriveSettings,
@@ -40,9 +42,6 @@ from pipelines.settings.rig import (
 
 READ_WRITE = 23
 """Function code of the exchange that lockstep counts."""
-
-EXTRAPOLATED = 5
-"""Samples over which a drive goes on at its set-points' speed when none comes; then it holds."""
 
 
 def build_plant(rig: RigSettings, path: Path, run: str, seed: int = 0, sample_rate_hz: float | None = None) -> Plant:
@@ -103,34 +102,29 @@ class Device:
 class Drive(Device):
     """A drive: follows its set-point while it is enabled."""
 
-    def __init__(self, rig: "VirtualRig", settings: DriveSettings, registers: DriveMap, rest: float) -> None:
+    def __init__(self, rig: "VirtualRig", settings: DriveSettings, registers: DriveMap, servo: Servo) -> None:
         self.read, self.write = Block(registers_of(registers.read)), Block(registers_of(registers.write))
         super().__init__(rig, settings.unit, registers.identity, (self.read, self.write))
         self.joint = JOINTS.index(settings.joint)
         self.torque_per_ampere = settings.torque_per_ampere
-        self.enable = registers.enable
-        self.rest = rest
-        self.last, self.step, self.unheard = rest, 0.0, 0
+        self.servo = servo
+        self._beat: float | None = None
 
-    def next_command(self) -> tuple[float, bool]:
-        """Return the set-point (rad) for the next sample and whether the drive is enabled."""
-        reference, enabled = self.command()
-        self.unheard = 0 if self.written else self.unheard + 1
-        if self.unheard:
-            reference = self.last + (self.step if self.unheard <= EXTRAPOLATED else 0.0)
-        self.step, self.last, self.written = reference - self.last, reference, False
-        return reference, enabled
-
-    def command(self) -> tuple[float, bool]:
-        """Return the set-point (rad) that was told last and whether the drive is enabled."""
+    def hear(self) -> None:
+        """Let the servo take what was written since it was last heard."""
+        if not self.written:
+            return
+        self.written = False
         start = self.write.address - self.first
-        if not self.registers:
-            return self.rest, False
         told = self.write.decode(self.registers[start : start + self.write.count])
-        return (told["reference"], True) if told["control"] == self.enable else (self.rest, False)
+        # Where there is a counter for that, only a new count tells that the host lives.
+        beat, self._beat = self._beat, told.get("heartbeat")
+        if beat is None or beat != self._beat:
+            self.servo.hear(told["reference"], int(told["control"]))
 
     def show(self, sample: Samples) -> None:
         """Put a sample into the registers."""
+        self.hear()
         j = self.joint
         values = {
             "sequence": sample.sequence[0] % (self.read.span("sequence") or 2**63),
@@ -139,7 +133,8 @@ class Drive(Device):
             "velocity": sample.velocity[0, j],
             "current": sample.torque[0, j] / self.torque_per_ampere,
             "temperature": sample.temperature[0, j],
-            "status": float(self.rig.enabled[j]),
+            # The drive's state as it is now: a control word is answered at once, not at the next sample.
+            "status": float(self.servo.status),
             "reference": sample.reference[0, j],
         }
         self._put(self.read, values)
@@ -167,13 +162,11 @@ class VirtualRig:
         self.plant = plant
         self.lockstep = rig.clock == "lockstep"
         self.drives = [
-            Drive(self, drive, rig.map.drive[drive.map], rest)
+            Drive(self, drive, rig.map.drive[drive.map], self._servo(rig, drive, rest))
             for drive, rest in zip(rig.drive, plant.reference, strict=True)
         ]
         self.sensors = [Sensor(self, sensor, rig.map.sensor[sensor.map]) for sensor in rig.sensor]
-        self.enabled = np.zeros(len(self.drives), dtype=np.bool_)
-        self._waiting = set(self.drives)
-        self._advance()
+        self._advance(plant.reference)
         self._began = asyncio.get_running_loop().time()
 
     def exchanged(self, drive: Device) -> None:
@@ -186,11 +179,11 @@ class VirtualRig:
         """Advance the plant to the sample that is due."""
         if self.lockstep:
             if not self._waiting:
-                self._advance()
+                self._advance(self.sample.angle[0])
             return
         elapsed = asyncio.get_running_loop().time() - self._began
         while self.sample.sequence[0] < int(elapsed * self.plant.sample_rate_hz):
-            self._advance()
+            self._advance(self.sample.angle[0])
 
     async def keep_time(self) -> None:
         """Latch samples on the rig's own clock, for ever."""
@@ -200,10 +193,19 @@ class VirtualRig:
             await asyncio.sleep(max(0.0, due - loop.time()))
             self.catch_up()
 
-    def _advance(self) -> None:
-        told = [drive.next_command() for drive in self.drives]
-        self.enabled = np.array([enabled for _, enabled in told])
-        self.sample = self.plant.run(np.array([[reference for reference, _ in told]]), self.enabled)
+    def _servo(self, rig: RigSettings, drive: DriveSettings, rest: float) -> Servo:
+        registers, deceleration = rig.map.drive[drive.map], rig.safety.deceleration_rad_s2
+        rate, heartbeat_s = self.plant.sample_rate_hz, self.plant.settings.heartbeat_s
+        return Servo(registers, rest, drive.angle_rad, rate, deceleration, heartbeat_s)
+
+    def _advance(self, angle: NDArray) -> None:
+        """Go on by one sample from measured angles (J,) rad."""
+        told = []
+        for drive in self.drives:
+            drive.hear()
+            told.append(drive.servo.next(float(angle[drive.joint])))
+        enabled = np.array([enabled for _, enabled in told])
+        self.sample = self.plant.run(np.array([[reference for reference, _ in told]]), enabled)
         self._waiting = set(self.drives)
 
 

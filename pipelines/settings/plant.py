@@ -54,6 +54,9 @@ class PlantSettings(Settings):
     shank_cuff_distance_m: float = Field(0.22, gt=0.0, description="Knee axis to shank cuff.")
     rest_rad: Pair = Field((0.0, 0.0), description="Where the leg hangs before a run.")
     sample_rate_hz: float = Field(200.0, gt=0.0, description="Samples a second that the devices latch.")
+    heartbeat_s: float | None = Field(
+        None, gt=0.0, description="How long a drive may be told nothing before it slows down and disables itself."
+    )
     drive_rate_hz: float = Field(1000.0, gt=0.0, description="Rate of the drives' position loops.")
     kp_nm_rad: Pair = Field((1500.0, 600.0), description="Stiffness of the position loops.")
     kd_nm_s_rad: Pair = Field((120.0, 40.0), description="Damping of the position loops.")

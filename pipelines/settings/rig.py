@@ -28,7 +28,7 @@ Unit = Literal[
 ]  # fmt: skip
 
 DIMENSION = {
-    "sequence": ("1",), "status": ("1",), "control": ("1",), "time": ("s", "ms", "us"),
+    "sequence": ("1",), "status": ("1",), "control": ("1",), "heartbeat": ("1",), "time": ("s", "ms", "us"),
     "angle": ("rad", "mrad", "deg"), "reference": ("rad", "mrad", "deg"), "velocity": ("rad/s", "deg/s", "rpm"),
     "current": ("A", "mA"), "temperature": ("°C",),
     "force_x": ("N", "kN"), "force_y": ("N", "kN"), "force_z": ("N", "kN"),
@@ -93,6 +93,13 @@ class DriveWrite(Settings):
 
     reference: Register = Field(description="Set-point angle, to be reached within one sample.")
     control: Register = Field(description="Control word.")
+    heartbeat: Register | None = Field(None, description="Counts up with every write: the host lives.")
+
+    @model_validator(mode="after")
+    def _heartbeat_counts(self) -> Self:
+        if self.heartbeat and not self.heartbeat.type.startswith("u"):
+            raise ValueError(f"heartbeat.type: found {self.heartbeat.type}, expected uint16, uint32 or uint64")
+        return self
 
 
 class SensorRead(Settings):
@@ -112,14 +119,33 @@ class DriveMap(Settings):
     write: DriveWrite = Field(description="Block that is written.")
     enable: int = Field(1, description="Control word that makes the drive follow its set-point.")
     disable: int = Field(0, description="Control word that takes the torque away.")
+    halt: int | None = Field(None, description="Control word that holds the leg where a stop has led it; else enable.")
+    fault_reset: int | None = Field(None, description="Control word that clears a fault, for --reset-faults.")
     fault_mask: int = Field(0, ge=0, description="Bits of the status word that mean a fault; 0 for none.")
+    enabled_mask: int = Field(0, ge=0, description="Bits of the status word that tell whether it is enabled; 0: none.")
+    enabled_value: int = Field(0, ge=0, description="What these bits are while it is enabled.")
 
     @model_validator(mode="after")
     def _blocks_are_possible(self) -> Self:
         _refuse_bad_block(self.read, "read")
         _refuse_bad_block(self.write, "write")
-        if self.fault_mask and self.read.status is None:
-            raise ValueError("fault_mask: needs a status register; add read.status or leave the mask out")
+        for name in ("fault_mask", "enabled_mask"):
+            if getattr(self, name) and self.read.status is None:
+                raise ValueError(f"{name}: needs a status register; add read.status or leave the mask out")
+        if self.enabled_value & ~self.enabled_mask:
+            raise ValueError(
+                f"enabled_value: found 0x{self.enabled_value:04X}, expected bits of enabled_mask "
+                f"0x{self.enabled_mask:04X} only; correct one of them"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _control_words_differ(self) -> Self:
+        words = {name: getattr(self, name) for name in ("enable", "disable", "halt", "fault_reset")}
+        for word, times in Counter(word for word in words.values() if word is not None).items():
+            if times > 1:
+                same = " and ".join(name for name, value in words.items() if value == word)
+                raise ValueError(f"{same}: both are 0x{word:04X}, expected different control words; correct one")
         return self
 
 

@@ -80,7 +80,9 @@ class Served:
     @property
     def enabled(self) -> list[bool]:
         """Whether each drive has been told to follow its set-point."""
-        return [drive.command()[1] for drive in self.rig.drives]
+        for drive in self.rig.drives:
+            drive.hear()
+        return [drive.servo.enabled for drive in self.rig.drives]
 
     def stop_soon(self) -> None:
         """Ask the rig to end, from within."""

@@ -103,7 +103,10 @@ def test_the_default_rig_is_started_recorded_and_ended_and_tells_nothing_sealed(
         assert secret not in told
 
 
-@pytest.mark.parametrize(("number", "name"), [(signal.SIGINT, "Ctrl-C"), (signal.SIGHUP, "SIGHUP")])
+@pytest.mark.parametrize(
+    ("number", "name"),
+    [(signal.SIGINT, "Ctrl-C"), (signal.SIGTERM, "SIGTERM"), (signal.SIGQUIT, "SIGQUIT"), (signal.SIGHUP, "SIGHUP")],
+)
 def test_a_signal_stops_the_leg_keeps_the_record_and_says_so_in_one_line(start, experiment, tmp_path, number, name):
     arguments, output = experiment("plain", 4000.0)
     process = start(arguments)

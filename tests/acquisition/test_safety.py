@@ -15,7 +15,7 @@ from pipelines.acquisition.machine import Reading, Row
 from pipelines.acquisition.plan import make_plan
 from pipelines.acquisition.safety import HOLD_SAMPLES, Limits, refuse_leap, slowing
 from pipelines.contracts import RECORDING
-from pipelines.errors import DeviceError, InputError
+from pipelines.errors import DeviceError, ExoidError, InputError
 from pipelines.rig.server import READ_WRITE, Drive, Sensor
 from pipelines.settings.rig import load_rig
 from tests.acquisition.journals import read_journal
@@ -38,10 +38,11 @@ class After:
 def stopped(record):
     """Record a run that is stopped; whatever the cause, every drive that can be reached is disabled at its end."""
 
-    def run(within_reach=(0, 1), **arguments):
+    def run(within_reach=(0, 1), raises=DeviceError, **arguments):
         served = arguments.setdefault("served_as", [])
-        with pytest.raises(DeviceError) as caught:
+        with pytest.raises(raises) as caught:
             record(**arguments)
+        assert type(caught.value) is raises
         assert [served[0].enabled[j] for j in within_reach] == [False] * len(within_reach)
         assert "\n" not in str(caught.value)
         return str(caught.value)
@@ -170,9 +171,10 @@ def test_what_goes_wrong_with_one_drives_stop_neither_hides_nor_hinders_the_othe
     broken = []
     monkeypatch.setattr(Line, "write", fails)
     monkeypatch.setattr(Line, "exchange", exchange)
-    why = stopped(fault=After(300, lambda *_: broken.append(True)), within_reach=[1])
+    why = stopped(fault=After(300, lambda *_: broken.append(True)), within_reach=[1], raises=ExoidError)
     assert "a fault of exoid's own (ValueError('no number'))" in why
     assert "and could not be disabled: drive hip (127.0.0.1:" in why
+    assert "USE THE EMERGENCY STOP" in why
 
 
 @pytest.mark.parametrize("still_pressed", [True, False])
@@ -206,6 +208,24 @@ def test_a_recording_that_cannot_be_written_does_not_hide_why_the_run_was_stoppe
     assert why.startswith("watchdog: no new sample from drive hip")
     assert f"samples are in {journal}, but could not be written as a recording" in why
     assert len(read_journal(journal)[0]) > 100
+
+
+def test_a_fault_of_our_own_stops_the_leg_ends_with_exit_code_1_and_keeps_its_traceback(stopped, tmp_path, monkeypatch):
+    def fails(limits, row):
+        if row.sequence > 300:
+            raise ZeroDivisionError("a bug")
+        return None
+
+    monkeypatch.setattr(Limits, "violation", fails)
+    why = stopped(raises=ExoidError)
+    samples, log = len(aborted(tmp_path).frame), tmp_path / "test.aborted.log"
+    assert why == (
+        f"a fault of exoid's own (ZeroDivisionError('a bug')); please report it with {log}; the leg was stopped, "
+        f"its {samples} samples so far are in {tmp_path / 'test.aborted.parquet'}"
+    )
+    assert 'raise ZeroDivisionError("a bug")' in log.read_text()
+    assert aborted(tmp_path).metadata["abort"] == "a fault of exoid's own (ZeroDivisionError('a bug'))"
+    assert ExoidError.exit_code == 1
 
 
 def test_a_full_disk_stops_the_leg_and_is_told(stopped, monkeypatch):
@@ -242,7 +262,7 @@ def test_a_counter_that_stands_still_trips_the_watchdog(stopped, tmp_path):
 
 def test_a_fault_bit_ends_the_run(stopped):
     def complain(device, function):
-        device.rig.enabled = np.array([8, 8])
+        device.rig.drives[1].servo.fault = True
 
     assert "reports a fault (status bits 0x0008); see the drive's manual" in stopped(fault=After(10, complain))
 
@@ -272,8 +292,8 @@ def test_a_counter_that_leaps_either_way_ends_the_run_before_a_set_point_follows
 
     def leap(device, function):
         shows(device, lambda true: replace(true, sequence=counter(true.sequence)))
-        reference, enabled = device.rig.drives[0].command()
-        sent.extend([reference] if enabled else [])
+        hip = device.rig.drives[0].servo
+        sent.extend([hip._told] if hip.enabled else [])
 
     why = stopped(
         shipped=shipped, served_as=served, fault=After(150, leap), rate_hz=50.0, duration_s=4.0, torque_nm=1000.0,

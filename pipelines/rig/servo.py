@@ -1,0 +1,86 @@
+"""What a virtual drive makes of control words, set-points and silence: when its motor follows, and where to."""
+
+from math import ceil
+
+from pipelines.settings.rig import DriveMap
+
+EXTRAPOLATED = 5
+"""Samples over which a drive goes on at its set-points' speed when none comes; then it slows down."""
+
+
+class Servo:
+    """The logic of one drive, a sample at a time."""
+
+    def __init__(
+        self,
+        registers: DriveMap,
+        rest: float,
+        angle_rad: tuple[float, float],
+        sample_rate_hz: float,
+        deceleration_rad_s2: float,
+        heartbeat_s: float | None,
+    ) -> None:
+        """Be a disabled drive at rest.
+
+        Parameters
+        ----------
+        rest : float
+            Where it stands, rad.
+        angle_rad : (low, high)
+            Its joint's limits, rad.
+        deceleration_rad_s2 : float
+            How it slows down when nothing is told any more.
+        heartbeat_s : float or None
+            How long it may be told nothing before it disables itself; None for a drive without such a watchdog.
+        """
+        self.fault = False
+        """Latched until a fault reset, and no drive with a fault is enabled."""
+        self._map = registers
+        self._limits = angle_rad
+        self._slowing = deceleration_rad_s2 / sample_rate_hz**2
+        self._patience = None if heartbeat_s is None else ceil(heartbeat_s * sample_rate_hz)
+        self._told, self._control = rest, registers.disable
+        self._last, self._step, self._unheard = rest, 0.0, 0
+
+    @property
+    def enabled(self) -> bool:
+        """Whether the motor follows."""
+        return not self.fault and self._control in (self._map.enable, self._map.halt)
+
+    @property
+    def status(self) -> int:
+        """The status word; a bit that the map gives no meaning stays 0."""
+        is_enabled, mask = self._map.enabled_value, self._map.enabled_mask
+        word = is_enabled if self.enabled else is_enabled ^ mask
+        # The lowest bit that means a fault: which of them it is, the map does not tell.
+        return word | (self._map.fault_mask & -self._map.fault_mask if self.fault else 0)
+
+    def hear(self, reference: float, control: int) -> None:
+        """Take a set-point (rad) and a control word."""
+        self._unheard = 0
+        if control == self._map.fault_reset:
+            self.fault = False
+        self._told, self._control = reference, control
+
+    def next(self, angle: float) -> tuple[float, bool]:
+        """Return the set-point (rad) for the next sample and whether the motor follows it.
+
+        While it does not, the set-point is the measured ``angle`` (rad), so that enabling begins without a jump.
+        """
+        reference = self._reference() if self.enabled else angle
+        self._step, self._last = reference - self._last, reference
+        self._unheard += 1
+        if self.enabled and self._patience is not None and self._unheard > self._patience and self._step == 0.0:
+            self.fault = True
+        return reference, self.enabled
+
+    def _reference(self) -> float:
+        if self._control == self._map.halt:
+            return self._last
+        if self._unheard == 0:
+            return self._told
+        step = self._step
+        if self._unheard > EXTRAPOLATED:
+            step = max(abs(step) - self._slowing, 0.0) * (1 if step > 0 else -1)
+        low, high = self._limits
+        return min(max(self._last + step, low), high)
