@@ -29,9 +29,6 @@ from pipelines.settings.mechanism import MechanismSettings
 from pipelines.settings.rig import RigSettings, load_rig
 
 
-EMERGENCY = "USE THE EMERGENCY STOP"
-
-
 @dataclass(frozen=True)
 class Outcome:
     """What a whole run left."""
@@ -124,7 +121,7 @@ async def _record(
         except OSError as error:  # a full disk must not hide that a drive could not be disabled
             raise DeviceError(
                 f"{path}: cannot be written ({error}); make room, then `exoid recover {path}` makes a recording "
-                f"of what is in it{f'. {_outcome(supervisor)}' if supervisor.why else ''}"
+                f"of what is in it{f'. {supervisor.why}; {_rest(supervisor)}' if supervisor.why else ''}"
             ) from error
     finally:
         machine.close()
@@ -151,12 +148,14 @@ def _finish(output: Path, path: Path, supervisor: Supervisor) -> Outcome:
     journal = JournalFile(path)
     account = account_of(journal)
     place, samples = place_for(output, account.abort), account.samples
-    kind, told = DeviceError, _outcome(supervisor)
-    if supervisor.fault:
-        kind, told = ExoidError, f"please report {_keep_traceback(supervisor.fault, place)}: {told}"
+    kind: type[ExoidError] = DeviceError
+    told = f"{supervisor.why}; {_rest(supervisor)}" if supervisor.why else "the run is complete"
+    if fault := supervisor.fault:
+        kind = ExoidError
+        told = f"{supervisor.why}; please report it with {_keep_traceback(fault, place)}; {_rest(supervisor)}"
     if account.abort and not samples:
         path.unlink()
-        raise kind(f"{told} before the recording began") from supervisor.fault
+        raise kind(f"{told} before the recording began") from fault
     try:
         write_recording(journal, place, account)
     except (ExoidError, OSError) as error:
@@ -166,15 +165,13 @@ def _finish(output: Path, path: Path, supervisor: Supervisor) -> Outcome:
         ) from error
     path.unlink()
     if account.abort:
-        raise kind(f"{told}, its {samples} samples so far are in {place}") from supervisor.fault
+        raise kind(f"{told}, its {samples} samples so far are in {place}") from fault
     return Outcome(place, samples, account.missed)
 
 
-def _outcome(supervisor: Supervisor) -> str:
-    """Return in words how a run ended."""
-    if supervisor.why is None:
-        return "the run is complete"
-    return f"{supervisor.why}; {'the leg was stopped' if supervisor.state is State.DISABLED else EMERGENCY}"
+def _rest(supervisor: Supervisor) -> str:
+    """Return in words how a run that was stopped has left the leg."""
+    return "the leg was stopped" if supervisor.state is State.DISABLED else "USE THE EMERGENCY STOP"
 
 
 def _keep_traceback(fault: BaseException, recording: Path) -> str:
