@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from exoid_cli.console import console
+from exoid_cli.operator import Terminal
 
 if TYPE_CHECKING:
     from pipelines.acquisition.check.latency import Latency
@@ -25,12 +26,16 @@ def check(
         Literal["exo_alone", "with_human"],
         typer.Option(help="Whether somebody is in the machine; only an empty one shows its sensors' zeros."),
     ] = "exo_alone",
+    by_hand: Annotated[
+        bool, typer.Option("--by-hand", help="Then disable the drives and say what to move and press by hand.")
+    ] = False,
 ) -> None:
     """Ask every device of a rig and say what is wrong; nothing is moved.
 
     \b
-    Example:
+    Examples:
       exoid rig check rigs/real_time.toml --rate-hz 200
+      exoid rig check rig.toml --by-hand
     """
     from pipelines.acquisition.check.check import check_rig
     from pipelines.errors import DeviceError
@@ -39,7 +44,7 @@ def check(
     if rate_hz is None and config:
         rate_hz = Experiment.load(config).acquire.sample_rate_hz
     console.say(f"{file}: asking every device, moving nothing")
-    report = check_rig(file, rate_hz, run)
+    report = check_rig(file, rate_hz, run, Terminal() if by_hand else None)
     console.emit(report.as_json())
     _show(report)
     if report.findings:

@@ -6,18 +6,24 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Literal
 
-from pipelines.acquisition.check.look import RigReport, look
+from pipelines.acquisition.check.by_hand import Operator, by_hand
+from pipelines.acquisition.check.finding import Finding
+from pipelines.acquisition.check.look import RigReport, look, probes_of
 from pipelines.acquisition.embedded import embedded
 from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.pace import urgent
+from pipelines.errors import DeviceError
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import RigSettings, load_rig
 
 
 def check_rig(
-    path: Path, rate_hz: float | None = None, run: Literal["exo_alone", "with_human"] = "exo_alone"
+    path: Path,
+    rate_hz: float | None = None,
+    run: Literal["exo_alone", "with_human"] = "exo_alone",
+    operator: Operator | None = None,
 ) -> RigReport:
-    """Ask every device of a rig, move nothing, and say what is wrong.
+    """Ask every device of a rig and say what is wrong; move nothing.
 
     Parameters
     ----------
@@ -27,6 +33,8 @@ def check_rig(
         Samples a second that an experiment asks for; else a virtual rig's own, and of a real one what it has.
     run : str
         Whether somebody is in the machine: only an empty one shows its sensors' zeros.
+    operator : Operator, optional
+        Who moves the joints and presses the cuffs, if all devices answer.
     """
     rig = load_rig(path)
     if rate_hz is None and rig.plant:
@@ -35,12 +43,19 @@ def check_rig(
     settings = RunSettings(name="check", run=run, purpose="train")
     place = embedded(rig, path, settings, rate_hz) if rig.embedded and rate_hz else nullcontext(rig)
     with place as present, nullcontext() if rig.clock == "lockstep" else urgent():
-        return asyncio.run(_check(present, rate_hz, alone=run == "exo_alone"))
+        return asyncio.run(_check(present, rate_hz, run == "exo_alone", operator))
 
 
-async def _check(rig: RigSettings, rate_hz: float | None, *, alone: bool) -> RigReport:
+async def _check(rig: RigSettings, rate_hz: float | None, alone: bool, operator: Operator | None) -> RigReport:
     machine = Machine(rig, with_sensors=True)
     try:
-        return await look(machine, rate_hz, alone=alone)
+        report = await look(machine, rate_hz, alone=alone)
+        if operator and all(device.latency for device in report.devices):
+            report.by_hand = True
+            try:
+                report.findings += await by_hand(probes_of(machine), rig, rate_hz, operator)
+            except DeviceError as error:
+                report.findings.append(Finding("rig", str(error)))
+        return report
     finally:
         machine.close()

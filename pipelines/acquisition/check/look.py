@@ -58,6 +58,8 @@ class RigReport:
     devices: list[DeviceReport] = field(default_factory=list)
     together: Rate | None = None
     drives_alone: Rate | None = None
+    by_hand: bool = False
+    """Whether a person moved it."""
     findings: list[Finding] = field(default_factory=list)
 
     def as_json(self) -> dict:
@@ -65,6 +67,7 @@ class RigReport:
         rates = {"together": self.together, "drives_alone": self.drives_alone}
         return {
             "rate_hz": self.rate_hz,
+            "by_hand": self.by_hand,
             "devices": [device.as_json() for device in self.devices],
             **{
                 name: {"cycles_hz": rate.cycles_hz, "late": rate.late, "cycle": rate.cycle.as_json()} if rate else None

@@ -74,7 +74,8 @@ class Probe:
         if not (self.in_lockstep and isinstance(self.part, Drive)):
             return await self.read()
         asked = time.perf_counter()
-        words = self.part.tell.encode({"reference": self.angle(), "control": self.part.map.disable})
+        told = dict.fromkeys(self.part.tell.names, 0.0) | {"reference": self.angle(), "control": self.part.map.disable}
+        words = self.part.tell.encode(told)
         self._keep(asked, await self.part.device.exchange(self.part.tell, words, self.part.told))
 
     async def count(self) -> None:

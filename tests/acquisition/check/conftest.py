@@ -11,10 +11,13 @@ from pipelines.rig import server
 def checked(rig_file, serve, monkeypatch):
     """Check a rig that swings out, against a rig file; returns the report.
 
-    ``believed`` are changes of the file, not of the rig that is there; ``served`` are changes of both.
+    ``believed`` are changes of the file, not of the rig that is there; ``served`` are changes of both;
+    ``options`` are those of the check.
     """
 
-    def run(shipped="plain", believed=None, served=None, fault=None, rate_hz=None, run="exo_alone", **changes):
+    def run(
+        shipped="plain", believed=None, served=None, fault=None, rate_hz=None, run="exo_alone", options=None, **changes
+    ):
         replace = dict(served or {})
         if shipped == "real_time":  # slow, for a busy computer
             replace["[plant]\n"] = "[plant]\nsample_rate_hz = 40.0\n"
@@ -26,8 +29,9 @@ def checked(rig_file, serve, monkeypatch):
         changes = {"watchdog_s": 2.0, "rest_rad": "[0.4, -0.6]", **changes}
         rig = rig_file(shipped, port, replace, **changes)
         seen = rig_file(shipped, port, replace | (believed or {}), **changes)
-        with serve(rig, port, run, fault=fault):
-            return check_rig(seen, rate_hz, run)
+        options = options or {}
+        with serve(rig, port, options.get("run", "exo_alone"), fault=fault):
+            return check_rig(seen, **options)
 
     return run
 

@@ -20,7 +20,7 @@ def told(report):
 @pytest.mark.parametrize("shipped", ["plain", "real_time"])
 @pytest.mark.parametrize("run", ["exo_alone", "with_human"])
 def test_nothing_is_said_of_a_right_rig(checked, shipped, run):
-    report = checked(shipped, run=run)
+    report = checked(shipped, options={"run": run})
     # A busy computer is a slow line, rightly.
     assert [str(finding) for finding in report.findings if finding.device != "rig"] == []
     assert len(report.devices) == 6
@@ -103,7 +103,7 @@ def test_registers_that_are_not_latched_with_the_counter_are_found(checked, alte
 
 
 def test_a_rate_that_the_devices_do_not_have_is_found(checked):
-    said = told(checked("real_time", rate_hz=80.0))
+    said = told(checked("real_time", options={"rate_hz": 80.0}))
     assert "drive hip: its counter goes up by 4" in said or "drive hip: its counter goes up by 3" in said
     assert "a second, expected 80" in said
 

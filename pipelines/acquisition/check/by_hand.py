@@ -1,0 +1,205 @@
+"""A person moves the leg and presses the cuffs as told; the registers are watched. The drives are disabled."""
+
+import asyncio
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.acquisition.check.agreement import check_velocity
+from pipelines.acquisition.check.finding import Finding
+from pipelines.acquisition.check.probe import Probe, Series
+from pipelines.acquisition.check.zeros import AXES
+from pipelines.acquisition.machine import Drive
+from pipelines.settings.rig import DIMENSION, UNITS, RigSettings
+
+PATIENCE_S = 20.0
+"""Longest wait for each movement."""
+LOOK_S = 0.005
+"""From one look at the devices to the next."""
+STILL_S = 0.3
+"""How long a movement must be over before it is judged."""
+BACK = 0.3
+"""Share of a movement's size at which it counts as over."""
+SWING_RAD = (0.1, 1.0)
+"""Angles that a person swings who was asked for 10 to 40 degrees."""
+PUSH_SHARE = 0.025
+"""Share of ``safety.cuff_force_n`` that a push must have."""
+CLEAR = 3.0
+"""How much more than another one a channel moves that is meant."""
+HARDLY_RAD = 1e-4
+MOTIONS = {
+    "hip": ("keep the knee straight, swing the whole leg forward by 10 to 40 degrees and let it come back", 1.0),
+    "knee": ("hold the thigh still, bend the knee by 10 to 40 degrees and straighten it again", -1.0),
+}
+"""What is asked for of each joint, and the sign of the angle that it makes: see docs/contracts.md."""
+
+
+class Operator(Protocol):
+    """Whoever stands at the leg."""
+
+    async def ready(self, prompt: str) -> None:
+        """Tell what to do; return once it is begun."""
+
+
+async def by_hand(
+    probes: Sequence[Probe], rig: RigSettings, rate_hz: float | None, operator: Operator
+) -> list[Finding]:
+    """Let a person move every joint and press every cuff.
+
+    Parameters
+    ----------
+    probes : sequence of Probe
+        All devices, connected.
+    rate_hz : float, optional
+        Samples a second, in lockstep.
+    """
+    drives, sensors = [p for p in probes if p.is_drive], [p for p in probes if not p.is_drive]
+    await operator.ready("Hold the leg: its drives are disabled now, and stay so. Nobody is in the machine.")
+    for probe in probes:
+        await probe.read()
+        if isinstance(probe.part, Drive):
+            await probe.part.disable(probe.angle())
+    findings: list[Finding] = []
+    for probe in drives:
+        motion, sign = MOTIONS[probe.place]
+        await operator.ready(f"{probe.place}: {motion}.")
+        moved = await _watch(drives, lambda p: np.array([p.last()["angle"]]), SWING_RAD[0] / 2)
+        findings += _judge_motion(probe, sign, moved, rate_hz)
+    for probe in sensors:
+        front = probe.place.endswith("front")
+        inside = "forward" if front else "backward"
+        await operator.ready(
+            f"{probe.place}: press on the inside of this cuff, {inside}, as the leg would, and let go."
+        )
+        least = PUSH_SHARE * rig.safety.cuff_force_n
+        pressed = await _watch(sensors, lambda p: np.array([p.last()[axis] for axis in AXES]), least, also=drives)
+        findings += _judge_push(probe, -1.0 if front else 1.0, pressed, least)
+    return findings
+
+
+async def _watch(
+    probes: Sequence[Probe],
+    value: Callable[[Probe], NDArray],
+    least: float,
+    also: Sequence[Probe] = (),
+) -> dict[Probe, Series]:
+    """Keep reading until something has moved by ``least`` and come back, or patience ends; return what was read.
+
+    In lockstep all drives must go on for any device to do so: those of ``also`` do too.
+    """
+    for probe in probes:
+        await probe.step()
+        probe.taken()
+    rest = np.concatenate([value(probe) for probe in probes])
+    largest, still_since, began = np.zeros_like(rest), time.monotonic(), time.monotonic()
+    while (now := time.monotonic()) - began < PATIENCE_S:
+        await asyncio.gather(*(probe.step() for probe in (*probes, *also)))
+        away = np.abs(np.concatenate([value(probe) for probe in probes]) - rest)
+        largest = np.fmax(largest, away)
+        which = int(np.nanargmax(np.nan_to_num(largest)))
+        if largest[which] < least or not away[which] < BACK * largest[which]:
+            still_since = now
+        elif now - still_since > STILL_S:
+            break
+        await asyncio.sleep(LOOK_S)
+    for probe in also:
+        probe.taken()
+    return {probe: probe.taken() for probe in probes}
+
+
+def _peak(values: NDArray) -> float:
+    """Return the largest deviation of values (n,) from the first, with its sign."""
+    away = values - values[0]
+    return float(away[np.argmax(np.abs(away))])
+
+
+def _judge_motion(asked: Probe, sign: float, moved: dict[Probe, Series], rate_hz: float | None) -> Iterator[Finding]:
+    peaks = {probe: _peak(series.of("angle")) for probe, series in moved.items()}
+    found = max(peaks, key=lambda probe: abs(peaks[probe]))
+    peak, where, register = peaks[asked], f"{asked.map_path}.read", asked.block.registers["angle"]
+    if abs(peaks[found]) < HARDLY_RAD:
+        yield Finding(
+            asked.name,
+            f"no angle changed when the {asked.place} was to be moved; was it? Else the angle is frozen: compare "
+            f"{where}.angle with the device's manual",
+            "angle",
+        )
+        return
+    if found is not asked and abs(peaks[found]) > CLEAR * abs(peak):
+        yield Finding(
+            asked.name,
+            f"the {asked.place} was moved, but the angle of {found.name} changed, by {peaks[found]:+.3g} rad, and not "
+            f"this one ({peak:+.3g}): the two are swapped; exchange host, port and unit of the two in the rig file",
+            "angle",
+        )
+        return
+    if peak * sign < 0:
+        yield Finding(
+            asked.name,
+            f"its angle went {'down' if peak < 0 else 'up'} ({peak:+.3g} rad) when the {asked.place} went "
+            f"{'forward' if asked.place == 'hip' else 'into flexion'}; expected {'up' if sign > 0 else 'down'}: turn "
+            f"the sign of {where}.angle.scale, and of velocity, current and write.reference with it"
+            f"{_shared(asked, moved)}",
+            "angle",
+        )
+    if not SWING_RAD[0] / 2 <= abs(peak) <= 1.5 * SWING_RAD[1]:
+        units = [
+            unit
+            for unit in DIMENSION["angle"]
+            if SWING_RAD[0] <= abs(peak) * UNITS[unit] / UNITS[register.unit] <= SWING_RAD[1]
+        ]
+        mended = f'with unit = "{units[0]}" it would be plausible: correct' if units else "compare the manual with"
+        yield Finding(
+            asked.name,
+            f"its angle changed by {peak:+.3g} rad when the {asked.place} was moved, expected {SWING_RAD[0]:g} to "
+            f"{SWING_RAD[1]:g} rad of 10 to 40 degrees; {mended} {where}.angle",
+            "angle",
+        )
+    velocity = asked.block.registers.get("velocity")
+    if velocity:
+        series = moved[asked]
+        fresh = series.fresh
+        t = np.arange(len(fresh)) / rate_hz if asked.in_lockstep and rate_hz else series.answered[fresh]
+        yield from check_velocity(
+            asked.name, where, velocity, t, series.of("angle")[fresh], series.of("velocity")[fresh]
+        )
+
+
+def _shared(asked: Probe, moved: dict[Probe, Series]) -> str:
+    others = [probe.name for probe in moved if probe is not asked and probe.map_path == asked.map_path]
+    return f" (in a map of its own where {others[0]} is right)" if others else ""
+
+
+def _judge_push(asked: Probe, sign: float, pressed: dict[Probe, Series], least: float) -> Iterator[Finding]:
+    peaks = {(probe, axis): _peak(series.of(axis)[series.fresh]) for probe, series in pressed.items() for axis in AXES}
+    (found, axis), peak = max(peaks.items(), key=lambda item: abs(item[1]))
+    where = f"{asked.map_path}.read"
+    if abs(peak) < least:
+        yield Finding(
+            asked.name,
+            f"no force of any cuff changed by more than {abs(peak):.3g} N when {asked.place} was to be pressed, "
+            f"expected {least:g} N and more; was it? Else compare scale and unit in {where} with the manual",
+        )
+    elif found is not asked:
+        yield Finding(
+            asked.name,
+            f"{asked.place} was pressed, but {found.name} felt it ({axis} {peak:+.3g} N): the two are swapped; "
+            "exchange host, port and unit of the two in the rig file",
+        )
+    elif axis != "force_y":
+        yield Finding(
+            asked.name,
+            f"the push was felt in {axis} ({peak:+.3g} N), expected force_y, the segment's forward axis: exchange the "
+            f"addresses in {where}",
+            axis,
+        )
+    elif peak * sign < 0:
+        yield Finding(
+            asked.name,
+            f"force_y went {'up' if peak > 0 else 'down'} ({peak:+.3g} N), expected {'up' if sign > 0 else 'down'}: it "
+            f"is the force of the exoskeleton on the leg, forward positive; turn the sign of {where}.force_y.scale",
+            axis,
+        )
