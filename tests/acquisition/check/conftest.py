@@ -15,9 +15,7 @@ def checked(rig_file, serve, monkeypatch):
     ``options`` are those of the check.
     """
 
-    def run(
-        shipped="plain", believed=None, served=None, fault=None, rate_hz=None, run="exo_alone", options=None, **changes
-    ):
+    def run(shipped="plain", believed=None, served=None, fault=None, options=None, **changes):
         replace = dict(served or {})
         if shipped == "real_time":  # slow, for a busy computer
             replace["[plant]\n"] = "[plant]\nsample_rate_hz = 40.0\n"
