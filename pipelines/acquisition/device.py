@@ -8,6 +8,7 @@ from pymodbus.constants import ExcCodes
 from pymodbus.exceptions import ModbusException
 from pymodbus.pdu import ModbusPDU
 
+from pipelines.acquisition.reply import NoReply, check_replies
 from pipelines.errors import DeviceError
 from pipelines.registers import Block
 from pipelines.settings.rig import DeviceSettings, Identity
@@ -34,6 +35,7 @@ class Device:
         self._client = AsyncModbusTcpClient(
             settings.host, port=settings.port, timeout=timeout_s, retries=0, reconnect_delay=0
         )
+        check_replies(self._client)
 
     async def connect(self) -> None:
         """Open the connection."""
@@ -90,6 +92,10 @@ class Device:
                 f"{self.label}: did not answer {what} within {self._timeout_s:g} s; check cable and power, "
                 "or raise safety.watchdog_s in the rig file"
             ) from error
+        if isinstance(response, NoReply):
+            raise DeviceError(
+                f"{self.label}: answered {what} with {response.found}; check that it speaks Modbus, and the line"
+            )
         # An exception reply is an answer like any other to pymodbus: nothing is raised.
         if response.isError():
             code = int(getattr(response, "exception_code", 0))

@@ -26,6 +26,7 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 from pipelines.errors import DeviceError, SettingsError, about
 from pipelines.mechanics.motion import CUFFS
 from pipelines.registers import Block
+from pipelines.rig.guard import guarded
 from pipelines.rig.plant import JOINTS, Plant, Samples
 from pipelines.rig.sealed import hidden_effects
 from pipelines.rig.servo import Servo
@@ -82,6 +83,8 @@ class Device:
         self, function: int, first: int, address: int, count: int, registers: list[int], written: list | None
     ) -> ExcCodes | None:
         self.registers, self.first = registers, first
+        if written is not None and not self.takes(address, count):
+            return ExcCodes.ILLEGAL_ADDRESS
         self.rig.catch_up()  # before a write takes effect: until now the old set-point held
         self.written |= written is not None
         if written is None:
@@ -89,6 +92,10 @@ class Device:
             if function == READ_WRITE:
                 self.rig.exchanged(self)
         return None
+
+    def takes(self, address: int, count: int) -> bool:
+        """Tell whether registers may be written; those that only tell something may not."""
+        return False
 
     def show(self, sample: Samples) -> None:
         """Put a sample into the registers."""
@@ -109,6 +116,10 @@ class Drive(Device):
         self.torque_per_ampere = settings.torque_per_ampere
         self.servo = servo
         self._beat: float | None = None
+
+    def takes(self, address: int, count: int) -> bool:
+        """Tell whether registers may be written; those that only tell something may not."""
+        return self.write.address <= address and address + count <= self.write.address + self.write.count
 
     def hear(self) -> None:
         """Let the servo take what was written since it was last heard."""
@@ -236,7 +247,7 @@ async def serve(
     clock = None if virtual.lockstep else asyncio.ensure_future(virtual.keep_time())
     try:
         for number, devices in by_port.items():
-            server = ModbusTcpServer(devices, address=("127.0.0.1", number))
+            server = guarded(ModbusTcpServer(devices, address=("127.0.0.1", number)))
             servers.append(server)
             if not await server.listen():
                 raise DeviceError(f"127.0.0.1:{number}: cannot listen there; choose a free port with --port")

@@ -1,6 +1,6 @@
 """What a virtual drive makes of control words, set-points and silence: when its motor follows, and where to."""
 
-from math import ceil
+from math import ceil, isfinite
 
 from pipelines.settings.rig import DriveMap
 
@@ -60,7 +60,8 @@ class Servo:
         self._unheard = 0
         if control == self._map.fault_reset:
             self.fault = False
-        self._told, self._control = reference, control
+        # It holds where it is told no number: arithmetic would carry that on for ever.
+        self._told, self._control = reference if isfinite(reference) else self._last, control
 
     def next(self, angle: float) -> tuple[float, bool]:
         """Return the set-point (rad) for the next sample and whether the motor follows it.

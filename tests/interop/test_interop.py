@@ -148,6 +148,8 @@ def test_mbpoll_writes_registers_of_our_rig_and_is_told_which_do_not_exist(mbpol
         assert mbpoll(port, 2, 200, "4", count=3)[:2] == (0, ["0", "77", "0"])
         _, values, complaint = mbpoll(port, 2, 300, "4", count=1)
         assert values == [] and "Illegal data address" in complaint
+        _, values, complaint = mbpoll(port, 99, 100, "4", count=1)
+        assert values == [] and "Target device failed to respond" in complaint
 
 
 def test_pymodbustcp_moves_our_rig_sample_by_sample(our_rig, pymodbustcp_client):

@@ -1,0 +1,62 @@
+"""What a virtual rig does about clients that mean harm, or do not know better."""
+
+from typing import TypeVar
+
+from pymodbus.constants import ExcCodes
+from pymodbus.pdu import ExceptionResponse, ModbusPDU
+from pymodbus.server.base import ModbusBaseServer
+from pymodbus.server.requesthandler import ServerRequestHandler
+
+Server = TypeVar("Server", bound=ModbusBaseServer)
+
+
+class NoRequest(ModbusPDU):
+    """A frame that asks for nothing that can be understood; answered as the specification says."""
+
+    def __init__(self, function: int) -> None:
+        super().__init__()
+        self.function_code = function & 0x7F
+
+    async def datastore_update(self, context: object, device_id: int) -> ModbusPDU:
+        """Refuse it."""
+        return ExceptionResponse(self.function_code, ExcCodes.ILLEGAL_VALUE)
+
+
+class Handler(ServerRequestHandler):
+    """The rig's end of one connection."""
+
+    def pause_writing(self) -> None:
+        """Hang up on a client that asks and does not fetch: its answers would pile up without end."""
+        self.transport.abort()  # type: ignore[attr-defined]  # pymodbus declares the base of all transports
+
+    def resume_writing(self) -> None:
+        """Nothing waits: whoever fell behind is gone."""
+
+    def callback_data(self, data: bytes, addr: tuple | None = None) -> int:
+        """Take what has come; drop what not even the end can be found of."""
+        try:
+            return super().callback_data(data, addr)
+        except Exception:  # asyncio would print it and close the line for all devices on it
+            return len(data)
+
+    async def handle_request(self) -> None:
+        """Answer a request; for a unit that is not there as a gateway does."""
+        request = self.last_pdu
+        if request is None or request.dev_id in self.server.context.device_ids():
+            await super().handle_request()
+        elif not self.server.ignore_missing_devices:
+            self.server_send(
+                ExceptionResponse(
+                    request.function_code, ExcCodes.GATEWAY_NO_RESPONSE, request.dev_id, request.transaction_id
+                ),
+                self.last_addr,
+            )
+
+
+def guarded(server: Server) -> Server:
+    """Return a server that no client can break or make grow."""
+    decode = server.decoder.decode
+    server.decoder.decode = lambda frame: decode(frame) or NoRequest(frame[0])  # type: ignore[method-assign]
+    connection = (server.trace_packet, server.trace_pdu, server.trace_connect)
+    server.callback_new_connection = lambda: Handler(server, *connection)  # type: ignore[method-assign]
+    return server
