@@ -12,7 +12,7 @@ EXPERIMENT := $(MAKE) --no-print-directory -f datasets/experiments/experiment.mk
 SEEDS ?= tuning
 
 .DEFAULT_GOAL := help
-.PHONY: help all test test-slow check format bench blind blind-full blind-fixed blind-page docs lock clean install
+.PHONY: help all test test-slow check format bench fuzz blind blind-full blind-fixed blind-page docs lock clean install
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | sort | expand -t 12
@@ -38,6 +38,9 @@ format: $(INSTALLED) ## format the code
 
 bench: $(INSTALLED) ## measure speed
 	$(BIN)/python -m tests.bench
+
+fuzz: $(INSTALLED) ## hostile replies against the client, hostile requests against the rig: 60,000 of each
+	$(BIN)/python -m tests.fuzz
 
 blind: $(INSTALLED) ## examine `exoid diagnose` on 300 sessions whose truth it cannot see; SEEDS=reporting to report
 	$(BIN)/python -m tests.blind --cases 300 --seeds $(SEEDS) --out build/blind
