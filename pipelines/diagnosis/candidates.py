@@ -14,12 +14,15 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.gram import Gram, gram_of, solve
 from pipelines.diagnosis.observations import FOLDS, Baseline, Run
-from pipelines.effects import EFFECTS, Effect, Side
+from pipelines.effects import EFFECTS, Effect, Parameter, Side
 from pipelines.model import Model, Term
 
 WORN = ("mass_off_axis", "payload_change")
 """Effects of the structure that the person may carry instead: then in their runs only, and felt by the cuffs."""
 BASELINE = ("rigid_body", "friction")
+WAVES = 1.5
+"""Of a ripple within the angles that are swept: with fewer it is not seen to repeat, and beside a spring it could
+imitate any function of the angle."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,15 @@ class Candidate:
 def bends_motion(effect: Effect) -> bool:
     """Tell whether an effect changes kinematics or readings rather than adding torque of its own."""
     return type(effect).corrected is not Effect.corrected or bool(effect.torque_reading is not None and effect.shape)
+
+
+def lowest(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> float:
+    """Return the value below which runs cannot tell a shape parameter of an effect."""
+    if parameter.unit != "1/turn" or effect.joint is None:
+        return -np.inf
+    j = runs[0].motion.joints.index(effect.joint)
+    swept = max(float(np.ptp(run.state[0][:, j])) for run in runs)
+    return WAVES * 2.0 * np.pi / swept
 
 
 def proposals(joints: Sequence[str], kinds: Sequence[str]) -> Iterator[Effect]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from pipelines.diagnosis.candidates import Candidate, columns_under, expanded, gram_of_runs
+from pipelines.diagnosis.candidates import Candidate, columns_under, expanded, gram_of_runs, lowest
 from pipelines.diagnosis.gram import Gram, error, solve
 from pipelines.diagnosis.observations import Baseline, Run, with_load
 from pipelines.effects import Parameter, Side
@@ -144,10 +144,11 @@ def _along(
     sweep: int,
 ) -> Fit:  # fmt: skip
     """Improve one shape parameter of one cause in some runs; where the best lies at an end, look on from there."""
-    parameter = best.causes[number].effect.shape[i]
+    effect = best.causes[number].effect
+    parameter, least = effect.shape[i], lowest(effect, effect.shape[i], runs)
     for _ in range(STEPS_ON):
         now = best.causes[number].shapes[which[0]][i]
-        to_value, low, high = _scale(parameter, now, 1.0 if sweep == 0 else CLOSER)
+        to_value, low, high = _scale(parameter, now, 1.0 if sweep == 0 else CLOSER, least)
         if not low < high:
             break
         best = _between(best, number, i, which, runs, baseline, weights, (to_value, low, high))
@@ -179,15 +180,17 @@ def _between(
     return min(tried, key=lambda f: f.cost)
 
 
-def _scale(parameter: Parameter, now: float, share: float) -> tuple[Callable[[float], float], float, float]:
+def _scale(
+    parameter: Parameter, now: float, share: float, least: float
+) -> tuple[Callable[[float], float], float, float]:
     """Return how a search coordinate becomes a value, and its range: near by, and hardly beyond typical.
 
-    ``share`` of the usual reach.
+    ``share`` of the usual reach; of what oscillates, no lower than ``least``.
     """
     low, high = parameter.typical
     if parameter.unit in MAXIMA_APART or parameter.per_run:
         reach = share * MAXIMA_APART.get(parameter.unit, ONSETS_APART_S)
-        return float, now - reach, now + reach
+        return float, max(now - reach, least), now + reach
     if low > 0 and high / low > 4:
         reach = share * 2 * float(np.log(REACH))
         bottom = min(max(np.log(now) - reach, np.log(low / REACH)), np.log(now))

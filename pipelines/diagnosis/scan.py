@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.candidates import Candidate, bends_motion, expanded_columns
+from pipelines.diagnosis.candidates import Candidate, bends_motion, expanded_columns, lowest
 from pipelines.diagnosis.observations import Run
 from pipelines.effects import Effect, Parameter
 from pipelines.mechanics.motion import Motion
@@ -96,7 +96,7 @@ def _coarse(run: Run) -> Motion:
 def worth_a_look(effect: Effect, scan: Scan) -> list[Candidate]:
     """Return the few shapes of an effect that promise most."""
     bends = bends_motion(effect)
-    shapes = list(_grid(effect, bends))
+    shapes = list(_grid(effect, bends, scan.runs))
     runs = len(scan.runs)
     if bends or len(shapes) == 1:
         made = [Candidate(effect, (shape,) * runs) for shape in shapes]
@@ -108,11 +108,12 @@ def worth_a_look(effect: Effect, scan: Scan) -> list[Candidate]:
     return made
 
 
-def _grid(effect: Effect, bends: bool) -> Iterator[tuple[float, ...]]:
+def _grid(effect: Effect, bends: bool, runs: Sequence[Run]) -> Iterator[tuple[float, ...]]:
     """Yield the shapes to try; where each is dear, forms that only bend a spring are left to the refinement."""
     few = FEW if not bends else SPRINGS if effect.swings else BENDING
     yield from itertools.product(*(
-        values_of(p, few) if not (effect.swings and p.unit == "1/rad²") else (p.default,) for p in effect.shape
+        (tried := values_of(p, few))[tried >= lowest(effect, p, runs)] if not (effect.swings and p.unit == "1/rad²")
+        else (p.default,) for p in effect.shape
     ))  # fmt: skip
 
 

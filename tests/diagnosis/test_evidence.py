@@ -5,14 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.diagnosis.fit import _scale
+from pipelines.diagnosis.candidates import Candidate, lowest
+from pipelines.diagnosis.fit import _scale, refined
 from pipelines.diagnosis.impacts import evidence_of_play
 from pipelines.diagnosis.observations import FOLDS, baseline_of, observe, with_load
 from pipelines.diagnosis.slow import SlowError, slow_error
 from pipelines.diagnosis.status import Standing
 from pipelines.diagnosis.tone import strongest_tone
 from pipelines.diagnosis.volition import evidence_of_will
-from pipelines.effects import Backlash, EncoderOffset, Parameter, TorqueDrift
+from pipelines.effects import Backlash, Cogging, EncoderOffset, Parameter, TorqueDrift
 from tests.diagnosis.sessions import session
 
 NOISE = 0.5
@@ -144,12 +145,23 @@ def test_trust_falls_with_what_is_plainly_left():
 
 def test_refinement_stays_at_the_maximum_that_the_scan_found():
     rhythm = Parameter("frequency", "Hz", "", "f", (0.1, 3.0))
-    _, low, high = _scale(rhythm, 0.43, 1.0)
+    _, low, high = _scale(rhythm, 0.43, 1.0, -np.inf)
     assert (low, high) == pytest.approx((0.42, 0.44))
     onset = Parameter("time", "s", "", "t", (0.0, 120.0), per_run=True)
-    assert _scale(onset, 30.0, 0.25)[1:] == pytest.approx((29.5, 30.5))
+    assert _scale(onset, 30.0, 0.25, -np.inf)[1:] == pytest.approx((29.5, 30.5))
 
 
 def test_a_run_shorter_than_its_period_is_still_dealt_out_to_every_fold(run):
     short = observe(replace(run.motion, period_s=300.0))
     assert set(short.fold) == set(range(FOLDS))
+
+
+def test_a_wave_that_does_not_come_again_within_the_motion_is_no_cogging(run):
+    baseline, ripple = baseline_of([run]), Cogging(joint="knee")
+    angle = run.state[0][:, 1]
+    measured = run.measured.copy()
+    measured[:, 1] += 5.0 * np.sin(2.0 * np.pi * (angle - angle.min()) / np.ptp(angle))
+    runs = [replace(run, measured=measured)]
+    least = lowest(ripple, ripple.shape[0], runs)
+    found = refined([Candidate(ripple, ((least + 0.5,),))], runs, baseline, np.ones(4))
+    assert found.causes[0].shapes[0][0] * np.ptp(angle) / (2.0 * np.pi) >= 1.5
