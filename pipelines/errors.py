@@ -39,6 +39,10 @@ class DeviceError(ExoidError):
     exit_code = 3
 
 
+class Unanswered(DeviceError):
+    """A device gave no answer in time; while the leg moves, one such is survived."""
+
+
 @contextmanager
 def about(file: Path | str | None) -> Iterator[None]:
     """Put before every complaint of the block which file it is about; nothing where there is none."""

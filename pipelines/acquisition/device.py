@@ -9,7 +9,7 @@ from pymodbus.exceptions import ModbusException
 from pymodbus.pdu import ModbusPDU
 
 from pipelines.acquisition.reply import NoReply, check_replies
-from pipelines.errors import DeviceError
+from pipelines.errors import DeviceError, Unanswered
 from pipelines.registers import Block
 from pipelines.settings.rig import DeviceSettings, Identity
 
@@ -27,10 +27,12 @@ MEANING: dict[int, str] = {
 class Device:
     """The line to one device. Requests to several devices may run side by side, to one they may not."""
 
-    def __init__(self, name: str, settings: DeviceSettings, timeout_s: float) -> None:
+    def __init__(self, name: str, settings: DeviceSettings, timeout_s: float, reply_s: float) -> None:
+        """Describe the line; while the leg moves a reply is awaited for ``reply_s``, else for ``timeout_s``."""
         self.label = f"{name} ({settings.host}:{settings.port}, unit {settings.unit})"
         self._unit = settings.unit
         self._timeout_s = timeout_s
+        self._reply_s = reply_s
         # Never a second try: a set-point that comes late is no set-point, and an exchange may move the leg.
         self._client = AsyncModbusTcpClient(
             settings.host, port=settings.port, timeout=timeout_s, retries=0, reconnect_delay=0
@@ -39,6 +41,7 @@ class Device:
 
     async def connect(self) -> None:
         """Open the connection."""
+        self._client.ctx.comm_params.timeout_connect = self._timeout_s
         if not await self._client.connect():
             raise DeviceError(
                 f"{self.label}: refuses the connection; check that the rig is on, and host and port in the rig file"
@@ -58,15 +61,17 @@ class Device:
                     f"0x{entry.value:04X}: it is another device; check cabling and unit id, or correct the rig file"
                 )
 
-    async def read(self, address: int, count: int) -> list[int]:
+    async def read(self, address: int, count: int, *, in_motion: bool = False) -> list[int]:
         """Return words read by FC03."""
-        what = f"reading registers {address} to {address + count - 1}"
-        return await self._ask(what, count, self._client.read_holding_registers, address=address, count=count)
+        what, within_s = f"reading registers {address} to {address + count - 1}", self._within(in_motion)
+        request = self._client.read_holding_registers
+        return await self._ask(what, count, within_s, request, address=address, count=count)
 
     async def write(self, block: Block, words: Sequence[int]) -> None:
         """Write a block by FC16."""
         what = f"writing registers {_range(block)}"
-        await self._ask(what, None, self._client.write_registers, address=block.address, values=list(words))
+        request = self._client.write_registers
+        await self._ask(what, None, self._timeout_s, request, address=block.address, values=list(words))
 
     async def exchange(self, write: Block, words: Sequence[int], read: Block) -> list[int]:
         """Write one block and read another in one FC23 exchange."""
@@ -74,6 +79,7 @@ class Device:
         return await self._ask(
             what,
             read.count,
+            self._within(True),
             self._client.readwrite_registers,
             read_address=read.address,
             read_count=read.count,
@@ -81,15 +87,26 @@ class Device:
             values=list(words),
         )
 
+    def _within(self, in_motion: bool) -> float:
+        return self._reply_s if in_motion else self._timeout_s
+
     async def _ask(
-        self, what: str, words: int | None, request: Callable[..., Awaitable[ModbusPDU]], **arguments: Any
+        self,
+        what: str,
+        words: int | None,
+        within_s: float,
+        request: Callable[..., Awaitable[ModbusPDU]],
+        **arguments: Any,
     ) -> list[int]:
         """Send a request and return the words of the answer, ``words`` of them where it is to bring any."""
+        # The one place where pymodbus looks for how long to wait, be it for a connection or for an answer.
+        self._client.ctx.comm_params.timeout_connect = within_s
         try:
             response = await request(**arguments, device_id=self._unit)
         except (ModbusException, OSError) as error:
-            raise DeviceError(
-                f"{self.label}: did not answer {what} within {self._timeout_s:g} s; check cable and power, "
+            silent = Unanswered if self._client.connected else DeviceError
+            raise silent(
+                f"{self.label}: did not answer {what} within {within_s:.3g} s; check cable and power, "
                 "or raise safety.watchdog_s in the rig file"
             ) from error
         if isinstance(response, NoReply):

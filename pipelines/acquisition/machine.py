@@ -2,14 +2,14 @@
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.acquisition.device import Device
-from pipelines.errors import DeviceError, SettingsError
+from pipelines.errors import DeviceError, SettingsError, Unanswered
 from pipelines.mechanics.motion import CUFFS
 from pipelines.registers import Block
 from pipelines.settings.rig import DriveSettings, RigSettings, SensorSettings, registers_of
@@ -64,7 +64,7 @@ class Drive:
         self.settings = settings
         self.in_lockstep = rig.clock == "lockstep"
         self.map = rig.map.drive[settings.map]
-        self.device = Device(f"drive {settings.joint}", settings, rig.safety.watchdog_s)
+        self.device = Device(f"drive {settings.joint}", settings, rig.safety.watchdog_s, rig.safety.longest_reply_s)
         self.told = Block(registers_of(self.map.read))
         self.tell = Block(registers_of(self.map.write))
         self._counter = Block({"sequence": self.map.read.sequence})
@@ -74,6 +74,7 @@ class Drive:
         self._sequence = Counter(self.told.span("sequence"))
         self._time = Counter(self.told.span("time"))
         self._sent = np.nan
+        self._counted = 0
         self.touched = False
         """Whether it has been told anything, so that it must be disabled."""
 
@@ -82,15 +83,24 @@ class Drive:
         return self._reading(await self.device.read(self.told.address, self.told.count))
 
     async def count(self) -> int:
-        """Read the sample counter alone."""
-        words = await self.device.read(self._counter.address, self._counter.count)
-        return int(self._sequence(self._decoded(self._counter, words)["sequence"]))
+        """Read the sample counter alone; without an answer it stands where it was."""
+        try:
+            words = await self.device.read(self._counter.address, self._counter.count, in_motion=True)
+        except Unanswered:
+            return self._counted
+        self._counted = int(self._sequence(self._decoded(self._counter, words)["sequence"]))
+        return self._counted
 
     async def exchange(self, reference: float, *, halt: bool = False) -> Reading:
         """Send a set-point (rad) and return the sample that is latched; ``halt`` where the leg is to stand there."""
         self.touched = True
         control = self.map.enable if self.map.halt is None or not halt else self.map.halt
-        reading = self._reading(await self.device.exchange(self.tell, self._words(reference, control), self.told))
+        words = self._words(reference, control)
+        # Nobody knows which set-point a drive follows that did not answer.
+        before, self._sent = self._sent, np.nan
+        answer = await self.device.exchange(self.tell, words, self.told)
+        self._sent = before
+        reading = self._reading(answer)
         self._sent = reference
         return reading
 
@@ -158,8 +168,9 @@ class Drive:
                 f"{self.device.label}: reports a fault (status bits 0x{fault:04X}); see the drive's manual, "
                 f"clear the fault and start again{reset}"
             )
+        self._counted = int(self._sequence(told["sequence"]))
         return Reading(
-            sequence=int(self._sequence(told["sequence"])),
+            sequence=self._counted,
             time=self._time(told["time"]),
             angle=told["angle"],
             torque=told["current"] * self.settings.torque_per_ampere,
@@ -177,13 +188,16 @@ class Sensor:
     def __init__(self, rig: RigSettings, settings: SensorSettings) -> None:
         self.settings = settings
         self.map = rig.map.sensor[settings.map]
-        self.device = Device(f"sensor {settings.cuff}", settings, rig.safety.watchdog_s)
+        self.device = Device(f"sensor {settings.cuff}", settings, rig.safety.watchdog_s, rig.safety.longest_reply_s)
         self.block = Block(registers_of(self.map.read))
         self._last: float | None = None
 
     async def look(self) -> tuple[float, float, float] | None:
-        """Return the force (N), or None where the sensor has no new sample."""
-        told = self.block.decode(await self.device.read(self.block.address, self.block.count))
+        """Return the force (N), or None where the sensor has no new sample or does not answer."""
+        try:
+            told = self.block.decode(await self.device.read(self.block.address, self.block.count, in_motion=True))
+        except Unanswered:
+            return None
         stale, self._last = told["sequence"] == self._last, told["sequence"]
         return None if stale else (told["force_x"], told["force_y"], told["force_z"])
 
@@ -223,6 +237,8 @@ class Machine:
         self._no_force = np.full((len(CUFFS), 3), np.nan)
         self._ahead = [0 for _ in self.drives]
         """How far each drive's counter is ahead of the first one's at the same sample."""
+        self._last: Row | None = None
+        self._answered = 0.0
 
     async def connect(self) -> None:
         """Open every line and make sure who is at its end."""
@@ -251,6 +267,21 @@ class Machine:
     async def cycle(self, reference: NDArray, number: int) -> Row:
         """Send set-points (J,) rad and return the sample that is latched in all devices.
 
+        An exchange that is not answered brings no new sample: the last one is returned again, until the watchdog's
+        time is over. Nothing is sent twice, for a set-point that comes late is no set-point.
+        """
+        try:
+            self._last = await self._cycle(reference, number)
+        except Unanswered:
+            if self._last is None or time.monotonic() - self._answered > self.rig.safety.watchdog_s:
+                raise
+        else:
+            self._answered = time.monotonic()
+        return self._last
+
+    async def _cycle(self, reference: NDArray, number: int) -> Row:
+        """Exchange all devices.
+
         In lockstep the drives' exchange ends a sample, so sensors are read before it. In real time the drives
         tell when a new sample begins, so sensors are read after it.
         """
@@ -274,7 +305,7 @@ class Machine:
     async def _exchange(self, reference: NDArray) -> tuple[Reading, ...]:
         """Exchange every drive; one that has not latched the others' sample yet is asked again."""
         pairs = list(zip(self.drives, reference.tolist(), strict=True))
-        readings = list(await asyncio.gather(*(drive.exchange(angle) for drive, angle in pairs)))
+        readings = await _all(drive.exchange(angle) for drive, angle in pairs)
         until = time.monotonic() + self.rig.safety.watchdog_s
         while True:
             counts = [reading.sequence - ahead for reading, ahead in zip(readings, self._ahead, strict=True)]
@@ -290,3 +321,13 @@ class Machine:
             f"{self.drives[late[0]].device.label}: its sample counter lags behind the others' for "
             f"{self.rig.safety.watchdog_s:g} s; check the drives' synchronisation"
         )
+
+
+async def _all(asked: Iterable[Awaitable[Reading]]) -> list[Reading]:
+    """Return all answers, once there are all: none shall be left for the next request to find."""
+    answers = await asyncio.gather(*asked, return_exceptions=True)
+    failures = [answer for answer in answers if isinstance(answer, BaseException)]
+    # What is worse than silence comes first.
+    for failure in sorted(failures, key=lambda failure: isinstance(failure, Unanswered)):
+        raise failure
+    return [answer for answer in answers if not isinstance(answer, BaseException)]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pipelines.acquisition.machine import Row
 from pipelines.acquisition.plan import Plan
+from pipelines.acquisition.plausibility import Plausibility
 from pipelines.acquisition.safety import Limits, refuse_leap, slowing
 from pipelines.acquisition.watch import Watch
 from pipelines.errors import DeviceError
@@ -68,6 +69,7 @@ class Supervisor:
         self.pressing = False
         """Whether slowing down would go on pressing: the drives are then disabled without it."""
         self._limits = Limits(rig, sample_rate_hz, sensors)
+        self._plausibility = Plausibility(rig, sample_rate_hz)
         self._watch = Watch(rig, sample_rate_hz)
         self._speed = np.zeros_like(self.sent)
         self._path = self.sent[np.newaxis]
@@ -154,7 +156,7 @@ class Supervisor:
                     f"drive {drive.joint}: its status word says that it is no longer enabled; was the emergency stop "
                     "pressed?"
                 )
-        if why := self._limits.violation(row):
+        if why := self._limits.violation(row) or self._plausibility.doubt(row, self.sent):
             raise DeviceError(why)
         return True
 

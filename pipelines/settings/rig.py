@@ -252,9 +252,26 @@ class SafetySettings(Settings):
     angle_margin_rad: float = Field(0.02, ge=0.0, description="Set-points keep this far from each angle limit.")
     cuff_force_n: float = Field(400.0, gt=0.0, description="Highest force on any axis of any cuff sensor.")
     watchdog_s: float = Field(0.1, gt=0.0, description="Longest a cycle or a device's next sample may take.")
+    reply_s: float | None = Field(
+        None, gt=0.0, description="Longest wait for one reply in motion, then it is a gap; else a third of watchdog_s."
+    )
     deceleration_rad_s2: float = Field(8.0, gt=0.0, description="How a stop slows the set-points down.")
     ramp_s: float = Field(3.0, gt=0.0, description="Shortest time to go from rest into the motion and back.")
     settle_s: float = Field(1.0, ge=0.0, description="Motion before the recording begins, for transients to fade.")
+
+    @model_validator(mode="after")
+    def _a_reply_is_awaited_less_long_than_the_watchdog(self) -> Self:
+        if self.longest_reply_s >= self.watchdog_s:
+            raise ValueError(
+                f"reply_s: found {self.reply_s:g}, expected less than watchdog_s ({self.watchdog_s:g}), or one lost "
+                "reply stops the run; leave it out"
+            )
+        return self
+
+    @property
+    def longest_reply_s(self) -> float:
+        """Longest wait for one reply while the leg moves, s."""
+        return self.watchdog_s / 3 if self.reply_s is None else self.reply_s
 
 
 class Maps(Settings):

@@ -1,0 +1,37 @@
+"""No fault brings a wrong number into a recording: a run goes on with a gap that is told, or stops and says why."""
+
+import re
+
+import pytest
+
+from tests.faults.faults import WATCHDOG_S, cases
+from tests.faults.runs import RATE, run_through
+
+
+def told_s(why):
+    """Return for how long, by its reason, a run was told nothing that could be believed."""
+    found = re.search(r"for (\d+\.\d+) s", why or "")
+    return float(found[1]) if found else 0.0
+
+
+EVERY_CASE = pytest.mark.parametrize("case", cases(), ids=lambda case: case.name)
+
+
+@EVERY_CASE
+def test_a_fault_leaves_a_gap_that_is_told_or_stops_the_run_with_its_reason(case, tmp_path):
+    result = run_through(case.fault, tmp_path, case.run)
+    assert result.wrong == 0 or "frozen" in str(result.why)  # that is known only when others have moved on
+    assert result.wrong_s <= told_s(result.why)
+    assert result.disabled or "could not be disabled" in str(result.why)
+    missing = int(result.frame["sequence"].iloc[-1] - result.frame["sequence"].iloc[0]) + 1 - len(result.frame)
+    assert missing == result.missing
+    if case.stops is None or (case.either and result.why is None):
+        assert result.why is None
+        assert len(result.frame) + result.missing == RATE
+        assert (result.missing > 0) == case.gap or case.either
+        assert result.missing <= WATCHDOG_S * RATE
+    else:
+        assert case.stops in str(result.why)
+        assert "\n" not in str(result.why)
+        assert case.stops in result.metadata["abort"]
+        assert len(result.frame) >= 10  # all that came before the fault
