@@ -268,16 +268,19 @@ class Machine:
         """Send set-points (J,) rad and return the sample that is latched in all devices.
 
         An exchange that is not answered brings no new sample: the last one is returned again, until the watchdog's
-        time is over. Nothing is sent twice, for a set-point that comes late is no set-point.
+        time is over. Nothing is sent twice, for a set-point that comes late is no set-point; only the first one,
+        where the leg stands, is.
         """
-        try:
-            self._last = await self._cycle(reference, number)
-        except Unanswered:
-            if self._last is None or time.monotonic() - self._answered > self.rig.safety.watchdog_s:
-                raise
-        else:
-            self._answered = time.monotonic()
-        return self._last
+        self._answered = self._answered or time.monotonic()
+        while True:
+            try:
+                self._last = await self._cycle(reference, number)
+                self._answered = time.monotonic()
+            except Unanswered:
+                if time.monotonic() - self._answered > self.rig.safety.watchdog_s:
+                    raise
+            if self._last is not None:
+                return self._last
 
     async def _cycle(self, reference: NDArray, number: int) -> Row:
         """Exchange all devices.
