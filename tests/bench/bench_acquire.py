@@ -3,12 +3,18 @@
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from statistics import median
 from tempfile import TemporaryDirectory
 
 from pipelines.acquisition.acquire import acquire
+from pipelines.acquisition.embedded import embedded
 from pipelines.settings import datasets
 from pipelines.settings.acquire import RunSettings
+from pipelines.settings.rig import load_rig
+from tests.bench import bare_loop
 from tests.bench.report import Row, show
+
+PAIRS = 5
 
 
 def rows() -> Iterator[Row]:
@@ -19,6 +25,13 @@ def rows() -> Iterator[Row]:
     ):
         rate = cycles_a_second(run, duration_s)
         yield Row(f"lockstep, {what}", f"{rate:.0f} cycles/s", wanted=f"{wanted} cycles/s")
+    ours, bare = beside_a_bare_loop(10.0)
+    share = 100 * median(a / b for a, b in zip(ours, bare, strict=True))
+    yield Row(
+        f"the latter beside a bare loop of the same calls, in turn on one rig, {PAIRS} times",
+        f"{share:.0f} %: {median(ours):.0f} of {median(bare):.0f} cycles/s",
+        wanted="70 %",
+    )
     samples, missed = real_time(60.0)
     yield Row(f"real time, 200 Hz, 60 s ({samples} samples)", f"{missed} missed", wanted="0 missed")
 
@@ -29,6 +42,24 @@ def cycles_a_second(run: str, duration_s: float) -> float:
     with TemporaryDirectory() as folder:
         _record(datasets() / "rigs" / "plain.toml", run, duration_s, Path(folder), lambda p: rates.append(p.rate_hz))
     return rates[-1]
+
+
+def beside_a_bare_loop(duration_s: float) -> tuple[list[float], list[float]]:
+    """Return cycles a second of runs, and of loops of the same pymodbus calls, each pair on the same rig."""
+    path, ours, bare = datasets() / "rigs" / "plain.toml", [], []
+    text = path.read_text().replace("embedded = true", "embedded = false", 1)
+    settings = RunSettings(name="bench", run="with_human", purpose="train", duration_s=duration_s)
+    with TemporaryDirectory() as folder, embedded(load_rig(path), path, settings, 200.0) as rig:
+        served = Path(folder) / "rig.toml"
+        served.write_text(re.sub(r"^(map = .*)$", rf"\1\nport = {rig.drive[0].port}", text, flags=re.MULTILINE))
+        for k in range(PAIRS):
+            bare.append(bare_loop.cycles_a_second(rig))
+            rates: list[float] = []
+            output = Path(folder) / f"{k}.parquet"
+            excitation = datasets() / "paper" / "trajectory.toml"
+            acquire(served, settings, excitation, output, report=lambda p: rates.append(p.rate_hz))  # noqa: B023
+            ours.append(rates[-1])
+    return ours, bare
 
 
 def real_time(duration_s: float) -> tuple[int, int]:
