@@ -23,31 +23,32 @@ def filter_(
       exoid filter recordings/run.parquet -o motions/run.parquet
     """
     from pipelines.contracts import MOTION, RECORDING, describe
-    from pipelines.filtering import filter_recording
+    from pipelines.filtering import Summary, filtered
     from pipelines.settings import Experiment
     from pipelines.settings.filter import FilterSettings
 
     settings = Experiment.load(config).filter if config else FilterSettings()
     if cutoff_hz is not None:
         settings = FilterSettings.model_validate({**settings.model_dump(), "cutoff_hz": cutoff_hz})
-    filtered = filter_recording(RECORDING.read(recording), settings)
+    motion = filtered(RECORDING.scan(recording), settings)
     provenance = describe(inputs=[recording], config=settings.model_dump(mode="json"))
-    MOTION.write(output, filtered.motion.frame, filtered.motion.metadata | provenance)
+    found = Summary(motion)
+    MOTION.write_pieces(output, found.passing(motion.pieces()), motion.metadata | provenance)
 
-    summary = {
+    report = {
         "file": str(output),
-        "cutoff_hz": filtered.cutoff_hz,
-        "why": filtered.why,
-        "segments": filtered.segments,
-        "valid_share": filtered.valid_share,
-        "angle_noise_rad": filtered.noise.tolist(),
+        "cutoff_hz": found.cutoff_hz,
+        "why": found.why,
+        "segments": found.segments,
+        "valid_share": found.valid_share,
+        "angle_noise_rad": found.noise.tolist(),
         "drive_velocity_difference_rad_s": (
-            None if filtered.velocity_difference is None else filtered.velocity_difference.tolist()
+            None if found.velocity_difference is None else found.velocity_difference.tolist()
         ),
     }
-    console.emit(summary)
-    gaps = "no gap" if filtered.segments == 1 else f"{filtered.segments} segments"
+    console.emit(report)
+    gaps = "no gap" if found.segments == 1 else f"{found.segments} segments"
     console.say(
-        f"{output}: {len(filtered.motion.frame)} samples, {gaps}, {filtered.valid_share:.1%} valid; "
-        f"cut-off {filtered.cutoff_hz:.1f} Hz ({filtered.why})"
+        f"{output}: {found.samples} samples, {gaps}, {found.valid_share:.1%} valid; "
+        f"cut-off {found.cutoff_hz:.1f} Hz ({found.why})"
     )

@@ -23,25 +23,26 @@ def identify(
     Example:
       exoid identify motions/*.parquet -o identified/
     """
-    from pipelines.contracts import PARAMETERS, RESIDUALS, describe, joints_of
+    from pipelines.contracts import PARAMETERS, RESIDUALS, describe
     from pipelines.identification import identify as fit
     from pipelines.identification.two_step import METHOD
-    from pipelines.mechanics.read import geometry_from, read_motions
+    from pipelines.identification.validation import residuals
+    from pipelines.mechanics.read import geometry_from, read_runs
     from pipelines.settings import Experiment
 
     settings = Experiment.load(config) if config else Experiment()
-    motions = read_motions(files, settings.filter, geometry_from(settings.mechanism))
-    found = fit(motions)
+    runs = read_runs(files, settings.filter, geometry_from(settings.mechanism))
+    found = fit(runs)
     config_used = {
         "mechanism": settings.mechanism.model_dump(mode="json"),
         "filter": settings.filter.model_dump(mode="json"),
         "identify": settings.identify.model_dump(mode="json"),
     }
-    shared = {"joints": motions[0].joint_metadata} | describe(inputs=files, config=config_used)
+    shared = {"joints": runs[0].joint_metadata} | describe(inputs=files, config=config_used)
     described = {
         "covariance": found.covariance.tolist(),
         "mechanism": "leg",
-        "geometry": motions[0].geometry.metadata(),
+        "geometry": runs[0].geometry.metadata(),
         "method": METHOD,
         "one_step": found.one_step.tolist(),
         "validation": found.validation.as_json(),
@@ -49,11 +50,12 @@ def identify(
         "unrealizable": found.unrealizable,
     }
     PARAMETERS.write(output / "parameters.parquet", found.parameters, shared | described)
-    RESIDUALS.write(output / "residuals.parquet", found.residuals, shared)
+    left = output / "residuals.parquet"
+    RESIDUALS.write_pieces(left, residuals(runs, found.models, "baseline"), shared)
     if settings.identify.figures:
         from pipelines.identification.figures import draw
 
-        draw(found.residuals, joints_of(shared), output)
+        draw(RESIDUALS.scan(left), output)
     _report(found)
 
 

@@ -39,7 +39,7 @@ __all__ = [
 
 def contract_of(path: Path | str) -> Contract:
     """Return the contract that a file says it keeps."""
-    _, metadata = parquet.load(Path(path))
+    _, metadata = parquet.header(Path(path))
     name = metadata["contract"].partition("/")[0]
     for contract in CONTRACTS:
         if contract.name == name:

@@ -1,8 +1,8 @@
-"""Parquet files with exoid's metadata: opened with a clear refusal, written whole or not at all."""
+"""Parquet files with exoid's metadata: opened with a clear refusal, streamed, written whole or not at all."""
 
 import json
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -19,17 +19,42 @@ STREAM = b"\xff\xff\xff\xff"
 """How an Arrow stream starts, and so the journal of a run."""
 
 
+ROWS = 2**16
+"""Of a piece that is read, and of a row group that is written: some 20 MB of a recording with everything in it."""
+READ_AHEAD = 2**20
+"""Bytes of each column held beside a piece; without a limit it is the row group, and other tools' may be the file."""
+
+
+def header(path: Path) -> tuple[pa.Schema, dict[str, Any]]:
+    """Return a file's columns and its ``exoid`` metadata, or say why it is none of exoid's."""
+    with _opened(path) as file:
+        return file.schema_arrow, _metadata(file.schema_arrow, path)
+
+
+def pieces(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
+    """Read a file's rows in their order, at most ``ROWS`` at a time; all columns, or those that are named."""
+    with _opened(path) as file:
+        for batch in file.iter_batches(ROWS, columns=columns):
+            yield pa.Table.from_batches([batch])
+
+
 def load(path: Path) -> tuple[pa.Table, dict[str, Any]]:
-    """Return a file's table and its ``exoid`` metadata, or say why it is none of exoid's."""
+    """Return a file's whole table and its ``exoid`` metadata."""
+    schema, metadata = header(path)
+    return pa.concat_tables([schema.empty_table(), *pieces(path)]), metadata
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[pq.ParquetFile]:
     _refuse_what_is_no_file(path)
     try:
         # Not read_table(path): it would take a folder named "run=1" above the file for a column of a data set.
-        table = pq.ParquetFile(path).read()
+        with pq.ParquetFile(path, buffer_size=READ_AHEAD) as file:
+            yield file
     except (pa.ArrowException, UnicodeDecodeError, OSError) as error:
         if isinstance(error, OSError) and error.errno:
             raise  # the system's refusal; Arrow tells of a damaged page by an OSError that has no number
         raise ContractError(f"{path}: {_what_is_wrong_with_the_bytes(path)}") from error
-    return table, _metadata(table.schema, path)
 
 
 def save(path: Path, pieces: Iterable[pa.Table], metadata: Mapping[str, Any]) -> None:
@@ -42,7 +67,7 @@ def save(path: Path, pieces: Iterable[pa.Table], metadata: Mapping[str, Any]) ->
         temporary.touch()  # else Arrow would complain of the temporary name, in its own words
         with pq.ParquetWriter(temporary, schema, compression="zstd") as writer:
             for piece in chain([first], pieces):
-                writer.write_table(piece.replace_schema_metadata(schema.metadata))
+                writer.write_table(piece.replace_schema_metadata(schema.metadata), row_group_size=ROWS)
 
 
 def refuse_place(path: Path, contract: str) -> None:

@@ -1,9 +1,9 @@
 """A data contract as code: columns with unit, meaning and type, checked on reading and on writing."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pandas as pd
@@ -45,6 +45,23 @@ def per_joint(quantity: str, meaning: str, *, required: bool = True, nullable: b
     return Column(quantity, "", meaning, required=required, nullable=nullable, per_joint=True)
 
 
+class Rows(Protocol):
+    """A checked table whose rows can be gone through piece by piece, as often as need be."""
+
+    @property
+    def metadata(self) -> dict[str, Any]: ...  # noqa: D102
+
+    @property
+    def path(self) -> Path | None: ...  # noqa: D102
+
+    @property
+    def joints(self) -> tuple[Joint, ...]: ...  # noqa: D102
+
+    def pieces(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
+        """Yield the rows in their order; all columns, or those that are named."""
+        ...
+
+
 @dataclass(frozen=True)
 class Table:
     """A checked table in memory."""
@@ -61,6 +78,29 @@ class Table:
     def stacked(self, quantity: str) -> NDArray[np.float64]:
         """Return a quantity of all joints side by side, shape (rows, joints), in the quantity's SI unit."""
         return self.frame[[joint.column(quantity) for joint in self.joints]].to_numpy(dtype=float)
+
+    def pieces(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
+        """Yield the rows as one piece, for there they are."""
+        frame = self.frame if columns is None else self.frame[list(columns)]
+        yield pa.Table.from_pandas(frame, preserve_index=False).replace_schema_metadata()
+
+
+@dataclass(frozen=True)
+class Stored:
+    """A table in a file, read and checked piece by piece."""
+
+    contract: "Contract"
+    metadata: dict[str, Any]
+    path: Path
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """The joints this table speaks of."""
+        return joints_of(self.metadata)
+
+    def pieces(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
+        """Yield the rows in their order, at most ``parquet.ROWS`` at a time; all columns, or those that are named."""
+        return self.contract.conformed(parquet.pieces(self.path, columns), self.metadata, str(self.path), columns)
 
 
 Rule = Callable[[pd.DataFrame, Mapping[str, Any], str], None]
@@ -98,20 +138,31 @@ class Contract:
 
     def read(self, path: Path | str) -> Table:
         """Return the table in a file, or raise a ContractError that says what is wrong with it."""
+        stored = self.scan(path)
+        frame = pa.concat_tables(stored.pieces()).to_pandas()
+        self._apply_rules(frame, stored.metadata, str(path))
+        return Table(frame, stored.metadata, stored.path)
+
+    def scan(self, path: Path | str) -> Stored:
+        """Return the table in a file without its rows: they are read, and checked, as they are gone through."""
         path = Path(path)
-        table, metadata = parquet.load(path)
+        _, metadata = parquet.header(path)
         self._refuse_other_contracts(metadata["contract"], path)
-        return Table(self._conform(table, metadata, str(path)).to_pandas(), metadata, path)
+        self._check_metadata(metadata, str(path))
+        return Stored(self, metadata, path)
 
     def write(self, path: Path | str, frame: pd.DataFrame, metadata: Mapping[str, Any]) -> None:
         """Check a table and write it atomically; ``contract`` is added to the metadata."""
-        self.write_pieces(path, [self._to_arrow(frame, str(path))], metadata)
+        path = Path(path)
+        metadata = {**metadata, "contract": self.label}
+        parquet.save(path, [self._conform(self._to_arrow(frame, str(path)), metadata, str(path))], metadata)
 
     def write_pieces(self, path: Path | str, pieces: Iterable[pa.Table], metadata: Mapping[str, Any]) -> None:
         """Write a table as ``write`` does, but piece by piece, so that it need never be in memory as a whole."""
         path = Path(path)
         metadata = {**metadata, "contract": self.label}
-        parquet.save(path, self._conformed(pieces, metadata, str(path)), metadata)
+        self._check_metadata(metadata, str(path))
+        parquet.save(path, self.conformed(pieces, metadata, str(path)), metadata)
 
     def refuse_place(self, path: Path) -> None:
         """Raise a ContractError where this table could not be written: before the work, not after it."""
@@ -150,37 +201,44 @@ class Contract:
         return pa.table(arrays)
 
     def _conform(self, table: pa.Table, metadata: Mapping[str, Any], source: str) -> pa.Table:
-        """Return the table with every known column in its type, unit and meaning attached; refuse what cannot be."""
-        (conformed,) = self._conformed([table], metadata, source)
+        """Return a whole table with every known column in its type, unit and meaning; refuse what cannot be."""
+        self._check_metadata(metadata, source)
+        (conformed,) = self.conformed([table], metadata, source)
+        self._apply_rules(conformed.to_pandas(), metadata, source)
         return conformed
 
-    def _conformed(self, pieces: Iterable[pa.Table], metadata: Mapping[str, Any], source: str) -> Iterator[pa.Table]:
-        """Do the same with a table that comes in pieces; empty ones are left out."""
-        self._check_metadata(metadata, source)
-        columns, rows, seam = self.columns_for(joints_of(metadata)), 0, None
+    def conformed(
+        self, pieces: Iterable[pa.Table], metadata: Mapping[str, Any], source: str, named: Sequence[str] | None = None
+    ) -> Iterator[pa.Table]:
+        """Yield the pieces of a table with every known column in its type, unit and meaning; refuse what cannot be.
+
+        Empty pieces are left out. Where only some columns are ``named``, the others are not asked for.
+        """
+        columns = [c for c in self.columns_for(joints_of(metadata)) if named is None or c.name in named]
+        rows, seam = 0, None
         for piece in pieces:
             if not piece.num_rows:
                 continue
             for column in columns:
                 piece = self._conform_column(piece, column, source, rows)
-            self._check_rows(piece, seam, metadata, source, rows)
+            self._check_time(piece, seam, source, rows)
             yield piece
             # Its last row, so that the seam to the next piece is looked at too.
             rows, seam = rows + piece.num_rows, piece.slice(piece.num_rows - 1)
         if not rows:
             raise ContractError(f"{source}: holds no rows, expected at least one; `{self.made_by}` makes it again")
 
-    def _check_rows(
-        self, piece: pa.Table, seam: pa.Table | None, metadata: Mapping[str, Any], source: str, first_row: int
-    ) -> None:
-        """Check what a row must keep with the one before it, and the contract's own rules."""
-        if self.time:
-            rows = pa.concat_tables([seam, piece]) if seam else piece
-            frame = rows.select([self.time, *self.restarts_with]).to_pandas()
-            where = checks.Place(source, self.time, first_row - (1 if seam else 0))
-            checks.refuse_time_that_does_not_increase(frame, self.time, self.restarts_with, where)
+    def _check_time(self, piece: pa.Table, seam: pa.Table | None, source: str, first_row: int) -> None:
+        if self.time is None or self.time not in piece.column_names:
+            return
+        rows = pa.concat_tables([seam, piece]) if seam else piece
+        frame = rows.select([self.time, *self.restarts_with]).to_pandas()
+        where = checks.Place(source, self.time, first_row - (1 if seam else 0))
+        checks.refuse_time_that_does_not_increase(frame, self.time, self.restarts_with, where)
+
+    def _apply_rules(self, frame: pd.DataFrame, metadata: Mapping[str, Any], source: str) -> None:
         for rule in self.rules:
-            rule(piece.to_pandas(), metadata, source)
+            rule(frame, metadata, source)
 
     def _conform_column(self, table: pa.Table, column: Column, source: str, first_row: int) -> pa.Table:
         index = table.schema.get_field_index(column.name)

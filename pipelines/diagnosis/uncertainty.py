@@ -10,7 +10,7 @@ from pipelines.diagnosis.candidates import Candidate
 from pipelines.diagnosis.fit import Fit, laden, stacked_columns
 from pipelines.diagnosis.observations import Baseline, Run
 from pipelines.diagnosis.slow import slow_error
-from pipelines.estimation.least_squares import long_run_covariance
+from pipelines.estimation.long_run import long_run_covariance
 
 ALIKE_S = 0.5
 """How long what a model gets wrong stays alike: it goes with the motion, whose fastest parts are about 1 Hz."""
@@ -48,7 +48,7 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
     scores = [
         np.einsum("mo,o,mo,moi->mi", run.usable, weights, e, a) for run, e, a in zip(runs, left, wide, strict=True)
     ]
-    filling, critical = long_run_covariance([[s] for s in scores], gram.shape[0])
+    filling, critical = long_run_covariance(lambda: enumerate(scores), gram.shape[0])
     misfit = np.maximum(imperfect, slow_error(runs, left).excess)
     for run, a in zip(runs, wide, strict=True):
         alike = ALIKE_S * run.motion.sample_rate_hz / run.block.decimation

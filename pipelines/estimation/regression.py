@@ -1,12 +1,14 @@
-"""One run as a linear regression: torque and regressor behind the same filter, and which rows to trust."""
+"""A run as a linear regression: torque and regressor behind the same filter, and which rows to trust."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.errors import InputError
-from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.motion import Motion, Piece
+from pipelines.mechanics.run import Run
 from pipelines.model import Model
 from pipelines.signals.blocks import BlockAverage, dilate
 
@@ -21,9 +23,8 @@ MASK = f"|v| < {REVERSAL_SPEED:g} rad/s, padded {REVERSAL_PADDING_S:g} s"
 
 @dataclass(frozen=True)
 class Regression:
-    """m blocks of one run, J joints, p parameters: ``torque = regressor @ parameters + noise``."""
+    """m blocks of a run, J joints, p parameters: ``torque = regressor @ parameters + noise``."""
 
-    motion: Motion
     time: NDArray
     """(m,) s, the middle of each block."""
     segment: NDArray
@@ -43,16 +44,8 @@ class Regression:
         """(m,) bool: usable at every joint, as the RMSE counts it."""
         return np.asarray(self.usable.all(axis=1))
 
-    def select(self, columns: NDArray) -> "Regression":
-        """Return the regression on some of the parameters."""
-        return replace(self, regressor=self.regressor[:, :, columns])
 
-    def less(self, torque: NDArray) -> "Regression":
-        """Return the regression with a known torque (m, J) taken off."""
-        return replace(self, torque=self.torque - torque)
-
-
-def block_average(motion: Motion) -> BlockAverage:
+def block_average(motion: Run) -> BlockAverage:
     """Return the regression filter that the motion's file asks for; a filter of another kind is refused."""
     chosen = motion.metadata.get("regression_filter") or {}
     kind = chosen.get("kind", "block_average")
@@ -69,9 +62,12 @@ def block_average(motion: Motion) -> BlockAverage:
 
 def away_from_reversals(motion: Motion) -> NDArray:
     """Tell for each sample and joint whether it moves, and has moved for a while: (n, J) bool."""
-    padding = round(REVERSAL_PADDING_S * motion.sample_rate_hz)
     slow = np.abs(motion.dq) < REVERSAL_SPEED
-    return ~np.column_stack([dilate(column, padding) for column in slow.T])
+    return ~np.column_stack([dilate(column, _padding(motion)) for column in slow.T])
+
+
+def _padding(run: Run) -> int:
+    return round(REVERSAL_PADDING_S * run.sample_rate_hz)
 
 
 def away_from_turns(motion: Motion) -> NDArray:
@@ -84,13 +80,23 @@ def away_from_turns(motion: Motion) -> NDArray:
     return np.asarray(~dilate(turned, round(TURN_S * motion.sample_rate_hz)))
 
 
-def regress(motion: Motion, model: Model) -> Regression:
-    """Compute the regressor at full rate, then average it and the torque over the same blocks."""
+def regressions(run: Run, model: Model) -> Iterator[Regression]:
+    """Yield a run as one linear regression, piece by piece."""
+    for piece in run.pieces(block_average(run).decimation + _padding(run)):
+        yield regress(piece, model)
+
+
+def regress(piece: Piece, model: Model) -> Regression:
+    """Compute the regressor at full rate, then average it and the torque over the same blocks.
+
+    A block belongs to the piece in whose core it begins; what it needs beyond stands in the margin.
+    """
+    motion, core = piece.motion, piece.core
     block = block_average(motion)
-    starts = block.starts(motion.segment)
+    starts = block.starts(motion.segment, piece.before)
+    starts = starts[(starts >= core.start) & (starts < core.stop)]
     valid = block.all(motion.valid, starts)
     return Regression(
-        motion=motion,
         time=block.mean(motion.time, starts),
         segment=motion.segment[starts],
         regressor=block.mean(model.regressor(motion), starts),

@@ -1,5 +1,6 @@
 """Filtering: a recording made fit for regression, and what there is to say about it."""
 
-from pipelines.filtering.summary import Filtered, filter_recording
+from pipelines.filtering.summary import Summary
+from pipelines.mechanics.kinematics import filtered
 
-__all__ = ["Filtered", "filter_recording"]
+__all__ = ["Summary", "filtered"]

@@ -1,51 +1,72 @@
-"""Filter a recording and say what was found on the way."""
+"""What is said of a filtered recording, gathered while its rows pass."""
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
-from pipelines.contracts.table import Table
-from pipelines.mechanics.kinematics import motion_table
-from pipelines.settings.filter import FilterSettings
+from pipelines.mechanics.kinematics import FilteredRecording
 
 
-@dataclass(frozen=True)
-class Filtered:
-    """A ``motion/1`` table and how its recording fared."""
+class Summary:
+    """How a recording fared in the filter; every array (J,)."""
 
-    motion: Table
-    cutoff_hz: float
-    why: str
-    segments: int
-    valid_share: float
-    noise: NDArray
-    """(J,) rms of measured less filtered angle, rad: the encoder's noise and what the filter took."""
-    velocity_difference: NDArray | None
-    """(J,) rms of the drive's own velocity less the filtered one, rad/s; None where the drive gave none."""
+    def __init__(self, motion: FilteredRecording) -> None:
+        self.cutoff_hz = motion.cutoff.hz
+        self.why = motion.cutoff.reason
+        self.segments = len(motion.stretches)
+        self.samples = 0
+        self._valid = 0
+        self._joints = motion.joints
+        self._noise = _MeanSquare(len(motion.joints))
+        self._velocity = _MeanSquare(len(motion.joints))
+
+    def passing(self, pieces: Iterable[pa.Table]) -> Iterator[pa.Table]:
+        """Yield the motion's rows as they are, once they have been looked at."""
+        for piece in pieces:
+            self._add(piece)
+            yield piece
+
+    def _add(self, piece: pa.Table) -> None:
+        valid = piece["valid"].to_numpy()
+        self.samples += piece.num_rows
+        self._valid += int(valid.sum())
+
+        def stacked(quantity: str) -> NDArray:
+            return np.column_stack([piece[joint.column(quantity)].to_numpy() for joint in self._joints])[valid]
+
+        self._noise.add(stacked("angle_measured") - stacked("angle"))
+        if {joint.column("velocity_measured") for joint in self._joints} <= set(piece.column_names):
+            self._velocity.add(stacked("velocity_measured") - stacked("velocity"))
+
+    @property
+    def valid_share(self) -> float:
+        """Share of the samples that a fit may use."""
+        return self._valid / self.samples
+
+    @property
+    def noise(self) -> NDArray:
+        """Rms of measured less filtered angle, rad: the encoder's noise and what the filter took."""
+        return self._noise.root
+
+    @property
+    def velocity_difference(self) -> NDArray | None:
+        """Rms of the drive's own velocity less the filtered one, rad/s; None where the drive gave none."""
+        return self._velocity.root if self._velocity.count.any() else None
 
 
-def filter_recording(recording: Table, settings: FilterSettings) -> Filtered:
-    """Make a motion of a ``recording/1`` table."""
-    motion = motion_table(recording, settings)
-    frame = motion.frame
-    valid = frame["valid"].to_numpy(bool)
-    joints = motion.joints
-    drive = [joint.column("velocity_measured") for joint in joints]
-    return Filtered(
-        motion=motion,
-        cutoff_hz=motion.metadata["filter"]["cutoff_hz"],
-        why=motion.metadata["filter"]["why"],
-        segments=int(frame["segment"].nunique()),
-        valid_share=float(valid.mean()),
-        noise=_rms((motion.stacked("angle_measured") - motion.stacked("angle"))[valid]),
-        velocity_difference=(
-            _rms((frame[drive].to_numpy(float) - motion.stacked("velocity"))[valid])
-            if set(drive) <= set(frame.columns)
-            else None
-        ),
-    )
+class _MeanSquare:
+    """A root mean square over what comes piece by piece (n, J), missing values left out."""
 
+    def __init__(self, columns: int) -> None:
+        self.count = np.zeros(columns)
+        self._total = np.zeros(columns)
 
-def _rms(x: NDArray) -> NDArray:
-    return np.sqrt(np.nanmean(x**2, axis=0))
+    def add(self, x: NDArray) -> None:
+        self.count += np.sum(~np.isnan(x), axis=0)
+        self._total += np.nansum(x**2, axis=0)
+
+    @property
+    def root(self) -> NDArray:
+        return np.sqrt(self._total / self.count)

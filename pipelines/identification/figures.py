@@ -1,5 +1,7 @@
 """The figures of an identification: what the model predicts, and what is left."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipelines.contracts.joints import Joint
+from pipelines.contracts.table import Rows
 from pipelines.plots import BLUE as LEFT
 from pipelines.plots import GREY as MEASURED
 from pipelines.plots import ORANGE as PREDICTED
@@ -18,20 +21,63 @@ BINS, FEWEST = 25, 8
 """Of the running mean of a residual, and the samples a bin needs to have one."""
 
 
-def draw(residuals: pd.DataFrame, joints: tuple[Joint, ...], folder: Path) -> None:
+MOST = 20_000
+"""Rows of a run that are drawn; of a longer one every second, fourth, ..."""
+
+
+@dataclass
+class _Drawn:
+    """What is drawn of one run, and what is said of all of it."""
+
+    frame: pd.DataFrame
+    every: int = 1
+    passed: int = 0
+    scored: int = 0
+    squares: dict[str, float] = field(default_factory=dict)
+    """Of each column, over the scored rows."""
+
+    def add(self, frame: pd.DataFrame, columns: Sequence[str]) -> None:
+        scored = frame[frame["scored"]]
+        self.scored += len(scored)
+        for name in columns:
+            self.squares[name] = self.squares.get(name, 0.0) + float(np.sum(scored[name] ** 2))
+        chosen = frame.iloc[-self.passed % self.every :: self.every]
+        self.frame = pd.concat([self.frame, chosen], ignore_index=True) if len(self.frame) else chosen
+        self.passed += len(frame)
+        while len(self.frame) > MOST:
+            self.frame = self.frame.iloc[::2].reset_index(drop=True)
+            self.every *= 2
+
+    def rms(self, column: str) -> float:
+        return float(np.sqrt(self.squares[column] / self.scored)) if self.scored else np.nan
+
+
+def draw(residuals: Rows, folder: Path) -> None:
     """Write the figures of every validation run as PNG and PDF into a folder.
 
     ``residuals`` is a ``residuals/1`` table.
     """
+    joints = residuals.joints
     with plt.rc_context(STYLE):
-        for name, run in residuals[residuals["purpose"] == "validate"].groupby("file", sort=False):
-            stem = Path(str(name)).stem
+        for name, run in _validation_runs(residuals).items():
+            stem = Path(name).stem
             save(_prediction(run, joints, stem), folder / f"torque-{stem}")
             save(_what_is_left(run, joints, stem), folder / f"residual-{stem}")
 
 
-def _prediction(run: pd.DataFrame, joints: tuple[Joint, ...], title: str) -> Figure:
+def _validation_runs(residuals: Rows) -> dict[str, _Drawn]:
+    columns = [joint.column(quantity) for joint in residuals.joints for quantity in ("residual", "torque")]
+    runs: dict[str, _Drawn] = {}
+    for piece in residuals.pieces():
+        frame = piece.to_pandas()
+        for name, rows in frame[frame["purpose"] == "validate"].groupby("file", sort=False):
+            runs.setdefault(str(name), _Drawn(rows.iloc[:0])).add(rows, columns)
+    return runs
+
+
+def _prediction(drawn: _Drawn, joints: tuple[Joint, ...], title: str) -> Figure:
     """Draw measured and predicted torque over time, the difference on the same scale beneath."""
+    run = drawn.frame
     figure, axes = plt.subplots(
         2 * len(joints), 1, figsize=(9, 3.2 * len(joints)), sharex=True, height_ratios=[3, 1.3] * len(joints)
     )
@@ -40,7 +86,7 @@ def _prediction(run: pd.DataFrame, joints: tuple[Joint, ...], title: str) -> Fig
         torque.plot(run["time_s"], run[joint.column("torque")], color=MEASURED, lw=2.2, label="measured")
         torque.plot(run["time_s"], run[joint.column("predicted")], color=PREDICTED, lw=0.9, label="predicted")
         torque.set_ylabel(f"{joint.name} torque, {joint.unit('torque')}")
-        torque.set_title(f"{joint.name}: {_error(run, joint)}", loc="left", fontsize=9)
+        torque.set_title(f"{joint.name}: {_error(drawn, joint)}", loc="left", fontsize=9)
         _residual_over(left, run["time_s"], run, joint)
         left.set_ylabel(f"left, {joint.unit('torque')}")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="upper right", ncols=2)
@@ -51,8 +97,9 @@ def _prediction(run: pd.DataFrame, joints: tuple[Joint, ...], title: str) -> Fig
     return figure
 
 
-def _what_is_left(run: pd.DataFrame, joints: tuple[Joint, ...], title: str) -> Figure:
+def _what_is_left(drawn: _Drawn, joints: tuple[Joint, ...], title: str) -> Figure:
     """Draw the residual against time, angle and speed: noise has no shape in any of them."""
+    run = drawn.frame
     figure, axes = plt.subplots(len(joints), 3, figsize=(10, 2.7 * len(joints)), squeeze=False, sharey="row")
     for row, joint in zip(axes, joints, strict=True):
         against = {"time, s": "time_s"}
@@ -61,7 +108,7 @@ def _what_is_left(run: pd.DataFrame, joints: tuple[Joint, ...], title: str) -> F
             _residual_over(axis, run[column], run, joint, dots=True)
             axis.set_xlabel(label)
         row[0].set_ylabel(f"{joint.name} residual, {joint.unit('torque')}")
-        row[0].set_title(_error(run, joint), loc="left", fontsize=9)
+        row[0].set_title(_error(drawn, joint), loc="left", fontsize=9)
     figure.legend(*axes[0, -1].get_legend_handles_labels(), loc="upper right", ncols=3, markerscale=4)
     figure.suptitle(f"{title}: what the model leaves", x=0.02, ha="left", fontweight="bold")
     figure.tight_layout()
@@ -84,7 +131,6 @@ def _residual_over(axis: Axes, x: pd.Series, run: pd.DataFrame, joint: Joint, do
     axis.set_ylim(-height, height)
 
 
-def _error(run: pd.DataFrame, joint: Joint) -> str:
-    scored = run[run["scored"]]
-    residual, torque = (np.sqrt(np.mean(scored[joint.column(name)] ** 2)) for name in ("residual", "torque"))
+def _error(drawn: _Drawn, joint: Joint) -> str:
+    residual, torque = (drawn.rms(joint.column(name)) for name in ("residual", "torque"))
     return f"RMSE {residual:.2f} of {torque:.1f} {joint.unit('torque')} rms"

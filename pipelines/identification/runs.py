@@ -4,20 +4,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pipelines.errors import InputError
-from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.one_machine import refuse_several_machines
+from pipelines.mechanics.run import Run
 
 REMEDY = "record it with `exoid acquire`, or correct the metadata of the file"
 
 
 @dataclass(frozen=True)
 class Runs:
-    """Motions of one machine, by what they are for."""
+    """Runs of one machine, by what they are for."""
 
-    motions: tuple[Motion, ...]
+    motions: tuple[Run, ...]
 
-    def of(self, purpose: str, run: str | None = None) -> list[Motion]:
-        """Return the motions of a purpose and, if asked, of a kind of run."""
+    def of(self, purpose: str, run: str | None = None) -> list[Run]:
+        """Return those of a purpose and, if asked, of a kind of run."""
         return [m for m in self.motions if m.purpose == purpose and run in (None, m.run)]
 
     @property
@@ -26,8 +26,8 @@ class Runs:
         return tuple(kind for kind in ("exo_alone", "with_human") if self.of("train", kind))
 
 
-def checked(motions: Sequence[Motion]) -> Runs:
-    """Refuse motions that do not belong together or do not suffice for two steps and a validation."""
+def checked(motions: Sequence[Run]) -> Runs:
+    """Refuse runs that do not belong together or do not suffice for two steps and a validation."""
     runs = Runs(tuple(motions))
     listed = ", ".join(f"{m.file} ({m.run}, {m.purpose})" for m in motions) or "none"
     if not runs.of("train", "exo_alone"):

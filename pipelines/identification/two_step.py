@@ -2,10 +2,11 @@
 
 Step 1 fits the rigid body and the friction of the empty exoskeleton. Step 2 holds that friction and
 fits the rigid body of human and exoskeleton; step 1's covariance is carried into step 2's intervals.
-A fit of everything at once is computed beside it as a check.
+A fit of everything at once is computed beside it as a check. Each training run is gone through once to compress its
+rows, from which every fit follows, and twice for the covariance of what the fit left.
 """
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,12 +15,23 @@ from numpy.typing import NDArray
 
 from pipelines.effects import Effect, Parameter
 from pipelines.estimation.collinearity import collinearities
-from pipelines.estimation.least_squares import Estimate, normal_equations, solve
-from pipelines.estimation.regression import Regression, regress
+from pipelines.estimation.least_squares import (
+    Compressed,
+    Estimate,
+    Fit,
+    compress,
+    estimate,
+    normal_equations,
+    score,
+    solve,
+    together,
+)
+from pipelines.estimation.long_run import Scores
+from pipelines.estimation.regression import regressions
 from pipelines.identification.runs import Runs, checked
-from pipelines.identification.validation import Validation, residuals, validate
+from pipelines.identification.validation import Validation, validate
 from pipelines.mechanics.leg import unrealizable
-from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.run import Run
 from pipelines.model import Model, Term, baseline
 
 METHOD = {
@@ -50,15 +62,15 @@ class Identified:
     one_step: NDArray
     """The values of a fit of everything at once, in the same order."""
     validation: Validation
-    residuals: pd.DataFrame
-    """``residuals/1``, model ``baseline``."""
+    models: dict[str, Model]
+    """What was found, for each kind of run."""
     collinear: list[str]
     """What this motion cannot separate, a sentence each."""
     unrealizable: list[str]
     """Which rigid bodies no real leg could have, a sentence each."""
 
 
-def identify(motions: Sequence[Motion]) -> Identified:
+def identify(motions: Sequence[Run]) -> Identified:
     """Identify friction, the exoskeleton's rigid body and, where there are runs with one, the human's.
 
     Raises
@@ -70,14 +82,14 @@ def identify(motions: Sequence[Motion]) -> Identified:
     """
     runs = checked(motions)
     models = {kind: _model(runs, (kind,)) for kind in runs.kinds}
-    train = {kind: [regress(m, models[kind]) for m in runs.of("train", kind)] for kind in runs.kinds}
-    alone = solve(train["exo_alone"], _names(models["exo_alone"]))
+    train = {kind: _compressed(runs, kind, models[kind]) for kind in runs.kinds}
+    alone = _alone(runs, train["exo_alone"], models["exo_alone"])
     rows = [Row(e, p, e.run, "friction") for e, p in models["exo_alone"].linear_parameters]
     values, covariance = alone.values, alone.covariance
     critical = np.full(len(rows), alone.critical)
     collinear = [f"exo_alone: {s}" for s in _collinear(train["exo_alone"], alone, models["exo_alone"])]
     if "with_human" in runs.kinds:
-        second = _with_friction_held(train["with_human"], alone, models["with_human"])
+        second = _with_friction_held(runs, train["with_human"], alone, models["with_human"])
         values, covariance = _joined(alone, second)
         body = [(e, p) for e, p in models["with_human"].linear_parameters if e.name == "rigid_body"]
         rows += [Row(e, p, "with_human", "inertia") for e, p in body]
@@ -91,9 +103,9 @@ def identify(motions: Sequence[Motion]) -> Identified:
     return Identified(
         parameters=table,
         covariance=covariance,
-        one_step=_one_step(runs, rows),
+        one_step=_one_step(runs, train, models, rows),
         validation=validate(runs.of("validate"), final),
-        residuals=pd.concat([residuals(m, final[m.run], "baseline") for m in motions if m.run in final]),
+        models=final,
         collinear=collinear,
         unrealizable=_unrealizable(table, runs),
     )
@@ -112,8 +124,31 @@ def _name(effect: Effect, parameter: Parameter) -> str:
     return f"{effect.joint} {parameter.name}" if effect.joint else parameter.name
 
 
-def _collinear(regressions: list[Regression], estimate: Estimate, model: Model) -> list[str]:
-    return collinearities(normal_equations(regressions, estimate.weights)[0], _names(model))
+def _compressed(runs: Runs, kind: str, model: Model) -> Compressed:
+    return compress(r for run in runs.of("train", kind) for r in regressions(run, model))
+
+
+def _scores(runs: Runs, kind: str, model: Model, values: NDArray, weights: NDArray, columns: NDArray) -> Scores:
+    """Return the scores of the fitted ``columns`` of a model whose columns all have ``values``."""
+
+    def go_through() -> Iterator[tuple[Hashable, NDArray]]:
+        for number, run in enumerate(runs.of("train", kind)):
+            for r in regressions(run, model):
+                for segment, scores in score(r, values, weights, columns):
+                    yield (number, segment), scores
+
+    return go_through
+
+
+def _alone(runs: Runs, rows: Compressed, model: Model) -> Estimate:
+    """Fit the rigid body and the friction of the empty exoskeleton."""
+    fit = solve(rows, _names(model))
+    every = np.arange(len(fit.values))
+    return estimate(fit, _scores(runs, "exo_alone", model, fit.values, fit.weights, every))
+
+
+def _collinear(rows: Compressed, fit: Fit, model: Model) -> list[str]:
+    return collinearities(normal_equations(rows, fit.weights)[0], _names(model))
 
 
 @dataclass(frozen=True)
@@ -124,17 +159,18 @@ class _Second:
     collinear: list[str]
 
 
-def _with_friction_held(regressions: list[Regression], alone: Estimate, model: Model) -> _Second:
+def _with_friction_held(runs: Runs, rows: Compressed, alone: Estimate, model: Model) -> _Second:
     """Fit the rigid body of human and exoskeleton under step 1's friction."""
     is_body = np.array([effect.name == "rigid_body" for effect, _ in model.linear_parameters])
     body, friction = np.flatnonzero(is_body), np.flatnonzero(~is_body)
-    held = alone.values[friction]
-    alone_only = [r.select(body).less(r.regressor[:, :, friction] @ held) for r in regressions]
     names = [name for name, chosen in zip(_names(model), is_body, strict=True) if chosen]
-    estimate = solve(alone_only, names)
-    gram, _ = normal_equations(regressions, estimate.weights)
-    carry = -estimate.sensitivity @ gram[np.ix_(body, friction)]
-    return _Second(estimate, carry, collinearities(gram[np.ix_(body, body)], names))
+    fit = solve(rows.with_held(friction, alone.values[friction]).select(body), names)
+    values = alone.values.copy()
+    values[body] = fit.values
+    found = estimate(fit, _scores(runs, "with_human", model, values, fit.weights, body))
+    gram, _ = normal_equations(rows, fit.weights)
+    carry = -fit.sensitivity @ gram[np.ix_(body, friction)]
+    return _Second(found, carry, collinearities(gram[np.ix_(body, body)], names))
 
 
 def _joined(alone: Estimate, second: _Second) -> tuple[NDArray, NDArray]:
@@ -181,13 +217,15 @@ def _of_run(model: Model, table: pd.DataFrame, kind: str) -> Model:
     return model.with_linear(np.concatenate([body["value"], friction["value"]]))
 
 
-def _one_step(runs: Runs, rows: Sequence[Row]) -> NDArray:
+def _one_step(runs: Runs, train: Mapping[str, Compressed], models: Mapping[str, Model], rows: Sequence[Row]) -> NDArray:
     """Fit all runs at once, friction shared, and return the values in the order of ``rows``."""
     model = _model(runs, runs.kinds)
-    estimate = solve([regress(m, model) for m in runs.of("train")], _names(model))
+    columns = {parameter: column for column, parameter in enumerate(model.linear_parameters)}
+    own = {kind: np.array([columns[parameter] for parameter in models[kind].linear_parameters]) for kind in train}
+    fit = solve(together([train[kind].spread(own[kind], len(columns)) for kind in train]), _names(model))
     found = {
         (effect.name, effect.joint, parameter.name, effect.run): value
-        for (effect, parameter), value in zip(model.linear_parameters, estimate.values, strict=True)
+        for (effect, parameter), value in zip(model.linear_parameters, fit.values, strict=True)
     }
 
     def of_run(row: Row, run: str | None) -> float:

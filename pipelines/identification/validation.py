@@ -1,16 +1,16 @@
 """How well a model predicts the torque of runs that no fit has seen."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
-import pandas as pd
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from pipelines.contracts.joints import joints_of
 from pipelines.estimation.least_squares import residual_of
-from pipelines.estimation.regression import regress
-from pipelines.mechanics.motion import Motion
+from pipelines.estimation.regression import Regression, regressions
+from pipelines.mechanics.run import Run
 from pipelines.model import Model
 
 
@@ -50,51 +50,80 @@ class Validation:
         }
 
 
-def validate(motions: Sequence[Motion], models: Mapping[str, Model]) -> Validation:
+def validate(motions: Sequence[Run], models: Mapping[str, Model]) -> Validation:
     """Score each kind of run's model on its motions; runs of a kind that has no model are left out."""
-    tables = {run: [_errors(m, models[run]) for m in motions if m.run == run] for run in models}
-    tables = {run: found for run, found in tables.items() if found}
-    return Validation(
-        joints=motions[0].joints,
-        pooled=_score([errors for found in tables.values() for errors in found]),
-        by_run={run: _score(found) for run, found in tables.items()},
-    )
+    joints = motions[0].joints
+    sums = {run: _Sums.none(len(joints)) for run in models if any(m.run == run for m in motions)}
+    for motion in motions:
+        if motion.run in sums:
+            for r in regressions(motion, models[motion.run]):
+                sums[motion.run] += _Sums.of(r, residual_of(r, models[motion.run].linear_values))
+    pooled = sum(sums.values(), _Sums.none(len(joints)))
+    return Validation(joints=joints, pooled=pooled.score(), by_run={run: s.score() for run, s in sums.items()})
 
 
-_Errors = tuple[NDArray, NDArray, NDArray, NDArray]
-"""Residual and torque (m, J), which blocks are scored and which are valid (m,)."""
+@dataclass(frozen=True)
+class _Sums:
+    """Square sums, (J,) each, and how many blocks they are over."""
+
+    residual: NDArray
+    torque: NDArray
+    scored: int
+    unmasked: NDArray
+    valid: int
+
+    @classmethod
+    def none(cls, joints: int) -> "_Sums":
+        return cls(np.zeros(joints), np.zeros(joints), 0, np.zeros(joints), 0)
+
+    @classmethod
+    def of(cls, r: Regression, residual: NDArray) -> "_Sums":
+        squares = residual**2
+        return cls(
+            residual=squares[r.scored].sum(axis=0),
+            torque=np.sum(r.torque[r.scored] ** 2, axis=0),
+            scored=int(r.scored.sum()),
+            unmasked=squares[r.valid].sum(axis=0),
+            valid=int(r.valid.sum()),
+        )
+
+    def __add__(self, other: "_Sums") -> "_Sums":
+        return _Sums(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
+
+    def score(self) -> Score:
+        return Score(
+            rmse=_root(self.residual, self.scored),
+            rmse_unmasked=_root(self.unmasked, self.valid),
+            torque_rms=_root(self.torque, self.scored),
+            samples=self.scored,
+        )
 
 
-def _errors(motion: Motion, model: Model) -> _Errors:
-    r = regress(motion, model)
-    return residual_of(r, model.linear_values), r.torque, r.scored, r.valid
+def _root(squares: NDArray, count: int) -> NDArray:
+    return np.sqrt(squares / count) if count else np.full(len(squares), np.nan)
 
 
-def _score(tables: Sequence[_Errors]) -> Score:
-    residual, torque, scored, valid = (np.concatenate(arrays) for arrays in zip(*tables, strict=True))
-    return Score(
-        rmse=_rms(residual[scored]),
-        rmse_unmasked=_rms(residual[valid]),
-        torque_rms=_rms(torque[scored]),
-        samples=int(scored.sum()),
-    )
+def residuals(motions: Sequence[Run], models: Mapping[str, Model], name: str) -> Iterator[pa.Table]:
+    """Yield the rows of ``residuals/1``, piece by piece, of all runs that have a model.
+
+    ``name`` is ``baseline`` or ``extended``.
+    """
+    for motion in motions:
+        if motion.run in models:
+            for r in regressions(motion, models[motion.run]):
+                yield _residual_rows(r, motion, models[motion.run], name)
 
 
-def _rms(x: NDArray) -> NDArray:
-    return np.sqrt(np.mean(x**2, axis=0)) if len(x) else np.full(x.shape[1], np.nan)
-
-
-def residuals(motion: Motion, model: Model, name: str) -> pd.DataFrame:
-    """Return a run's rows of ``residuals/1``; ``name`` is ``baseline`` or ``extended``."""
-    r = regress(motion, model)
+def _residual_rows(r: Regression, motion: Run, model: Model, name: str) -> pa.Table:
     error = residual_of(r, model.linear_values)
+    blocks = len(r.time)
     columns: dict[str, object] = {
-        "file": np.full(len(r.time), motion.file),
-        "run": motion.run,
-        "purpose": motion.purpose,
+        "file": pa.repeat(motion.file, blocks),
+        "run": pa.repeat(motion.run, blocks),
+        "purpose": pa.repeat(motion.purpose, blocks),
         "segment": r.segment,
         "time_s": r.time,
-        "model": name,
+        "model": pa.repeat(name, blocks),
         "scored": r.scored,
     }
     quantities = {
@@ -107,4 +136,4 @@ def residuals(motion: Motion, model: Model, name: str) -> pd.DataFrame:
     }
     for j, joint in enumerate(joints_of(motion.metadata)):
         columns |= {joint.column(quantity): values[:, j] for quantity, values in quantities.items()}
-    return pd.DataFrame(columns)
+    return pa.table(columns)

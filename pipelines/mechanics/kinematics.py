@@ -1,128 +1,122 @@
 """From a recording to a motion: zero-phase filtered angles, their derivatives, segments, and what to trust."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
+import pyarrow as pa
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from pipelines.contracts.table import Table
+from pipelines.contracts.joints import Joint
+from pipelines.contracts.table import Rows, Table
+from pipelines.contracts.windows import Window, windows
 from pipelines.errors import InputError, about
+from pipelines.mechanics.stretches import Stretches, find_stretches
 from pipelines.settings.filter import FilterSettings
 from pipelines.signals.blocks import BlockAverage
 from pipelines.signals.cutoff import Cutoff, choose_cutoff
-from pipelines.signals.low_pass import derivative, low_pass, shortest
+from pipelines.signals.low_pass import derivative, low_pass, reach, shortest
 
-GAP = 1.5
-"""Sample periods between two samples that make a gap, unless it is bridged."""
-BRIDGED_S = 0.022
-"""A shorter hole is interpolated: no leg does anything in it, and a bus that loses a sample here and there, or a
-clock that stamps one late, would otherwise leave no stretch long enough to be filtered."""
-JITTER = 0.02
-"""Share of a sample period a sample may stray from the uniform grid before it is interpolated."""
 EDGE_PERIODS = 1.5
 """Periods of the cut-off frequency at each end of a segment where the filter lacks one side."""
+SPLINE_REACH = 40
+"""Samples away from which a cubic spline no longer feels a cut: its influence falls by 3.7 with each."""
+WINDOW = 2**16
+"""Rows that are filtered at a time; fewer than the filter reaches would cost more than they save."""
 
 
 @dataclass(frozen=True)
-class Kinematics:
-    """Filtered motion of all joints, every array (n, J), and which samples to trust."""
+class FilteredRecording:
+    """A ``motion/1`` table that is computed, window by window, each time its rows are gone through."""
 
-    q: NDArray
-    dq: NDArray
-    ddq: NDArray
-    segment: NDArray
-    valid: NDArray
+    recording: Rows
+    metadata: dict[str, Any]
+    """The recording's, and how it is filtered."""
     cutoff: Cutoff
+    stretches: Stretches
+
+    @property
+    def path(self) -> Path | None:
+        """The recording's file."""
+        return self.recording.path
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """The recording's."""
+        return self.recording.joints
+
+    def pieces(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
+        """Yield the motion in its order; all columns, or those that are named.
+
+        Each window reaches so far beyond what it is about that the result is that of filtering all at once.
+        """
+        rate_hz, order = self.metadata["sample_rate_hz"], self.metadata["filter"]["order"]
+        margin = reach(rate_hz, self.cutoff.hz, order) + SPLINE_REACH
+        for window in windows(self.recording.pieces(), max(WINDOW, margin), margin):
+            table = window.kept(self._filtered(window))
+            yield table if columns is None else table.select(list(columns))
+
+    def _filtered(self, window: Window) -> pa.Table:
+        rows, rate_hz = window.rows, float(self.metadata["sample_rate_hz"])
+        time, angle = _time_and_angle(rows, self.joints)
+        q, dq, ddq = angle.copy(), np.zeros_like(angle), np.zeros_like(angle)
+        segment, valid = np.zeros(len(time), dtype=np.int64), np.zeros(len(time), dtype=bool)
+        edge = _edge(rate_hz, self.cutoff.hz)
+        # Of a stretch that only the margin holds there may be too little to filter, and nothing of it is kept.
+        for s in self.stretches.overlapping(window.first + window.core.start, window.first + window.core.stop):
+            here = _rows_of(s, self.stretches, window)
+            segment[here] = s
+            if self.stretches.samples[s] < shortest(rate_hz, self.cutoff.hz):
+                continue
+            grid = _Grid(self.stretches, s, rate_hz)
+            q[here], dq[here], ddq[here] = grid.filtered(
+                time[here], angle[here], self.cutoff.hz, self.metadata["filter"]["order"]
+            )
+            trusted = slice(
+                max(0, int(self.stretches.start[s]) + edge - window.first),
+                max(0, int(self.stretches.stop[s]) - edge - window.first),
+            )
+            valid[trusted] = True
+        return _motion_columns(rows, self.joints, (q, dq, ddq), segment, valid)
 
 
-def motion_table(recording: Table, settings: FilterSettings) -> Table:
+def filtered(recording: Rows, settings: FilterSettings) -> FilteredRecording:
     """Make a ``motion/1`` table of a ``recording/1`` table.
 
     Angles are filtered and differentiated; torque, forces and the rest stay as measured; no sample is dropped.
     """
-    frame, metadata = recording.frame, recording.metadata
-    rate_hz = float(metadata["sample_rate_hz"])
-    names = tuple(joint.name for joint in recording.joints)
+    rate_hz = float(recording.metadata["sample_rate_hz"])
     with about(recording.path):
-        made = differentiate(frame["time_s"].to_numpy(float), recording.stacked("angle"), rate_hz, settings, names)
-    columns: dict[str, Any] = {"time_s": frame["time_s"]}
-    for j, joint in enumerate(recording.joints):
-        columns[joint.column("angle")] = made.q[:, j]
-        columns[joint.column("angle_measured")] = frame[joint.column("angle")]
-        columns[joint.column("velocity")] = made.dq[:, j]
-        columns[joint.column("acceleration")] = made.ddq[:, j]
-        if joint.column("velocity") in frame:
-            columns[joint.column("velocity_measured")] = frame[joint.column("velocity")]
-    columns |= {name: frame[name] for name in frame.columns if name not in columns}
-    columns |= {"segment": made.segment, "valid": made.valid}
+        stretches = find_stretches((piece["time_s"].to_numpy() for piece in recording.pieces(["time_s"])), rate_hz)
+        cutoff = _cutoff(recording, stretches, rate_hz, settings)
+        _refuse_stretches_that_are_all_edge(stretches, rate_hz, cutoff)
+    how = {
+        "kind": "butterworth_zero_phase", "order": settings.order, "cutoff_hz": cutoff.hz, "why": cutoff.reason,
+    }  # fmt: skip
     block = BlockAverage.lasting(settings.block_s, rate_hz)
-    filters = {
-        "filter": {
-            "kind": "butterworth_zero_phase",
-            "order": settings.order,
-            "cutoff_hz": made.cutoff.hz,
-            "why": made.cutoff.reason,
-        },
-        "regression_filter": block.as_metadata(rate_hz),
-    }
-    return Table(pd.DataFrame(columns), {**metadata, **filters}, recording.path)
+    metadata = {**recording.metadata, "filter": how, "regression_filter": block.as_metadata(rate_hz)}
+    return FilteredRecording(recording, metadata, cutoff, stretches)
 
 
-def differentiate(
-    time: NDArray, angle: NDArray, rate_hz: float, settings: FilterSettings, names: tuple[str, ...]
-) -> Kinematics:
-    """Filter measured angles and differentiate them, segment by segment.
-
-    Parameters
-    ----------
-    time : (n,) array
-        s, strictly increasing, with gaps.
-    angle : (n, J) array
-        rad or m.
-    rate_hz : float
-        Nominal sample rate.
-    names : tuple of str
-        The joints' names, for the reason given with the cut-off.
-    """
-    steps = np.diff(time)
-    actual_hz = 1.0 / float(np.median(steps)) if len(steps) else rate_hz
-    if not 0.5 < actual_hz / rate_hz < 2.0:
-        raise InputError(
-            f"metadata sample_rate_hz is {rate_hz:g}, but time_s advances by {1 / actual_hz:g} s "
-            f"({actual_hz:g} Hz); correct the one that is wrong"
-        )
-    segment = np.concatenate([[0], np.cumsum(steps > max(GAP / rate_hz, BRIDGED_S))]).astype(np.int64)
-    stretches = [np.flatnonzero(segment == s) for s in range(segment[-1] + 1)]
-    longest = max(stretches, key=len)
-    cutoff = _cutoff(time[longest], angle[longest], rate_hz, settings, names)
-    q, dq, ddq = angle.copy(), np.zeros_like(angle), np.zeros_like(angle)
-    valid = np.zeros(len(time), dtype=bool)
-    edge = int(np.ceil(EDGE_PERIODS * rate_hz / cutoff.hz))
-    for rows in stretches:
-        if len(rows) < shortest(rate_hz, cutoff.hz):
-            continue
-        q[rows], dq[rows], ddq[rows] = _filtered(time[rows], angle[rows], rate_hz, cutoff.hz, settings.order)
-        valid[rows[edge : len(rows) - edge]] = True
-    if not valid.any():
-        raise InputError(
-            f"no stretch without a gap lasts the {2 * edge / rate_hz:.2f} s that a {cutoff.hz:.1f} Hz filter needs; "
-            "the longest has "
-            f"{_count(len(longest))}: record longer runs, or raise filter.cutoff_hz"
-        )
-    return Kinematics(q, dq, ddq, segment, valid, cutoff)
+def motion_table(recording: Table, settings: FilterSettings) -> Table:
+    """Return the ``motion/1`` table of a recording in memory."""
+    motion = filtered(recording, settings)
+    return Table(pa.concat_tables(motion.pieces()).to_pandas(), motion.metadata, recording.path)
 
 
-def _cutoff(time: NDArray, angle: NDArray, rate_hz: float, settings: FilterSettings, names: tuple[str, ...]) -> Cutoff:
+def _cutoff(recording: Rows, stretches: Stretches, rate_hz: float, settings: FilterSettings) -> Cutoff:
     if settings.cutoff_hz == "auto":
-        if len(time) < 2 * shortest(rate_hz, rate_hz / 8):
+        samples = int(stretches.samples[stretches.longest])
+        if samples < 2 * shortest(rate_hz, rate_hz / 8):
             raise InputError(
-                f"the longest stretch without a gap has {_count(len(time))}, too few to choose a cut-off from; "
+                f"the longest stretch without a gap has {_count(samples)}, too few to choose a cut-off from; "
                 "record longer runs, or set filter.cutoff_hz"
             )
-        return choose_cutoff(_on_grid(time, angle, rate_hz)[1], rate_hz, names)
+        names = tuple(joint.name for joint in recording.joints)
+        return choose_cutoff(_on_grid(recording, stretches, rate_hz), samples, rate_hz, names)
     if settings.cutoff_hz >= rate_hz / 2:
         raise InputError(
             f"filter.cutoff_hz is {settings.cutoff_hz:g}, expected less than half the sample rate of "
@@ -131,22 +125,91 @@ def _cutoff(time: NDArray, angle: NDArray, rate_hz: float, settings: FilterSetti
     return Cutoff(settings.cutoff_hz, "set by hand")
 
 
+def _refuse_stretches_that_are_all_edge(stretches: Stretches, rate_hz: float, cutoff: Cutoff) -> None:
+    edge = _edge(rate_hz, cutoff.hz)
+    longest = int(stretches.samples[stretches.longest])
+    if longest <= 2 * edge or longest < shortest(rate_hz, cutoff.hz):
+        raise InputError(
+            f"no stretch without a gap lasts the {2 * edge / rate_hz:.2f} s that a {cutoff.hz:.1f} Hz filter needs; "
+            "the longest has "
+            f"{_count(longest)}: record longer runs, or raise filter.cutoff_hz"
+        )
+
+
+def _edge(rate_hz: float, cutoff_hz: float) -> int:
+    return int(np.ceil(EDGE_PERIODS * rate_hz / cutoff_hz))
+
+
 def _count(samples: int) -> str:
     return "1 sample" if samples == 1 else f"{samples} samples"
 
 
-def _filtered(time: NDArray, angle: NDArray, rate_hz: float, cutoff_hz: float, order: int) -> list[NDArray]:
-    """Return angle, velocity and acceleration of one stretch at its own times."""
-    grid, uniform = _on_grid(time, angle, rate_hz)
-    smooth = low_pass(uniform, rate_hz, cutoff_hz, order)
-    states = [smooth, derivative(smooth, rate_hz, 1), derivative(smooth, rate_hz, 2)]
-    return states if grid is time else [CubicSpline(grid, state)(time) for state in states]
+def _on_grid(recording: Rows, stretches: Stretches, rate_hz: float) -> Iterator[NDArray]:
+    """Yield the angles (n, J) of the longest stretch at uniform times."""
+    s = stretches.longest
+    grid = _Grid(stretches, s, rate_hz)
+    names = ["time_s", *(joint.column("angle") for joint in recording.joints)]
+    for window in windows(recording.pieces(names), WINDOW, SPLINE_REACH):
+        time, angle = _time_and_angle(window.rows, recording.joints)
+        here = _rows_of(s, stretches, window)
+        first, last = max(here.start, window.core.start), min(here.stop, window.core.stop)
+        if first < last:
+            ends = window.first + last == stretches.stop[s]
+            yield grid.between(time[here], angle[here], time[first], np.inf if ends else time[last])
 
 
-def _on_grid(time: NDArray, angle: NDArray, rate_hz: float) -> tuple[NDArray, NDArray]:
-    """Return uniform times and the angles there; the samples themselves where they are uniform already."""
-    grid = time[0] + np.arange(len(time)) / rate_hz
-    if np.max(np.abs(time - grid)) < JITTER / rate_hz:
-        return time, angle
-    grid = time[0] + np.arange(int((time[-1] - time[0]) * rate_hz) + 1) / rate_hz
-    return grid, CubicSpline(time, angle)(grid)
+def _rows_of(s: int, stretches: Stretches, window: Window) -> slice:
+    """Return where in a window's rows a stretch is."""
+    rows = window.rows.num_rows
+    return slice(*(int(np.clip(row - window.first, 0, rows)) for row in (stretches.start[s], stretches.stop[s])))
+
+
+def _time_and_angle(rows: pa.Table, joints: Sequence[Joint]) -> tuple[NDArray, NDArray]:
+    return rows["time_s"].to_numpy(), np.column_stack([rows[joint.column("angle")].to_numpy() for joint in joints])
+
+
+def _motion_columns(
+    rows: pa.Table, joints: Sequence[Joint], states: Sequence[NDArray], segment: NDArray, valid: NDArray
+) -> pa.Table:
+    """Put what was computed beside what was recorded, in the order of ``motion/1``."""
+    columns: dict[str, Any] = {"time_s": rows["time_s"]}
+    q, dq, ddq = states
+    for j, joint in enumerate(joints):
+        columns[joint.column("angle")] = q[:, j]
+        columns[joint.column("angle_measured")] = rows[joint.column("angle")]
+        columns[joint.column("velocity")] = dq[:, j]
+        columns[joint.column("acceleration")] = ddq[:, j]
+        if joint.column("velocity") in rows.column_names:
+            columns[joint.column("velocity_measured")] = rows[joint.column("velocity")]
+    columns |= {name: rows[name] for name in rows.column_names if name not in columns}
+    return pa.table({**columns, "segment": segment, "valid": valid})
+
+
+class _Grid:
+    """The uniform times of one stretch, at which a filter with one transfer function is defined."""
+
+    def __init__(self, stretches: Stretches, number: int, rate_hz: float) -> None:
+        self._origin_s = stretches.origin_s[number]
+        self._uniform = stretches.uniform[number]
+        self._rate_hz = rate_hz
+
+    def filtered(self, time: NDArray, angle: NDArray, cutoff_hz: float, order: int) -> list[NDArray]:
+        """Return angle, velocity and acceleration at the samples' own times (n,)."""
+        grid, uniform = self._sampled(time, angle)
+        smooth = low_pass(uniform, self._rate_hz, cutoff_hz, order)
+        states = [smooth, derivative(smooth, self._rate_hz, 1), derivative(smooth, self._rate_hz, 2)]
+        return states if self._uniform else [CubicSpline(grid, state)(time) for state in states]
+
+    def between(self, time: NDArray, angle: NDArray, begin_s: float, end_s: float) -> NDArray:
+        """Return the angles at those uniform times that lie in ``begin_s`` to ``end_s``, that not included."""
+        grid, uniform = self._sampled(time, angle)
+        return uniform[(grid >= begin_s) & (grid < end_s)]
+
+    def _sampled(self, time: NDArray, angle: NDArray) -> tuple[NDArray, NDArray]:
+        """Return uniform times and the angles there; the samples themselves where they are uniform already."""
+        if self._uniform:
+            return time, angle
+        first = int(np.ceil((time[0] - self._origin_s) * self._rate_hz))
+        last = int((time[-1] - self._origin_s) * self._rate_hz)
+        grid = self._origin_s + np.arange(first, last + 1) / self._rate_hz
+        return grid, CubicSpline(time, angle)(grid)

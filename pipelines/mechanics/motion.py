@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +76,10 @@ class Motion:
         """What a file computed from this motion says of its joints."""
         return [{"name": joint.name, "kind": joint.kind} for joint in joints_of(self.metadata)]
 
+    def pieces(self, margin: int) -> Iterator["Piece"]:
+        """Yield the run in pieces of which each knows ``margin`` samples to both sides: here one, for all is there."""
+        yield Piece(self, slice(0, len(self)), 0)
+
     def joint_index(self, joint: str) -> int:
         """Return the column of a joint in q, dq, ddq and torque."""
         return self.joints.index(joint)
@@ -139,6 +143,16 @@ class Motion:
         # The torques are the same, and smoothing them costs more than the correction did.
         made.__dict__.update({name: self.__dict__[name] for name in LOADS if name in self.__dict__})
         return made
+
+
+class Piece(NamedTuple):
+    """Some of a run: the samples that it is about, and their neighbours."""
+
+    motion: Motion
+    core: slice
+    """The samples it is about."""
+    before: int
+    """Samples of the motion's first segment that came before the motion."""
 
 
 def geometry_of(metadata: dict[str, Any], default: Geometry | None = None) -> Geometry:

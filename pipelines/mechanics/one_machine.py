@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 from pipelines.errors import InputError
-from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.run import Run
 
 
-def refuse_several_machines(motions: Sequence[Motion]) -> None:
+def refuse_several_machines(motions: Sequence[Run]) -> None:
     """Refuse motions whose joints or geometry differ from the first one's."""
     first = motions[0]
     for other in motions[1:]:

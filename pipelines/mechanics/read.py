@@ -6,10 +6,12 @@ from pathlib import Path
 
 from pipelines.contracts import MOTION, RECORDING, contract_of
 from pipelines.contracts.provenance import sha256
+from pipelines.contracts.table import Rows
 from pipelines.errors import InputError
-from pipelines.mechanics.kinematics import motion_table
+from pipelines.mechanics.kinematics import filtered, motion_table
 from pipelines.mechanics.leg import Geometry
 from pipelines.mechanics.motion import Motion, motion_from_table
+from pipelines.mechanics.run import StoredRun
 from pipelines.settings.filter import FilterSettings
 from pipelines.settings.mechanism import MechanismSettings
 
@@ -35,15 +37,33 @@ def read_motions(
 
     Files of one name in several folders are told apart by their paths.
     """
+    _refuse_twins(paths)
+    motions = [read_motion(path, settings, default_geometry) for path in paths]
+    return [replace(motion, file=name) for motion, name in zip(motions, _told_apart(paths), strict=True)]
+
+
+def read_runs(paths: Sequence[Path], settings: FilterSettings, default_geometry: Geometry) -> list[StoredRun]:
+    """Return the runs in several files as ``read_motions`` does, but read, and filtered, piece by piece."""
+    _refuse_twins(paths)
+    return [
+        StoredRun(_motion_rows(path, settings), default_geometry, name)
+        for path, name in zip(paths, _told_apart(paths), strict=True)
+    ]
+
+
+def _motion_rows(path: Path, settings: FilterSettings) -> Rows:
+    return filtered(RECORDING.scan(path), settings) if contract_of(path) is RECORDING else MOTION.scan(path)
+
+
+def _refuse_twins(paths: Sequence[Path]) -> None:
     seen: dict[str, Path] = {}
     for path in paths:
         if path.is_file():
             twin = seen.setdefault(sha256(path), path)
             if twin is not path:
                 raise InputError(f"{path} holds the same data as {twin}; give each run once")
-    motions = [read_motion(path, settings, default_geometry) for path in paths]
+
+
+def _told_apart(paths: Sequence[Path]) -> list[str]:
     names = [path.name for path in paths]
-    return [
-        motion if names.count(path.name) == 1 else replace(motion, file=str(path))
-        for path, motion in zip(paths, motions, strict=True)
-    ]
+    return [path.name if names.count(path.name) == 1 else str(path) for path in paths]

@@ -36,10 +36,14 @@ class BlockAverage:
             "kind": "block_average", "order": 1, "cutoff_hz": self.cutoff_hz(rate_hz), "decimation": self.decimation,
         }  # fmt: skip
 
-    def starts(self, segment: NDArray) -> NDArray:
-        """Return the first sample of each whole block, given each sample's segment number (n,)."""
+    def starts(self, segment: NDArray, before: int = 0) -> NDArray:
+        """Return the first sample of each whole block, given each sample's segment number (n,).
+
+        Where the first segment began earlier, ``before`` samples of it have gone already.
+        """
         first = np.flatnonzero(np.diff(segment, prepend=segment[0] - 1))
         last = np.append(first[1:], len(segment))
+        first[0] = -before % self.decimation
         width = self.decimation
         return np.concatenate([np.arange(a, b - width + 1, width) for a, b in zip(first, last, strict=True)])
 

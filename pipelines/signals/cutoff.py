@@ -1,11 +1,13 @@
 """Where a signal ends and its noise begins: the cut-off a low-pass should have."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
-from scipy.signal import welch
+
+from pipelines.signals.welch import Welch
 
 WINDOW_S = 10.0
 NOISE_BAND = (0.6, 0.96)
@@ -43,13 +45,8 @@ class Spectrum:
     """Frequency below which nearly all of the signal's power lies."""
 
 
-def spectrum(x: NDArray, rate_hz: float) -> Spectrum:
-    """Estimate the spectrum of uniform samples (n,) and find where it sinks into its noise floor.
-
-    A Blackman-Harris window, because the leakage of the slow motion would otherwise hide the floor.
-    """
-    length = min(len(x), int(WINDOW_S * rate_hz))
-    frequency, density = welch(x, rate_hz, window="blackmanharris", nperseg=length, detrend="linear")
+def spectrum(frequency: NDArray, density: NDArray, rate_hz: float) -> Spectrum:
+    """Find where the spectrum of one channel, both arrays (f,), sinks into its noise floor."""
     nyquist = rate_hz / 2
     band = (frequency >= NOISE_BAND[0] * nyquist) & (frequency <= NOISE_BAND[1] * nyquist)
     floor = float(np.median(density[band]))
@@ -63,13 +60,16 @@ def spectrum(x: NDArray, rate_hz: float) -> Spectrum:
     return Spectrum(frequency, density, floor, float(meets), float(min(motion, meets)))
 
 
-def choose_cutoff(x: NDArray, rate_hz: float, channels: tuple[str, ...]) -> Cutoff:
-    """Choose one cut-off for all channels of ``x`` (n, channels).
+def choose_cutoff(pieces: Iterable[NDArray], samples: int, rate_hz: float, channels: tuple[str, ...]) -> Cutoff:
+    """Choose one cut-off for all channels of a signal that comes in pieces (n, channels), ``samples`` in all.
 
     The noisiest channel decides, for the acceleration of one joint stands in the torque of both; but twice the
     frequency of the fastest motion passes, whatever the noise.
     """
-    found = [spectrum(column, rate_hz) for column in x.T]
+    welch = Welch(rate_hz, min(samples, int(WINDOW_S * rate_hz)))
+    for piece in pieces:
+        welch.add(piece)
+    found = [spectrum(welch.frequency_hz, density, rate_hz) for density in welch.density.T]
     highest = HIGHEST_SHARE * rate_hz / 2
     noisiest = int(np.argmin([s.meets_floor_hz for s in found]))
     meets = found[noisiest].meets_floor_hz
@@ -81,4 +81,4 @@ def choose_cutoff(x: NDArray, rate_hz: float, channels: tuple[str, ...]) -> Cuto
         return Cutoff(needed, f"{said}, but the {channels[fastest]} moves at up to {needed / 2:.1f} Hz")
     if chosen > highest:
         return Cutoff(highest, f"{said}; above a sixteenth of the sample rate is only what reversals leave")
-    return Cutoff(max(chosen, 2.0 * rate_hz / len(x)), f"{said}; in acceleration noise outweighs signal before that")
+    return Cutoff(max(chosen, 2.0 * rate_hz / samples), f"{said}; in acceleration noise outweighs signal before that")

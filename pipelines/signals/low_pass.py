@@ -10,6 +10,20 @@ ORDER = 4
 DERIVATIVE_STENCIL = 5
 """Samples in the difference formula: exact for polynomials of degree 4."""
 
+NEGLIGIBLE = 1e-18
+"""Of a cut in the data, what the filter may still feel of it: less than rounding."""
+
+
+def reach(rate_hz: float, cutoff_hz: float, order: int = ORDER) -> int:
+    """Return how many samples away a cut in the data is no longer felt: it fades as the slowest pole does."""
+    _, poles, _ = butter(order, cutoff_hz, fs=rate_hz, output="zpk")
+    fading = int(np.ceil(np.log(NEGLIGIBLE) / np.log(np.max(np.abs(poles)))))
+    return max(fading, shortest(rate_hz, cutoff_hz), _padding(rate_hz, cutoff_hz)) + DERIVATIVE_STENCIL
+
+
+def _padding(rate_hz: float, cutoff_hz: float) -> int:
+    return int(3 * rate_hz / cutoff_hz)
+
 
 def shortest(rate_hz: float, cutoff_hz: float) -> int:
     """Return the fewest samples a stretch needs to be filtered: one time constant's padding on each side."""
@@ -27,7 +41,7 @@ def low_pass(x: NDArray, rate_hz: float, cutoff_hz: float, order: int = ORDER) -
         Sample rate; frequency at which one pass has fallen by 3 dB, below half the sample rate.
     """
     sections = butter(order, cutoff_hz, fs=rate_hz, output="sos")
-    padding = min(len(x) - 1, int(3 * rate_hz / cutoff_hz))
+    padding = min(len(x) - 1, _padding(rate_hz, cutoff_hz))
     return np.ascontiguousarray(sosfiltfilt(sections, x, axis=0, padlen=padding))
 
 

@@ -9,6 +9,7 @@ from numpy.testing import assert_array_equal
 
 from pipelines.contracts import RECORDING
 from pipelines.identification import identify
+from pipelines.identification.validation import residuals
 from pipelines.mechanics.read import read_motions
 from tests.blind.cases import Case
 from tests.blind.causes import CAUSES, FORMS
@@ -36,8 +37,10 @@ def faultless(tmp_path_factory):
 
 def test_exoid_fits_a_faultless_session_to_its_noise(faultless):
     session, paths = faultless
-    found = identify(read_motions(paths))
-    scored = found.residuals[found.residuals["scored"] & (found.residuals["purpose"] == "validate")]
+    runs = read_motions(paths)
+    found = identify(runs)
+    left = pa.concat_tables(residuals(runs, found.models, "baseline")).to_pandas()
+    scored = left[left["scored"] & (left["purpose"] == "validate")]
     floor = noise_floor(session.rig, session.of("validate"))
     for joint, noise in zip(("hip", "knee"), floor, strict=True):
         assert np.sqrt(np.mean(scored[f"{joint}_residual_nm"] ** 2)) == pytest.approx(noise, rel=0.05)

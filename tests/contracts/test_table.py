@@ -337,7 +337,7 @@ def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(
     RECORDING.write(path, swinging_leg, run_metadata)
     before = path.read_bytes()
 
-    def half_written(writer, table):
+    def half_written(writer, table, **options):
         raise error
 
     monkeypatch.setattr(storage.pq.ParquetWriter, "write_table", half_written)

@@ -13,7 +13,7 @@ from pipelines.effects.friction import Friction
 from pipelines.effects.joint_elasticity import MOTOR_INERTIA
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.effects.rotor_inertia import RotorInertia
-from pipelines.estimation.regression import regress
+from pipelines.estimation.regression import regressions
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table
 from pipelines.model import Model, Term
@@ -42,7 +42,7 @@ def moved(run, *terms):
 
 
 def scored(motion, model):
-    regression = regress(motion, model)
+    (regression,) = regressions(motion, model)
     rows = regression.scored
     return regression.regressor[rows], regression.torque[rows]
 

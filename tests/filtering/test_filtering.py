@@ -1,32 +1,32 @@
+from dataclasses import dataclass
+
 import numpy as np
-import pandas as pd
+import pyarrow as pa
 import pytest
 from numpy.testing import assert_allclose
 
 from pipelines.contracts import MOTION
 from pipelines.contracts.table import Table
 from pipelines.errors import InputError
-from pipelines.filtering import filter_recording
+from pipelines.filtering import Summary, filtered
 from pipelines.settings.filter import FilterSettings
-
-RATE_HZ = 200.0
-W = 2 * np.pi * 0.5
+from tests.filtering.recordings import W, grid, recording
 
 
-def recording(time, noise_rad=0.0, **metadata):
-    rng = np.random.default_rng(0)
-    angle = {joint: a * np.sin(W * time + a) for joint, a in (("hip", 0.5), ("knee", 0.7))}
-    frame = pd.DataFrame({"time_s": time})
-    for joint, q in angle.items():
-        frame[f"{joint}_angle_rad"] = q + noise_rad * rng.standard_normal(len(time))
-        frame[f"{joint}_torque_nm"] = rng.standard_normal(len(time))
-        frame[f"{joint}_velocity_rad_s"] = np.gradient(q, time)
-    described = {"run": "exo_alone", "purpose": "train", "sample_rate_hz": RATE_HZ, **metadata}
-    return Table(frame, described)
+@dataclass
+class Filtered:
+    """A motion whole, and what is said of it."""
+
+    motion: Table
+    segments: int
+    cutoff_hz: float
 
 
-def grid(seconds):
-    return np.arange(0, seconds, 1 / RATE_HZ)
+def filter_recording(table, settings):
+    motion = filtered(table, settings)
+    summary = Summary(motion)
+    pieces = list(summary.passing(motion.pieces()))
+    return Filtered(Table(pa.concat_tables(pieces).to_pandas(), motion.metadata), summary.segments, summary.cutoff_hz)
 
 
 def test_velocity_and_acceleration_are_those_of_the_motion():

@@ -1,10 +1,21 @@
 import numpy as np
 import pytest
 
-from pipelines.signals.cutoff import choose_cutoff, spectrum
+from pipelines.signals import cutoff
+from pipelines.signals.welch import Welch
 
 RATE_HZ = 200.0
 TIME = np.arange(0, 40, 1 / RATE_HZ)
+
+
+def spectrum(x, rate_hz):
+    welch = Welch(rate_hz, int(cutoff.WINDOW_S * rate_hz))
+    welch.add(x[:, np.newaxis])
+    return cutoff.spectrum(welch.frequency_hz, welch.density[:, 0], rate_hz)
+
+
+def choose_cutoff(x, rate_hz, channels):
+    return cutoff.choose_cutoff([x], len(x), rate_hz, channels)
 
 
 def moving(harmonics=5, base_hz=0.2):

@@ -1,0 +1,37 @@
+"""Windows over a table that comes piece by piece: rows one after the other, each with its neighbours."""
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import pyarrow as pa
+
+
+class Window(NamedTuple):
+    """Some rows of a table, and which of them it is about; the others, before and after, are its margin."""
+
+    rows: pa.Table
+    first: int
+    """Number of its first row in the whole table."""
+    core: slice
+    """Of ``rows``."""
+
+    def kept(self, table: pa.Table) -> pa.Table:
+        """Return the core of a table that has been made of ``rows``, row by row."""
+        return table.slice(self.core.start, self.core.stop - self.core.start)
+
+
+def windows(pieces: Iterable[pa.Table], length: int, margin: int) -> Iterator[Window]:
+    """Yield windows whose cores, ``length`` rows each but for the last, are the whole table.
+
+    ``margin`` rows stand before and after the core, fewer only where the table begins or ends.
+    """
+    held: pa.Table | None = None
+    first = start = 0
+    for piece in pieces:
+        held = piece if held is None else pa.concat_tables([held, piece])
+        while held.num_rows >= start + length + margin:
+            yield Window(held.slice(0, start + length + margin), first, slice(start, start + length))
+            passed = max(0, start + length - margin)
+            held, first, start = held.slice(passed), first + passed, start + length - passed
+    if held is not None and held.num_rows > start:
+        yield Window(held, first, slice(start, held.num_rows))

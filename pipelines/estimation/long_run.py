@@ -1,0 +1,95 @@
+"""The covariance of a sum of autocorrelated scores, which come piece by piece.
+
+Residuals of a moving leg are autocorrelated, and the textbook covariance, which takes every sample for
+news, then covers the truth 27 % of the time instead of 95 %. Here it is the long-run covariance of the
+scores (Newey and West, 1987, Econometrica 55(3); lag chosen after Andrews, 1991, Econometrica 59(3));
+critical values allow for the lag's length (Kiefer and Vogelsang, 2005, Econometric Theory 21(6)).
+"""
+
+from collections.abc import Callable, Hashable, Iterable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+Scores = Callable[[], Iterable[tuple[Hashable, NDArray]]]
+"""Goes through the scores from the first on each time it is called: an unbroken stretch's name and its next scores
+(m, p). What follows under the same name goes on where it ended."""
+
+
+def long_run_covariance(scores: Scores, parameters: int) -> tuple[NDArray, float]:
+    """Sum the scores' autocovariances with Bartlett weights; nothing is multiplied across a gap.
+
+    Parameters
+    ----------
+    scores : callable
+        Gone through twice: for the lag, and for the sum.
+    parameters : int
+        Fitted parameters, for the loss of degrees of freedom.
+
+    Returns
+    -------
+    (p, p) covariance of the scores' sum, and the critical value that goes with its lag.
+    """
+    lag, total = _lag(scores)
+    S = _bartlett(scores, lag)
+    share = (lag + 1) / total
+    critical = 1.96 + 2.9694 * share + 0.4160 * share**2 - 0.5324 * share**3
+    return S * total / max(total - parameters, 1), critical
+
+
+def _bartlett(scores: Scores, lag: int) -> NDArray:
+    """Return the sum of s_t s_u' (1 - |t - u| / (lag + 1)) over all t and u of a stretch no more than ``lag`` apart.
+
+    It is the mean square of running sums over lag + 1 scores, zeros before and after the stretch: each product
+    stands in as many of them as its weight says. That takes one step a score, whatever the lag.
+    """
+    S: NDArray | float = 0.0
+    for x in _led(scores, lag):
+        reached = np.cumsum(x, axis=0)
+        running = reached[lag:].copy()
+        running[1:] -= reached[: len(x) - lag - 1]
+        S = S + running.T @ running
+    return np.asarray(S / (lag + 1))
+
+
+def _led(scores: Scores, lag: int) -> Iterator[NDArray]:
+    """Yield each piece behind the ``lag`` scores before it, and after a stretch's last as many zeros."""
+    name, before = None, np.zeros((0, 0))
+    for stretch, x in scores():
+        silence = np.zeros((lag, x.shape[1]))
+        if stretch != name:
+            if len(before):
+                yield np.concatenate([before, silence])
+            name, before = stretch, silence
+        joined = np.concatenate([before, x])
+        yield joined
+        before = joined[len(joined) - lag :]
+    if len(before):
+        yield np.concatenate([before, np.zeros_like(before)])
+
+
+def _lag(scores: Scores) -> tuple[int, int]:
+    """Return Andrews' lag for first-order autocorrelation, and how many rows there are.
+
+    Each column weighs alike whatever its unit.
+    """
+    name, last = None, np.zeros((0, 0))
+    total, together, earlier, later = 0, 0.0, 0.0, 0.0
+    for stretch, x in scores():
+        total += len(x)
+        joined = x if stretch != name else np.concatenate([last, x])
+        now, before = joined[1:], joined[:-1]
+        together = together + np.sum(now * before, axis=0)
+        earlier = earlier + np.sum(before**2, axis=0)
+        later = later + np.sum(now**2, axis=0)
+        name, last = stretch, joined[-1:]
+    moved = np.asarray(earlier) > 0.0
+    if not moved.any():
+        return 0, total
+    power = np.asarray(earlier)[moved]
+    rho = np.clip(np.asarray(together)[moved] / power, -0.97, 0.97)
+    # Of the innovations, over the score's own: scores have the units of their parameters.
+    variance = (np.asarray(later)[moved] - 2.0 * rho * np.asarray(together)[moved]) / power + rho**2
+    above = np.sum(4 * rho**2 * variance**2 / ((1 - rho) ** 6 * (1 + rho) ** 2))
+    below = np.sum(variance**2 / (1 - rho) ** 4)
+    return min(int(np.ceil(1.1447 * (above / below * total) ** (1 / 3))), total // 4), total

@@ -1,0 +1,95 @@
+"""The unbroken stretches of a recording: where its gaps are, and whether its samples keep to a uniform grid."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.errors import InputError
+
+GAP = 1.5
+"""Sample periods between two samples that make a gap, unless it is bridged."""
+BRIDGED_S = 0.022
+"""A shorter hole is interpolated: no leg does anything in it, and a bus that loses a sample here and there, or a
+clock that stamps one late, would otherwise leave no stretch long enough to be filtered."""
+JITTER = 0.02
+"""Share of a sample period a sample may stray from the uniform grid before it is interpolated."""
+
+
+@dataclass(frozen=True)
+class Stretches:
+    """All stretches of a recording, in their order; every array (s,)."""
+
+    start: NDArray
+    """Row of the first sample."""
+    stop: NDArray
+    """Row after the last."""
+    origin_s: NDArray
+    """Time of the first sample."""
+    uniform: NDArray
+    """True where every sample is at its place on a grid of the nominal rate, which begins with the first one."""
+
+    def __len__(self) -> int:
+        """Return the number of stretches."""
+        return len(self.start)
+
+    @property
+    def samples(self) -> NDArray:
+        """How many each has."""
+        return self.stop - self.start
+
+    @property
+    def longest(self) -> int:
+        """Number of the longest, the first of equals."""
+        return int(np.argmax(self.samples))
+
+    def overlapping(self, first: int, last: int) -> range:
+        """Return the numbers of those that have a row in ``first`` to ``last``, ``last`` not included."""
+        return range(int(np.searchsorted(self.stop, first, "right")), int(np.searchsorted(self.start, last, "left")))
+
+
+def find_stretches(times: Iterable[NDArray], rate_hz: float) -> Stretches:
+    """Find the stretches of a recording whose times (s, strictly increasing) come piece by piece.
+
+    Raises
+    ------
+    InputError
+        Where the times do not advance at about ``rate_hz``.
+    """
+    starts: list[int] = []
+    origins: list[float] = []
+    strayed: list[float] = []
+    steps: list[float] = []
+    row, start, origin, stray, before = 0, 0, np.nan, 0.0, -np.inf
+    for time in times:
+        step = np.diff(time, prepend=before)
+        steps += [float(np.median(step[np.isfinite(step)]))] if np.isfinite(step).any() else []
+        begins = np.flatnonzero(step > max(GAP / rate_hz, BRIDGED_S))
+        # What goes on from the piece before stands first, though no row of it may follow here.
+        start_of, origin_of = np.append(start, row + begins), np.append(origin, time[begins])
+        number = np.searchsorted(begins, np.arange(len(time)), "right")
+        grid = origin_of[number] + (row + np.arange(len(time)) - start_of[number]) / rate_hz
+        away = np.append(stray, np.zeros(len(begins)))
+        np.maximum.at(away, number, np.abs(time - grid))
+        starts.extend(start_of[1:])
+        origins.extend(origin_of[1:])
+        strayed.extend(away[:-1])
+        row, start, origin, stray, before = row + len(time), start_of[-1], origin_of[-1], away[-1], time[-1]
+    _refuse_another_rate(steps, rate_hz)
+    return Stretches(
+        start=np.array(starts, dtype=np.int64),
+        stop=np.array([*starts[1:], row], dtype=np.int64),
+        origin_s=np.array(origins),
+        # The first is what went before the first row: nothing.
+        uniform=np.array([*strayed[1:], stray]) < JITTER / rate_hz,
+    )
+
+
+def _refuse_another_rate(steps: list[float], rate_hz: float) -> None:
+    step = float(np.median(steps)) if steps else 1.0 / rate_hz
+    if not 0.5 < 1.0 / (step * rate_hz) < 2.0:
+        raise InputError(
+            f"metadata sample_rate_hz is {rate_hz:g}, but time_s advances by {step:g} s "
+            f"({1.0 / step:g} Hz); correct the one that is wrong"
+        )

@@ -1,0 +1,44 @@
+"""The power spectral density of a signal that comes piece by piece (Welch, 1967, IEEE Trans. Audio 15(2))."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import welch
+
+
+class Welch:
+    """An average over windows that overlap by half, across the pieces as if they were one.
+
+    A Blackman-Harris window, because the leakage of a slow motion would otherwise hide the noise floor.
+
+    Parameters
+    ----------
+    length : int
+        Samples in a window.
+    """
+
+    def __init__(self, rate_hz: float, length: int) -> None:
+        self._rate_hz = rate_hz
+        self._length = length
+        self._hop = length - length // 2
+        self._rest: NDArray | None = None
+        self._total: NDArray | float = 0.0
+        self._windows = 0
+        self.frequency_hz: NDArray = np.fft.rfftfreq(length, 1.0 / rate_hz)
+
+    def add(self, x: NDArray) -> None:
+        """Take the next samples (n, channels)."""
+        x = x if self._rest is None else np.concatenate([self._rest, x])
+        windows = max(0, (len(x) - self._length) // self._hop + 1)
+        if windows:
+            whole = x[: (windows - 1) * self._hop + self._length]
+            _, density = welch(
+                whole, self._rate_hz, window="blackmanharris", nperseg=self._length, detrend="linear", axis=0
+            )
+            self._total = self._total + windows * density
+            self._windows += windows
+        self._rest = x[windows * self._hop :]
+
+    @property
+    def density(self) -> NDArray:
+        """(f, channels) unit²/Hz; at least one window's samples must have been added."""
+        return np.asarray(self._total / self._windows)
