@@ -34,8 +34,10 @@ def header(path: Path) -> tuple[pa.Schema, dict[str, Any]]:
 def pieces(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
     """Read a file's rows in their order, at most ``ROWS`` at a time; all columns, or those that are named."""
     with _opened(path) as file:
-        for batch in file.iter_batches(ROWS, columns=columns):
-            yield pa.Table.from_batches([batch])
+        # Group by group: Arrow's reader of several keeps hold of all that it has read.
+        for group in range(file.num_row_groups):
+            for batch in file.iter_batches(ROWS, row_groups=[group], columns=columns):
+                yield pa.Table.from_batches([batch])
 
 
 def load(path: Path) -> tuple[pa.Table, dict[str, Any]]:
