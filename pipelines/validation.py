@@ -47,11 +47,21 @@ def _sentence(path: str, faults: list[dict[str, Any]], known_keys: Callable[[str
         parent, _, key = path.rpartition(".")
         known = known_keys(parent)
         return f"{path}: unknown key" + (f"; {suggestion(key, known)}" if known else "; remove it")
+    if kind == "union_tag_not_found":
+        return f"{path}.{_discriminator(faults[0])}: missing; add it"
+    if kind == "union_tag_invalid":
+        found, known = faults[0]["ctx"]["tag"], faults[0]["ctx"]["expected_tags"]
+        return f"{path}.{_discriminator(faults[0])}: found {found!r}, expected one of {known}"
     if kind == "value_error":
         return f"{path}: {faults[0]['ctx']['error']}" if path else str(faults[0]["ctx"]["error"])
     # A union ("auto" or a number) complains once for each of its members.
     expected = " or ".join(dict.fromkeys(_expectation(fault["msg"]) for fault in faults))
     return f"{path}: found {_found(faults[0]['input'])}, expected {expected}"
+
+
+def _discriminator(fault: dict[str, Any]) -> str:
+    """Return the key that chooses among the kinds a table can be of."""
+    return fault["ctx"]["discriminator"].strip("'")
 
 
 def _key_path(fault: Any, data: Any) -> str:

@@ -1,17 +1,17 @@
-"""A Modbus device: one connection, one request at a time, and every way to fail turned into one sentence."""
+"""A Modbus device: what can be asked of it, and every way to fail turned into one sentence."""
 
 from collections.abc import Awaitable, Callable, Iterable, Sequence
 from typing import Any
 
-from pymodbus.client import AsyncModbusTcpClient
 from pymodbus.constants import ExcCodes
 from pymodbus.exceptions import ModbusException
 from pymodbus.pdu import ModbusPDU
 
-from pipelines.acquisition.reply import NoReply, check_replies
+from pipelines.acquisition.line import Line
+from pipelines.acquisition.reply import NoReply
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.registers import Block
-from pipelines.settings.rig import DeviceSettings, Identity
+from pipelines.settings.rig import Identity
 
 MEANING: dict[int, str] = {
     ExcCodes.ILLEGAL_FUNCTION: "it does not know this function",
@@ -25,31 +25,16 @@ MEANING: dict[int, str] = {
 
 
 class Device:
-    """The line to one device. Requests to several devices may run side by side, to one they may not."""
+    """One device on a line. Several may be asked side by side; those on one line are answered one after the other."""
 
-    def __init__(self, name: str, settings: DeviceSettings, timeout_s: float, reply_s: float) -> None:
-        """Describe the line; while the leg moves a reply is awaited for ``reply_s``, else for ``timeout_s``."""
-        self.label = f"{name} ({settings.host}:{settings.port}, unit {settings.unit})"
-        self._unit = settings.unit
+    def __init__(self, name: str, unit: int, line: Line, timeout_s: float, reply_s: float) -> None:
+        """Join a line; while the leg moves a reply is awaited for ``reply_s``, else for ``timeout_s``."""
+        self.label = line.join(name, unit)
+        self.line = line
+        self._client = line.client
+        self._unit = unit
         self._timeout_s = timeout_s
         self._reply_s = reply_s
-        # Never a second try: a set-point that comes late is no set-point, and an exchange may move the leg.
-        self._client = AsyncModbusTcpClient(
-            settings.host, port=settings.port, timeout=timeout_s, retries=0, reconnect_delay=0
-        )
-        check_replies(self._client)
-
-    async def connect(self) -> None:
-        """Open the connection."""
-        self._client.ctx.comm_params.timeout_connect = self._timeout_s
-        if not await self._client.connect():
-            raise DeviceError(
-                f"{self.label}: refuses the connection; check that the rig is on, and host and port in the rig file"
-            )
-
-    def close(self) -> None:
-        """Close the connection; nothing happens where there is none."""
-        self._client.close()
 
     async def check_identity(self, identity: Iterable[Identity]) -> None:
         """Refuse a device that is not the one that the rig file describes."""
@@ -99,10 +84,8 @@ class Device:
         **arguments: Any,
     ) -> list[int]:
         """Send a request and return the words of the answer, ``words`` of them where it is to bring any."""
-        # The one place where pymodbus looks for how long to wait, be it for a connection or for an answer.
-        self._client.ctx.comm_params.timeout_connect = within_s
         try:
-            response = await request(**arguments, device_id=self._unit)
+            response = await self.line.ask(within_s, request, **arguments, device_id=self._unit)
         except (ModbusException, OSError) as error:
             silent = Unanswered if self._client.connected else DeviceError
             raise silent(

@@ -7,9 +7,11 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from pipelines.errors import DeviceError, SettingsError
 from pipelines.settings.acquire import RunSettings
+from pipelines.settings.line import TcpLine
 from pipelines.settings.rig import RigSettings
 
 START_S = 180.0
@@ -19,7 +21,7 @@ END_S = 3.0
 
 @contextmanager
 def embedded(rig: RigSettings, path: Path, run: RunSettings, sample_rate_hz: float) -> Iterator[RigSettings]:
-    """Run the virtual rig of a file; yields the rig's settings with the port that its devices listen on."""
+    """Run the virtual rig of a file; yields the rig's settings with the places where its devices are."""
     command = [
         sys.executable, "-m", "exoid_cli.app", "rig", "serve", str(path), "--run", run.run, "--seed", str(run.seed),
         "--sample-rate-hz", str(sample_rate_hz), "--port", "0", "--until-input-ends",
@@ -28,22 +30,22 @@ def embedded(rig: RigSettings, path: Path, run: RunSettings, sample_rate_hz: flo
         # A session of its own: Ctrl-C is for whoever moves the leg, the rig must live to be stopped safely.
         # It ends with its input, which the system closes even where this process is killed.
         process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=complaints, start_new_session=True
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=complaints, start_new_session=True, bufsize=0
         )
         try:
-            port = _port(process, path, complaints)
-            yield _at(rig, port)
+            lines = len({device.line for device in (*rig.drive, *rig.sensor)})
+            yield _at(rig, dict(_place(process, path, complaints) for _ in range(lines)))
         finally:
             _end(process)
 
 
-def _port(process: subprocess.Popen, path: Path, complaints) -> int:
-    """Wait for the line in which the rig says where it listens."""
+def _place(process: subprocess.Popen, path: Path, complaints) -> tuple[str | None, str]:
+    """Wait until the rig says where devices are; return the name of their line, None for those on none, and the place."""
     assert process.stdout is not None  # it was asked for
     ready, _, _ = select.select([process.stdout], [], [], START_S)
-    line = process.stdout.readline().decode() if ready else ""
-    if ":" in line:
-        return int(line.rpartition(":")[2])
+    if line := process.stdout.readline().decode().strip() if ready else "":
+        name, _, place = line.rpartition(" ")
+        return name or None, place
     _end(process)
     complaints.seek(0)
     said = complaints.read().decode(errors="replace").strip()
@@ -56,15 +58,15 @@ def _port(process: subprocess.Popen, path: Path, complaints) -> int:
     raise kind(said.splitlines()[-1].removeprefix("exoid: "))
 
 
-def _at(rig: RigSettings, port: int) -> RigSettings:
-    """Return the rig with every device on a port of this machine."""
-    here = {"host": "127.0.0.1", "port": port}
-    return rig.model_copy(
-        update={
-            "drive": tuple(drive.model_copy(update=here) for drive in rig.drive),
-            "sensor": tuple(sensor.model_copy(update=here) for sensor in rig.sensor),
-        }
-    )
+def _at(rig: RigSettings, places: dict[str | None, str]) -> RigSettings:
+    """Return the rig with every device where it is found on this machine."""
+    update: dict[str, Any] = {"line": {name: line.at(places[name]) for name, line in rig.line.items()}}
+    if None in places:
+        alone = TcpLine().at(places[None]).model_dump(include={"host", "port"})
+        for kind in ("drive", "sensor"):
+            devices = getattr(rig, kind)
+            update[kind] = tuple(d if d.line else d.model_copy(update=alone) for d in devices)
+    return rig.model_copy(update=update)
 
 
 def _end(process: subprocess.Popen) -> None:

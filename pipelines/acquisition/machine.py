@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.acquisition.device import Device
+from pipelines.acquisition.line import Line, lines_of
 from pipelines.errors import DeviceError, SettingsError, Unanswered
 from pipelines.mechanics.motion import CUFFS
 from pipelines.registers import Block
@@ -60,11 +61,12 @@ class Reading:
 class Drive:
     """One drive: set-points out, readings in."""
 
-    def __init__(self, rig: RigSettings, settings: DriveSettings) -> None:
+    def __init__(self, rig: RigSettings, settings: DriveSettings, line: Line) -> None:
         self.settings = settings
         self.in_lockstep = rig.clock == "lockstep"
         self.map = rig.map.drive[settings.map]
-        self.device = Device(f"drive {settings.joint}", settings, rig.safety.watchdog_s, rig.safety.longest_reply_s)
+        safety = rig.safety
+        self.device = Device(f"drive {settings.joint}", settings.unit, line, safety.watchdog_s, safety.longest_reply_s)
         self.told = Block(registers_of(self.map.read))
         self.tell = Block(registers_of(self.map.write))
         self._counter = Block({"sequence": self.map.read.sequence})
@@ -185,10 +187,11 @@ class Drive:
 class Sensor:
     """One 3-axis force sensor."""
 
-    def __init__(self, rig: RigSettings, settings: SensorSettings) -> None:
+    def __init__(self, rig: RigSettings, settings: SensorSettings, line: Line) -> None:
         self.settings = settings
         self.map = rig.map.sensor[settings.map]
-        self.device = Device(f"sensor {settings.cuff}", settings, rig.safety.watchdog_s, rig.safety.longest_reply_s)
+        safety = rig.safety
+        self.device = Device(f"sensor {settings.cuff}", settings.unit, line, safety.watchdog_s, safety.longest_reply_s)
         self.block = Block(registers_of(self.map.read))
         self._last: float | None = None
 
@@ -231,8 +234,9 @@ class Machine:
 
     def __init__(self, rig: RigSettings, *, with_sensors: bool) -> None:
         self.rig = rig
-        self.drives = [Drive(rig, settings) for settings in rig.drive]
-        self.sensors = [Sensor(rig, settings) for settings in rig.sensor] if with_sensors else []
+        line_of = lines_of(rig)
+        self.drives = [Drive(rig, settings, line_of(settings)) for settings in rig.drive]
+        self.sensors = [Sensor(rig, settings, line_of(settings)) for settings in rig.sensor] if with_sensors else []
         self._parts: list[Drive | Sensor] = [*self.drives, *self.sensors]
         self._no_force = np.full((len(CUFFS), 3), np.nan)
         self._ahead = [0 for _ in self.drives]
@@ -243,7 +247,7 @@ class Machine:
     async def connect(self) -> None:
         """Open every line and make sure who is at its end."""
         for part in self._parts:
-            await part.device.connect()
+            await part.device.line.connect()
             await part.device.check_identity(part.map.identity)
 
     async def reset_faults(self) -> None:
@@ -254,7 +258,7 @@ class Machine:
     def close(self) -> None:
         """Close every line."""
         for part in self._parts:
-            part.device.close()
+            part.device.line.close()
 
     async def look(self) -> Row:
         """Read every device once, moving nothing."""

@@ -1,4 +1,4 @@
-"""The virtual rig on the wire: drives and force sensors as Modbus TCP devices, all latched at one instant.
+"""The virtual rig on the wire: drives and force sensors as Modbus devices, all latched at one instant.
 
 In lockstep a sample lasts until every drive has been exchanged once (FC23: set-point in, sample out), so a
 run depends on seeds and set-points alone. In real time samples come on the rig's own clock.
@@ -12,24 +12,23 @@ import sys
 import threading
 from collections import defaultdict
 from collections.abc import Callable, Iterable
-from contextlib import suppress
+from contextlib import AsyncExitStack, suppress
 from itertools import groupby
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 from pymodbus.constants import ExcCodes
-from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from pipelines.errors import DeviceError, SettingsError, about
+from pipelines.errors import SettingsError, about
 from pipelines.mechanics.motion import CUFFS
 from pipelines.registers import Block
-from pipelines.rig.guard import guarded
+from pipelines.rig.listening import listening
 from pipelines.rig.plant import JOINTS, Plant, Samples
 from pipelines.rig.sealed import hidden_effects
 from pipelines.rig.servo import Servo
+from pipelines.settings.line import LineSettings, RtuLine, TcpLine
 from pipelines.settings.rig import (
     DriveMap,
     DriveSettings,
@@ -40,6 +39,9 @@ from pipelines.settings.rig import (
     load_rig,
     registers_of,
 )
+
+Announce = Callable[[str, str | None], None]
+"""Told a place and whose it is: the name of a line, None for devices that are on none."""
 
 READ_WRITE = 23
 """Function code of the exchange that lockstep counts."""
@@ -224,8 +226,9 @@ async def serve(
     rig: RigSettings,
     plant: Plant,
     port: int | None,
-    announce: Callable[[str, int], None],
+    announce: Announce,
     until: asyncio.Event,
+    bind: str = "127.0.0.1",
 ) -> None:
     """Serve a rig on this machine until an event is set.
 
@@ -234,30 +237,41 @@ async def serve(
     rig : RigSettings
     plant : Plant
     port : int or None
-        One port for all devices, 0 for a free one; None for those that the rig file names.
+        One TCP port for all devices, 0 for a free one of each line; None for what the rig file names.
     announce : callable
-        Called with host and port of each server once it listens.
+        Called with the place of each server once it listens, and the name of its line, None for devices without.
     until : asyncio.Event
+    bind : str
+        Address on which TCP ports listen.
     """
     virtual = VirtualRig(rig, plant)
-    by_port: dict[int, list[SimDevice]] = defaultdict(list)
+    on_line: dict[str | None | int, list[SimDevice]] = defaultdict(list)
     for settings, device in zip((*rig.drive, *rig.sensor), (*virtual.drives, *virtual.sensors), strict=True):
-        by_port[settings.port if port is None else port].append(device.as_served())
-    servers = []
+        alone = settings.port if port is None else port
+        on_line[alone if settings.line is None else settings.line].append(device.as_served())
+    if port and len(on_line) > 1:
+        raise SettingsError(
+            f"--port: found {port} for {len(on_line)} lines, expected one line; leave it out for the places that the rig "
+            "file names, or give 0 for free ones"
+        )
     clock = None if virtual.lockstep else asyncio.ensure_future(virtual.keep_time())
     try:
-        for number, devices in by_port.items():
-            server = guarded(ModbusTcpServer(devices, address=("127.0.0.1", number)))
-            servers.append(server)
-            if not await server.listen():
-                raise DeviceError(f"127.0.0.1:{number}: cannot listen there; choose a free port with --port")
-            announce("127.0.0.1", cast(asyncio.Server, server.transport).sockets[0].getsockname()[1])
-        await until.wait()
+        async with AsyncExitStack() as servers:
+            for key, devices in on_line.items():
+                name = key if isinstance(key, str) else None
+                line = TcpLine.model_construct(port=key) if name is None else rig.line[name]
+                announce(await servers.enter_async_context(listening(_placed(line, bind, port), devices)), name)
+            await until.wait()
     finally:
         if clock:
             clock.cancel()
-        for server in servers:
-            await server.shutdown()
+
+
+def _placed(line: LineSettings, bind: str, port: int | None) -> LineSettings:
+    """Return where a line is served."""
+    if isinstance(line, RtuLine):
+        return line if port is None else line.at("")
+    return line.at(f"{bind}:{line.port if port is None else port}")
 
 
 def serve_file(
@@ -266,9 +280,10 @@ def serve_file(
     seed: int,
     port: int | None,
     sample_rate_hz: float | None,
-    announce: Callable[[str, int], None],
+    announce: Announce,
     *,
     until_input_ends: bool,
+    bind: str = "127.0.0.1",
 ) -> None:
     """Serve the rig in a file until Ctrl-C or, if asked, until standard input is closed.
 
@@ -290,7 +305,7 @@ def serve_file(
                 loop.call_soon_threadsafe(until.set)
 
             threading.Thread(target=wait, daemon=True).start()
-        await serve(rig, plant, port, announce, until)
+        await serve(rig, plant, port, announce, until, bind)
 
     if rig.clock == "real_time":
         gc.freeze()  # else looking through all that was imported would cost several samples now and then

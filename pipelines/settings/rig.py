@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
+from pydantic.main import IncEx
 
 from pipelines.settings.base import Settings, load_toml
+from pipelines.settings.line import LineSettings, TcpLine
 from pipelines.settings.plant import PlantSettings
 
 RegisterType = Literal["int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64"]
@@ -45,6 +47,7 @@ class Register(Settings):
     address: int = Field(ge=0, le=65535, description="Address of its first register, counted from 0.")
     type: RegisterType = Field(description="How the bits are to be read.")
     word_order: Literal["big", "little"] = Field("big", description="Which half of a long value comes first.")
+    byte_order: Literal["big", "little"] = Field("big", description="Which half of each register comes first.")
     scale: float = Field(1.0, description="Units per count; negative turns the sign.")
     offset: float = Field(0.0, description="Value at a raw 0, in the unit.")
     unit: Unit = Field("1", description="Unit of the scaled value.")
@@ -191,10 +194,20 @@ def _refuse_bad_block(block: Settings, name: str) -> None:
 class DeviceSettings(Settings):
     """Where a device is found."""
 
+    line: str | None = Field(None, description="The line it is on, a table below [line]; else one of its own by TCP.")
     host: str = Field("127.0.0.1", description="Name or address; an embedded rig is always on this machine.")
     port: int = Field(502, ge=1, le=65535, description="TCP port; an embedded rig chooses a free one.")
     unit: int = Field(1, ge=1, le=247, description="Modbus unit id.")
     map: str = Field(description="Its register map, a table below [map].")
+
+    @model_validator(mode="after")
+    def _is_in_one_place(self) -> Self:
+        for key in ("host", "port"):
+            if self.line is not None and key in self.model_fields_set:
+                raise ValueError(
+                    f"{key}: found beside line = {self.line!r}, which says where the device is; remove one"
+                )
+        return self
 
 
 class DriveSettings(DeviceSettings):
@@ -291,6 +304,7 @@ class RigSettings(Settings):
     )
     drive: tuple[DriveSettings, ...] = Field(min_length=1, description="The drives.")
     sensor: tuple[SensorSettings, ...] = Field((), description="Cuff force sensors, read with a human only.")
+    line: dict[str, LineSettings] = Field(default_factory=dict, description="Lines that devices share, by name.")
     map: Maps = Field(description="Register maps.")
     safety: SafetySettings = Field(SafetySettings(), description="What stops a run, and how.")
     geometry: GeometrySettings = Field(GeometrySettings(), description="The leg in this rig.")
@@ -312,16 +326,35 @@ class RigSettings(Settings):
                         f"{kind}[{i}].map: found {device.map!r}, expected a table below [map.{kind}]: "
                         f"{', '.join(known) or 'there is none'}"
                     )
-        devices = (*self.drive, *self.sensor)
-        for place, times in Counter((d.host, d.port, d.unit) for d in devices).items():
-            if times > 1:
-                raise ValueError(f"unit: {place[0]}:{place[1]} unit {place[2]} stands for two devices; correct one")
+        self._refuse_bad_lines()
         for cuff, times in Counter(sensor.cuff for sensor in self.sensor).items():
             if times > 1:
                 raise ValueError(f"sensor: found two sensors at {cuff}, expected one; correct their cuffs")
         if self.plant is None and (self.embedded or self.clock == "lockstep"):
             raise ValueError("plant: missing; a virtual rig (embedded, or in lockstep) needs the machine it plays")
         return self
+
+    def _refuse_bad_lines(self) -> None:
+        devices = (*self.drive, *self.sensor)
+        for device in devices:
+            if device.line is not None and device.line not in self.line:
+                raise ValueError(
+                    f"line: found {device.line!r} at unit {device.unit}, expected a table below [line]: "
+                    f"{', '.join(self.line) or 'there is none'}"
+                )
+        for name in self.line:
+            if name not in {device.line for device in devices}:
+                raise ValueError(f'line.{name}: no device is on it; remove it, or give one line = "{name}"')
+        for place, times in Counter(line.place for line in self.line.values()).items():
+            if times > 1:
+                raise ValueError(f"line: two lines lead to {place}; make them one, with all its devices on it")
+        for (place, unit), times in Counter((self.line_of(d).place, d.unit) for d in devices).items():
+            if times > 1:
+                raise ValueError(f"unit: {place} unit {unit} stands for two devices; correct one")
+
+    def line_of(self, device: DeviceSettings) -> LineSettings:
+        """Return the line that a device is on."""
+        return TcpLine(host=device.host, port=device.port) if device.line is None else self.line[device.line]
 
     def known_geometry(self) -> dict[str, float]:
         """Return the lengths that are known of this rig's leg; a virtual rig's are its plant's unless the file says."""
@@ -335,9 +368,12 @@ class RigSettings(Settings):
 
     def public(self) -> dict:
         """Return what recordings may tell of the rig: everything but the plant, which later stages are to find."""
-        return self.model_dump(mode="json", exclude={"plant"}, exclude_none=True)
+        files: IncEx = {name: set(line.files) for name, line in self.line.items()}
+        return self.model_dump(mode="json", exclude={"plant": True, "line": files}, exclude_none=True)
 
 
 def load_rig(path: Path | str) -> RigSettings:
-    """Return the rig in a file."""
-    return load_toml(path, RigSettings)
+    """Return the rig in a file; what files it names are found from there."""
+    rig = load_toml(path, RigSettings)
+    lines = {name: line.with_files_in(Path(path).parent) for name, line in rig.line.items()}
+    return rig.model_copy(update={"line": lines})

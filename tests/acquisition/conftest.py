@@ -71,7 +71,7 @@ class Served:
 
     async def _serve(self) -> None:
         self._loop, self._until = asyncio.get_running_loop(), asyncio.Event()
-        await server.serve(self._rig, self._plant, self._port, lambda host, port: self._listening.set(), self._until)
+        await server.serve(self._rig, self._plant, self._port, lambda place, line: self._listening.set(), self._until)
 
     def start(self) -> None:
         self._thread.start()

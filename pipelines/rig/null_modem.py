@@ -1,0 +1,33 @@
+"""A null modem: two pseudo-terminals that stand for the two ends of a serial cable."""
+
+import asyncio
+import os
+import tty
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+
+@contextmanager
+def null_modem() -> Iterator[tuple[str, str]]:
+    """Join two serial ports for as long as the block lasts, within a running event loop; yields their paths."""
+    loop = asyncio.get_running_loop()
+    pairs = [os.openpty(), os.openpty()]
+    for (near, _), (far, _) in (pairs, pairs[::-1]):
+        os.set_blocking(near, False)
+        loop.add_reader(near, _pass_on, near, far)
+    try:
+        for _, port in pairs:
+            tty.setraw(port)  # else it would echo whatever came before a client sets it up
+        # The ports stay open here too: a client may come and go without the cable being pulled.
+        yield os.ttyname(pairs[0][1]), os.ttyname(pairs[1][1])
+    finally:
+        for pair in pairs:
+            loop.remove_reader(pair[0])
+            for end in pair:
+                os.close(end)
+
+
+def _pass_on(near: int, far: int) -> None:
+    # What nobody fetches at the far end is lost, as on a cable.
+    with suppress(BlockingIOError):
+        os.write(far, os.read(near, 4096))
