@@ -1,11 +1,16 @@
 """``exoid rig serve``: a virtual rig on this machine, to be recorded like a real one."""
 
+from contextlib import suppress
+from ipaddress import ip_address
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
 from exoid_cli.console import console
+from pipelines.errors import SettingsError
+
+LOOPBACK = "127.0.0.1"
 
 
 def rig(
@@ -18,24 +23,40 @@ def rig(
         int | None, typer.Option(min=0, max=65535, help="One port for all devices, 0 for a free one; else the file's.")
     ] = None,
     sample_rate_hz: Annotated[float | None, typer.Option(min=1.0, help="Samples a second; else the plant's.")] = None,
+    bind: Annotated[str, typer.Option(help="Address to listen on.")] = LOOPBACK,
+    anyone: Annotated[bool, typer.Option("--anyone", help="Allow a --bind that other computers can reach.")] = False,
     until_input_ends: Annotated[bool, typer.Option(hidden=True, help="Stop when standard input is closed.")] = False,
 ) -> None:
-    """Serve the drives and force sensors of a virtual rig over Modbus TCP, until Ctrl-C.
+    """Serve the drives and force sensors of a virtual rig over Modbus, until Ctrl-C.
 
     \b
     Example:
       exoid rig serve rigs/real_time.toml --run exo_alone --port 5020
     """
+    _refuse_anyone(bind, anyone)
     from pipelines.rig.server import serve_file
 
     told = False
 
-    def announce(host: str, port: int) -> None:
+    def announce(place: str, line: str | None) -> None:
         nonlocal told
         if not told and not until_input_ends:
             console.say(f"{file}: a virtual rig, {run}; Ctrl-C ends it")
             told = True
         # Not through the console: whoever started the rig waits for this line.
-        print(f"{host}:{port}", flush=True)
+        print(f"{line} {place}" if line else place, flush=True)
 
-    serve_file(file, run, seed, port, sample_rate_hz, announce, until_input_ends=until_input_ends)
+    serve_file(file, run, seed, port, sample_rate_hz, announce, until_input_ends=until_input_ends, bind=bind)
+
+
+def _refuse_anyone(bind: str, anyone: bool) -> None:
+    """Refuse an address that other computers can reach, unless that is wanted; then warn."""
+    with suppress(ValueError):  # a name may lead anywhere
+        if ip_address(bind).is_loopback:
+            return
+    if not anyone:
+        raise SettingsError(
+            f"--bind: found {bind}, expected an address of this computer's own, such as {LOOPBACK}: Modbus has no "
+            "authentication, whoever reaches the rig can move it; add --anyone if that is wanted"
+        )
+    console.warn(f"the rig listens on {bind}, and Modbus has no authentication: whoever reaches it can move it")

@@ -14,6 +14,7 @@ import numpy as np
 from pipelines.acquisition.columns import columns_of
 from pipelines.acquisition.embedded import embedded
 from pipelines.acquisition.journal import Journal, JournalFile, journal_of, locked, refuse_leftover
+from pipelines.acquisition.line_rate import refuse_slow_lines
 from pipelines.acquisition.loop import Loop, Progress, Report, run_to_its_end
 from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.pace import urgent
@@ -73,6 +74,9 @@ def acquire(
     trajectory = read_trajectory(trajectory_path)
     with about(trajectory_path):
         check_trajectory(rig, trajectory, run.duration_s, sample_rate_hz)
+    if rig.clock == "real_time":
+        with about(rig_path):
+            refuse_slow_lines(rig, sample_rate_hz, with_sensors=run.run == "with_human")
     RECORDING.refuse_place(output)
     journal = journal_of(output)
     refuse_leftover(journal)

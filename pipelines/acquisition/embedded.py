@@ -40,7 +40,7 @@ def embedded(rig: RigSettings, path: Path, run: RunSettings, sample_rate_hz: flo
 
 
 def _place(process: subprocess.Popen, path: Path, complaints) -> tuple[str | None, str]:
-    """Wait until the rig says where devices are; return the name of their line, None for those on none, and the place."""
+    """Wait until the rig says where a line is; return its name, None for that of devices on none, and the place."""
     assert process.stdout is not None  # it was asked for
     ready, _, _ = select.select([process.stdout], [], [], START_S)
     if line := process.stdout.readline().decode().strip() if ready else "":

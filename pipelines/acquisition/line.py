@@ -3,9 +3,10 @@
 import asyncio
 import errno
 import ssl
+import termios
 from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import serial
 from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient, AsyncModbusTlsClient
@@ -42,17 +43,29 @@ class Line:
     async def connect(self) -> None:
         """Open the connection; nothing happens where there is one."""
         async with self._turn:
-            if not self.client.connected and not await self.client.connect():
+            if not self.client.connected and not await self._connected():
                 raise DeviceError(f"{self._label}: {await self._refusal()}")
+
+    async def _connected(self) -> bool:
+        try:
+            return await self.client.connect()
+        except (termios.error, ValueError) as error:
+            raise DeviceError(
+                f"{self._label}: the serial port cannot be set up like that ({error}); correct baud_rate, parity or "
+                'stop_bits in the rig file (a pseudo-terminal needs parity = "none")'
+            ) from error
 
     def close(self) -> None:
         """Close the connection; nothing happens where there is none."""
+        if self.client.ctx.transport:
+            # At once: TLS would wait for the other end to say goodbye, and that may be gone.
+            cast(asyncio.Transport, self.client.ctx.transport).abort()
         self.client.close()
 
     async def renew(self) -> None:
         """Close the connection and open another, once whoever is asking has been answered."""
         async with self._turn:
-            self.client.close()
+            self.close()
         await self.connect()
 
     async def ask(self, within_s: float, request: Callable[..., Awaitable[ModbusPDU]], **arguments: Any) -> ModbusPDU:
@@ -106,7 +119,7 @@ class Line:
                 )
                 _, writer = await asyncio.wait_for(opening, self._timeout_s)
                 writer.close()
-        except (OSError, TimeoutError) as error:
+        except OSError as error:
             return _explained(error)
         return "refuses the connection; check that the rig is on, and host and port in the rig file"
 
@@ -152,13 +165,15 @@ def _tls_context(settings: TlsLine) -> ssl.SSLContext:
     return context
 
 
-def _explained(error: OSError | TimeoutError) -> str:
+def _explained(error: OSError) -> str:
     """Return a failure to connect in words, with what to do."""
     if isinstance(error, ssl.SSLCertVerificationError):
         return (
             f"its certificate is not to be trusted ({error.verify_message.rstrip('.')}); name in ca whoever signed it, "
             "and in host the name that it is made out to"
         )
+    if isinstance(error, TimeoutError):
+        return "no TLS connection within safety.watchdog_s; check that the rig is on, and that the port speaks TLS"
     if isinstance(error, ssl.SSLError):
         return f"no TLS connection ({error.reason or error}); check that the port speaks TLS, and certificate and key"
     if error.errno == errno.ENOENT:

@@ -194,8 +194,7 @@ class Loop:
         for attempt in range(DISABLE_TRIES):
             try:
                 if attempt:
-                    drive.device.close()
-                    await drive.device.connect()
+                    await drive.device.line.renew()
                 await drive.disable(float(self.supervisor.sent[joint]))
                 return None
             except DeviceError as error:

@@ -37,8 +37,8 @@ async def listening(line: LineSettings, devices: list[SimDevice]) -> AsyncIterat
     """
     if isinstance(line, RtuLine):
         with null_modem() as (ours, theirs), _linked(line.serial_port, theirs) as place:
-            server = ModbusSerialServer(devices, port=ours, baudrate=line.baud_rate, ignore_missing_devices=True)
-            async with _serving(server, place):
+            bus = ModbusSerialServer(devices, port=ours, baudrate=line.baud_rate, ignore_missing_devices=True)
+            async with _serving(bus, place):
                 yield place
         return
     server = _network_server(line, devices)
@@ -61,10 +61,16 @@ def _network_server(line: NetworkLine, devices: list[SimDevice]) -> ModbusTcpSer
 async def _serving(server: ModbusTcpServer | ModbusSerialServer, place: str) -> AsyncIterator[None]:
     try:
         if not await guarded(server).listen():
-            raise DeviceError(f"{place}: cannot listen there; choose a free port with --port")
+            raise DeviceError(
+                f"{place}: cannot listen there; choose a free port with --port, another address with --bind"
+            )
         yield
     finally:
+        for connection in server.active_connections.values():
+            if connection.transport:  # at once: TLS would wait for the client to say goodbye
+                cast(asyncio.Transport, connection.transport).abort()
         await server.shutdown()
+        await asyncio.sleep(0)  # sockets are closed by the loop, one turn later
 
 
 @contextmanager
@@ -80,8 +86,8 @@ def _linked(wanted: str, port: str) -> Iterator[str]:
         link.symlink_to(port)
     except OSError as error:
         raise DeviceError(
-            f"{link}: cannot become the link to the virtual rig's pseudo-terminal ({error.strerror}); name another path "
-            "in serial_port, or ask for --port 0"
+            f"{link}: cannot become the link to the virtual rig's pseudo-terminal ({error.strerror}); name another "
+            "path in serial_port, or ask for --port 0"
         ) from error
     try:
         yield wanted

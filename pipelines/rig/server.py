@@ -245,21 +245,20 @@ async def serve(
         Address on which TCP ports listen.
     """
     virtual = VirtualRig(rig, plant)
-    on_line: dict[str | None | int, list[SimDevice]] = defaultdict(list)
+    on_line: dict[str | int, list[SimDevice]] = defaultdict(list)
     for settings, device in zip((*rig.drive, *rig.sensor), (*virtual.drives, *virtual.sensors), strict=True):
         alone = settings.port if port is None else port
         on_line[alone if settings.line is None else settings.line].append(device.as_served())
     if port and len(on_line) > 1:
         raise SettingsError(
-            f"--port: found {port} for {len(on_line)} lines, expected one line; leave it out for the places that the rig "
-            "file names, or give 0 for free ones"
+            f"--port: found {port} for {len(on_line)} lines, expected one line; leave it out for the places that the "
+            "rig file names, or give 0 for free ones"
         )
     clock = None if virtual.lockstep else asyncio.ensure_future(virtual.keep_time())
     try:
         async with AsyncExitStack() as servers:
             for key, devices in on_line.items():
-                name = key if isinstance(key, str) else None
-                line = TcpLine.model_construct(port=key) if name is None else rig.line[name]
+                name, line = (key, rig.line[key]) if isinstance(key, str) else (None, TcpLine.model_construct(port=key))
                 announce(await servers.enter_async_context(listening(_placed(line, bind, port), devices)), name)
             await until.wait()
     finally:

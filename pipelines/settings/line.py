@@ -107,8 +107,9 @@ class RtuLine(Line):
         return self.serial_port
 
     def at(self, place: str) -> Self:
-        """Return the line with another place."""
-        return self.model_copy(update={"serial_port": place})
+        """Return the line on a virtual rig's pseudo-terminal."""
+        # Characters travel whole there: it knows no parity, and refuses to be set up with one.
+        return self.model_copy(update={"serial_port": place, "parity": "none"})
 
     @property
     def character_s(self) -> float:

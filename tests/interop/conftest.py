@@ -93,7 +93,7 @@ def _serving_ours():
     async def serving():
         until = asyncio.Event()
         stop = partial(asyncio.get_running_loop().call_soon_threadsafe, until.set)
-        await serve(rig, plant, 0, lambda host, port: listening.put((port, stop)), until)
+        await serve(rig, plant, 0, lambda place, line: listening.put((int(place.rpartition(":")[2]), stop)), until)
 
     thread = threading.Thread(target=asyncio.run, args=[serving()])
     thread.start()
