@@ -33,12 +33,14 @@ class Line:
         """Who is on it."""
         self._settings, self._timeout_s, self._name = settings, timeout_s, name
         self._turn = asyncio.Lock()
+        self._asking = False
         self._quiet_since = 0.0
 
     def join(self, name: str, unit: int) -> str:
         """Add a device; return what errors call it."""
-        self.devices.append(f"{name} (unit {unit})")
-        return f"{name} ({self.place}, unit {unit})"
+        label = f"{name} ({self.place}, unit {unit})"
+        self.devices.append(f"{name} (unit {unit})" if self._name else label)
+        return label
 
     async def connect(self) -> None:
         """Open the connection; nothing happens where there is one."""
@@ -47,6 +49,7 @@ class Line:
                 raise DeviceError(f"{self._label}: {await self._refusal()}")
 
     async def _connected(self) -> bool:
+        self.client.ctx.comm_params.timeout_connect = self._timeout_s
         try:
             return await self.client.connect()
         except (termios.error, ValueError) as error:
@@ -82,20 +85,21 @@ class Line:
             await self._quiet()
             # The one place where pymodbus looks for how long to wait, be it for a connection or for an answer.
             self.client.ctx.comm_params.timeout_connect = within_s
+            self._asking = True
             try:
                 return await request(**arguments)
             except (ModbusException, OSError) as error:
                 if self.client.connected:
                     raise
-                raise DeviceError(
-                    f"{self._label}: the line is lost, and with it {', '.join(self.devices)}; check cable and power"
-                ) from error
+                others = f", and with it {', '.join(self.devices)}" if self._name else ""
+                raise DeviceError(f"{self._label}: the line is lost{others}; check cable and power") from error
             finally:
+                self._asking = False
                 self._quiet_since = asyncio.get_running_loop().time()
 
     @property
     def _label(self) -> str:
-        return f"line {self._name} ({self.place})" if self._name else f"{self.devices[0]} at {self.place}"
+        return f"line {self._name} ({self.place})" if self._name else self.devices[0]
 
     async def _quiet(self) -> None:
         """Wait until nothing has been on the line for as long as its devices need to tell frames apart."""
@@ -105,8 +109,9 @@ class Line:
 
     def _told(self, connected: bool) -> None:
         """End the request that is under way when the connection ends: its answer will not come."""
-        if not connected and not self.client.ctx.response_future.done():
-            self.client.ctx.response_future.set_exception(ConnectionException("lost"))
+        answer = self.client.ctx.response_future
+        if self._asking and not connected and not answer.done():
+            answer.set_exception(ConnectionException("lost"))
 
     async def _refusal(self) -> str:
         """Return why there is no connection; the client tells its log alone."""

@@ -1,6 +1,7 @@
 """How often a line can carry what a cycle asks of it: a serial line takes its time for every character."""
 
 from collections import defaultdict
+from math import floor
 
 from pipelines.acquisition.pace import SLOW
 from pipelines.errors import SettingsError
@@ -21,7 +22,7 @@ def refuse_slow_lines(rig: RigSettings, sample_rate_hz: float, *, with_sensors: 
             on_it = sum(device.line == name for device in (*rig.drive, *(rig.sensor if with_sensors else ())))
             raise SettingsError(
                 f"line {name} ({rig.line[name].place}): {sample_rate_hz:g} samples a second are asked for, at most "
-                f"{highest:.0f} fit through it with {on_it} device{'s' * (on_it > 1)} on it; raise baud_rate, give "
+                f"{floor(highest)} fit through it with {on_it} device{'s' * (on_it > 1)} on it; raise baud_rate, give "
                 "devices lines of their own, or lower acquire.sample_rate_hz"
             )
 

@@ -163,7 +163,7 @@ class Loop:
             await self._disable(j) if stop.cancelled() else stop.result()
             for j, stop in zip(touched, stops, strict=True)
         ]
-        self.supervisor.finish([complaint for complaint in complaints if complaint])
+        self.supervisor.finish(list(dict.fromkeys(filter(None, complaints))))  # a lost line is one complaint
         self._tell_stop()
 
     def _tell_stop(self) -> None:

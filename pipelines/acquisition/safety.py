@@ -55,7 +55,7 @@ class Limits:
             silent_s = (row.sequence - self._felt.setdefault(cuff, row.sequence)) / self._rate
             if silent_s > self._rig.safety.watchdog_s + sensor.every / self._rate:
                 return (
-                    f"watchdog: no new sample from sensor {sensor.cuff} ({sensor.host}:{sensor.port}, unit "
+                    f"watchdog: no new sample from sensor {sensor.cuff} ({self._rig.line_of(sensor).place}, unit "
                     f"{sensor.unit}) for {silent_s:.3f} s, allowed are {self._rig.safety.watchdog_s:g} s; its counter "
                     "stands still, or what it sends is no number"
                 )

@@ -120,7 +120,7 @@ async def look(machine: Machine, rate_hz: float | None, *, alone: bool) -> RigRe
 async def _meet(probe: Probe, report: DeviceReport) -> None:
     """Connect, read the identity, and read one device many times."""
     device, loop = probe.part.device, asyncio.get_running_loop()
-    await device.connect()
+    await device.line.connect()
     report.connected = True
     for entry in probe.part.map.identity:
         (found,) = await device.read(entry.address, 1)
