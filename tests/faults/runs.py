@@ -87,8 +87,8 @@ def served(folder: Path, run: str) -> Iterator[tuple[int, dict[int, Samples]]]:
     plant.run = remembered
     listening, ports, ends = threading.Event(), list[int](), []
 
-    def announce(host: str, port: int) -> None:
-        ports.append(port)
+    def announce(place: str, line: str | None) -> None:
+        ports.append(int(place.rpartition(":")[2]))
         listening.set()
 
     async def serve() -> None:
