@@ -1,0 +1,333 @@
+"""A rig that misbehaves as it is told, in simulated time: what acquisition tells it is kept, nothing is waited for."""
+
+import asyncio
+import heapq
+import selectors
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field
+from unittest.mock import patch
+
+from pipelines.acquisition import journal, loop, machine, pace
+from pipelines.acquisition.acquire import _finish, _record
+from pipelines.acquisition.device import Device
+from pipelines.acquisition.loop import Loop, run_to_its_end
+from pipelines.acquisition.states import Supervisor
+from pipelines.errors import DeviceError
+from pipelines.registers import Block
+from pipelines.settings.rig import registers_of
+
+RATE = 50.0
+LATENCY_S = 0.0003
+STEPS = 200_000
+"""Turns of the event loop after which a run is taken to hang."""
+
+
+class SimulatedTime(asyncio.SelectorEventLoop):
+    """An event loop whose clock moves only where everything waits."""
+
+    def __init__(self):
+        super().__init__(selectors.SelectSelector())
+        self.now, self._turns = 1000.0, 0
+
+    def time(self):
+        return self.now
+
+    monotonic = perf_counter = time
+
+    def _run_once(self):
+        self._turns += 1
+        assert self._turns < STEPS, "the run hangs"
+        if not self._ready and self._scheduled:
+            while self._scheduled and self._scheduled[0]._cancelled:
+                self._timer_cancelled_count -= 1
+                heapq.heappop(self._scheduled)._scheduled = False
+            if self._scheduled:
+                self.now = max(self.now, self._scheduled[0]._when)
+        super()._run_once()
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happens at the n-th request of a run."""
+
+    at: int
+    kind: str
+    what: object = None
+
+
+@dataclass(frozen=True)
+class Told:
+    """A set-point and a control word on their way to a drive."""
+
+    time: float
+    joint: int
+    reference: float
+    control: int
+    arrived: bool
+
+
+@dataclass
+class SimulatedDrive:
+    """Registers of a drive that follows its set-point at once."""
+
+    joint: int
+    settings: object
+    map: object
+    rig: "SimulatedRig"
+    control: int = 0
+    angle: float = 0.0
+    ahead: int = 0
+    frozen_at: int | None = None
+    clock_ahead: float = 0.0
+    wrong: dict = field(default_factory=dict)
+    fault: bool = False
+    stuck_status: bool = False
+    """Whether the status word tells the opposite of what is."""
+
+    def __post_init__(self):
+        self.read, self.write = Block(registers_of(self.map.read)), Block(registers_of(self.map.write))
+
+    @property
+    def enabled(self):
+        return not self.fault and self.control in (self.map.enable, self.map.halt)
+
+    def take(self, words):
+        told = self.write.decode(words)
+        self.control = int(told["control"])
+        if self.enabled:
+            self.angle = told["reference"]
+
+    def words(self):
+        count = self.rig.count() if self.frozen_at is None else self.frozen_at
+        values = {
+            "sequence": max(count + self.ahead, 0), "time": max(count / RATE + self.clock_ahead, 0.0),
+            "angle": self.angle, "velocity": 0.0, "current": 0.0, "temperature": 20.0, "reference": self.angle,
+            "status": (self.enabled != self.stuck_status) | 8 * self.fault,
+        }  # fmt: skip
+        return self.read.encode(values | self.wrong)
+
+
+class SimulatedRig:
+    """Drives and sensors behind every line that acquisition opens."""
+
+    def __init__(self, rig, events, clock, stopped_by):
+        self.rig, self.clock, self.stopped_by = rig, clock, stopped_by
+        self.events = sorted(events, key=lambda event: event.at)
+        self.drives = [SimulatedDrive(j, d, rig.map.drive[d.map], self) for j, d in enumerate(rig.drive)]
+        self.sensor_block = Block(registers_of(rig.map.sensor["force"].read))
+        self.force = 0.0
+        self.requests, self.samples = 0, 0
+        self.exchanged, self.dead = set(), {}
+        self.told: list[Told] = []
+        self.raised: list[tuple[float, BaseException]] = []
+        self.began = clock.now
+        self.failed_to_disable = [0, 0]
+
+    def count(self):
+        if self.rig.clock == "lockstep":
+            return 100 + self.samples
+        return 100 + int((self.clock.now - self.began) * RATE)
+
+    def of(self, label):
+        return next((d for d in self.drives if d.settings.joint in label), None)
+
+    def happen(self):
+        """Let the events of this request happen; return one that befalls the request itself."""
+        self.requests += 1
+        befalls = None
+        while self.events and self.events[0].at <= self.requests:
+            event = self.events.pop(0)
+            if event.kind in ("raise", "late", "lost", "no answer", "dead"):
+                befalls = event
+            else:
+                self._do(event)
+        return befalls
+
+    def _do(self, event):
+        drive = self.drives[self.requests % 2]
+        match event.kind:
+            case "signal":
+                self.stopped_by.append("SIGTERM")
+            case "cancel":
+                for task in asyncio.all_tasks():
+                    task.cancel()
+                self.raised.append((self.clock.now, asyncio.CancelledError()))
+            case "counter":
+                drive.ahead += event.what
+            case "freeze":
+                drive.frozen_at = self.count()
+            case "clock":
+                drive.clock_ahead += event.what
+            case "reading":
+                drive.wrong = dict([event.what])
+            case "fault":
+                drive.fault = True
+            case "status":
+                drive.stuck_status = True
+            case "force":
+                self.force = event.what
+            case _:
+                raise AssertionError(event.kind)
+
+    async def answer(self, device, write, read):
+        """Serve a request, or let what is due befall it."""
+        event = self.happen()
+        drive = self.of(device.label)
+        dead = self.dead.get(device.label, 0)
+        if event and event.kind == "dead":
+            dead = event.what
+        if dead:
+            self.dead[device.label] = dead - 1
+            event = Event(0, "lost")
+        kind = event.kind if event else ""
+        arrived = kind not in ("lost", "raise")
+        if write is not None and drive:
+            block, words = write
+            told = block.decode(words)
+            self.told.append(Told(self.clock.now, drive.joint, told["reference"], int(told["control"]), arrived))
+            if told["control"] == drive.map.disable and kind:
+                self.failed_to_disable[drive.joint] += 1
+        if kind == "raise":
+            error = event.what()
+            self.raised.append((self.clock.now, error))
+            raise error
+        await asyncio.sleep(event.what if kind == "late" else LATENCY_S)
+        if write is not None and drive and arrived:
+            drive.take(words)
+        if kind in ("lost", "no answer"):
+            await asyncio.sleep(self.rig.safety.watchdog_s)
+            self.raised.append((self.clock.now, DeviceError("no answer")))
+            raise DeviceError(f"{device.label}: did not answer")
+        return self._read(drive, write, read)
+
+    def _read(self, drive, write, read):
+        if read is None:
+            return []
+        address, count = read
+        if drive is None:
+            values = {"sequence": self.count(), "force_x": self.force, "force_y": 0.0, "force_z": 0.0}
+            return self.sensor_block.encode(values)
+        block = drive.words()
+        start = address - drive.read.address
+        if write is not None and self.rig.clock == "lockstep":
+            self.exchanged.add(drive.joint)
+            if len(self.exchanged) == len(self.drives):
+                self.samples, self.exchanged = self.samples + 1, set()
+        return block[start : start + count]
+
+
+@dataclass
+class Run:
+    """What a simulated run came to."""
+
+    rig: SimulatedRig
+    supervisor: Supervisor
+    result: object
+    """Outcome, or what was raised."""
+    aborted_at: float | None
+    first_reason: str | None
+    states: list
+
+
+def simulate(rig, settings, trajectory, path, events, *, plan=None, own=None):
+    """Record one run on a simulated rig.
+
+    Parameters
+    ----------
+    events : list of Event
+    plan : callable, optional
+        Makes another plan of the one that was made.
+    own : (place, n, error), optional
+        An error of exoid's own: ``report``, ``journal`` or ``limits`` raises it at its n-th call.
+    """
+    time = SimulatedTime()
+    stopped_by = []
+    simulated = SimulatedRig(rig, events, time, stopped_by)
+    sensors = rig.sensor if settings.run == "with_human" else ()
+    supervisor = Supervisor(rig, RATE, sensors)
+    run = Run(simulated, supervisor, None, None, None, [supervisor.state])
+    metadata = {"run": settings.run, "purpose": "train", "sample_rate_hz": RATE, "config": {"run": {"duration_s": settings.duration_s}}}  # fmt: skip
+    with _patched(simulated, time, run, plan, own) as report:
+        try:
+            run_to_its_end(
+                _record(
+                    supervisor, settings, trajectory, path.with_suffix(".journal"), metadata, report, stopped_by, False
+                ),
+                supervisor.abort,
+            )
+            run.result = _finish(path, path.with_suffix(".journal"), supervisor)
+        except BaseException as error:
+            run.result = error
+    return run
+
+
+@contextmanager
+def _patched(simulated, time, run, plan, own):
+    place, fails_at, error = own or (None, 0, None)
+    calls = 0
+
+    def fail():
+        nonlocal calls
+        calls += 1
+        if calls == fails_at:
+            raised = error()
+            simulated.raised.append((time.now, raised))
+            raise raised
+
+    def report(progress):
+        if place == "report":
+            fail()
+
+    async def connect(device):
+        pass
+
+    async def check_identity(device, identity):
+        pass
+
+    async def read(device, address, count):
+        return await simulated.answer(device, None, (address, count))
+
+    async def write(device, block, words):
+        await simulated.answer(device, (block, words), None)
+
+    async def exchange(device, block, words, read):
+        return await simulated.answer(device, (block, words), (read.address, read.count))
+
+    abort, go = Supervisor.abort, Supervisor._go
+
+    def watched_abort(supervisor, error):
+        abort(supervisor, error)
+        if run.aborted_at is None:
+            run.aborted_at, run.first_reason = time.now, supervisor.why
+
+    def watched_go(supervisor, state):
+        go(supervisor, state)
+        run.states.append(state)
+
+    with ExitStack() as stack:
+        for module in (journal, loop, machine, pace):
+            stack.enter_context(patch.object(module, "time", time))
+        stack.enter_context(patch("asyncio.events.new_event_loop", lambda: time))
+        # The line has no part in this: every way to ask a device goes to the simulated rig.
+        for request in (connect, check_identity, read, write, exchange):
+            stack.enter_context(patch.object(Device, request.__name__, request))
+        stack.enter_context(patch.object(Device, "close", lambda device: None))
+        stack.enter_context(patch.object(Supervisor, "abort", watched_abort))
+        stack.enter_context(patch.object(Supervisor, "_go", watched_go))
+        if plan:
+            from pipelines.acquisition import acquire
+
+            made = acquire.make_plan
+            stack.enter_context(patch.object(acquire, "make_plan", lambda *a: plan(made(*a))))
+        for name, where, attribute in (
+            ("journal", journal.Journal, "append"),
+            ("limits", Loop, "_keep"),
+        ):
+            if place == name:
+                genuine = getattr(where, attribute)
+                stack.enter_context(
+                    patch.object(where, attribute, lambda *a, genuine=genuine: (fail(), genuine(*a))[1])
+                )
+        yield report
+        with suppress(RuntimeError):
+            time.close()

@@ -1,0 +1,243 @@
+"""What holds whatever happens: random sequences of faults and operator's actions on a simulated rig."""
+
+import asyncio
+import tempfile
+from math import ceil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from pipelines.acquisition.acquire import Outcome
+from pipelines.acquisition.loop import DISABLE_TRIES
+from pipelines.acquisition.plan import Plan
+from pipelines.acquisition.safety import HOLD_SAMPLES
+from pipelines.acquisition.states import TRANSITIONS, State
+from pipelines.contracts import RECORDING
+from pipelines.errors import DeviceError, ExoidError
+from pipelines.mechanics.fourier import FourierTrajectory
+from pipelines.settings.acquire import RunSettings
+from pipelines.settings.rig import RigSettings
+from tests.acquisition.simulated import RATE, Event, simulate
+
+ROUNDING_RAD = 2e-6
+"""Half a count of the set-point's register, twice."""
+TRAJECTORY = FourierTrajectory(
+    np.array([0.1, -0.1]), np.array([[0.06, 0.01], [-0.05, 0.02]]), np.array([[0.02, -0.02], [0.06, 0.01]]), 4 * np.pi
+)
+REGISTERS = {
+    "sequence": ("uint32", "1", 1.0), "time": ("float64", "s", 1.0), "angle": ("float64", "rad", 1.0),
+    "velocity": ("float64", "rad/s", 1.0), "current": ("float64", "A", 1.0), "reference": ("float64", "rad", 1.0),
+    "temperature": ("float64", "°C", 1.0), "status": ("uint16", "1", 1.0),
+}  # fmt: skip
+
+
+def rig_that(clock, *, reads_back=True):
+    """Return a rig of two drives and two cuff sensors."""
+    read = {
+        name: {"address": 100 + 4 * k, "type": kind, "unit": unit, "scale": scale}
+        for k, (name, (kind, unit, scale)) in enumerate(REGISTERS.items())
+    }
+    write = {
+        "reference": {"address": 200, "type": "int32", "scale": 1e-6, "unit": "rad"},
+        "control": {"address": 202, "type": "uint16"},
+    }
+    servo = {"read": read, "write": write, "enable": 15, "halt": 271, "fault_mask": 8}
+    if reads_back:
+        servo |= {"enabled_mask": 1, "enabled_value": 1}
+    force = {
+        name: {"address": 100 + 4 * k, "type": "uint32" if name == "sequence" else "float64", "unit": unit}
+        for k, (name, unit) in enumerate({"sequence": "1", "force_x": "N", "force_y": "N", "force_z": "N"}.items())
+    }
+    drive = {"map": "servo", "torque_constant_nm_a": 0.12, "gear_ratio": 100.0, "torque_nm": 150.0, "speed_rad_s": 3.0}
+    return RigSettings.model_validate({
+        "name": "simulated",
+        "clock": clock,
+        "drive": [
+            drive | {"joint": "hip", "unit": 1, "angle_rad": (-0.35, 1.75)},
+            drive | {"joint": "knee", "unit": 2, "angle_rad": (-2.1, 0.35)},
+        ],
+        "sensor": [{"cuff": "thigh_front", "unit": 11, "map": "force"}, {"cuff": "shank_back", "unit": 12, "map": "force"}],
+        "map": {"drive": {"servo": servo}, "sensor": {"force": {"read": force}}},
+        "safety": {"watchdog_s": 0.2, "ramp_s": 0.3, "settle_s": 0.1, "deceleration_rad_s2": 8.0},
+        "plant": {},
+    })  # fmt: skip
+
+
+RIGS = {
+    (clock, reads_back): rig_that(clock, reads_back=reads_back)
+    for clock in ("real_time", "lockstep")
+    for reads_back in (True, False)
+}
+
+
+def raised(*kinds):
+    return st.sampled_from(kinds).map(lambda kind: lambda: kind("made up"))
+
+
+anything = raised(
+    DeviceError, OSError, ValueError, ZeroDivisionError, MemoryError, AssertionError, RecursionError, KeyboardInterrupt,
+    SystemExit, asyncio.CancelledError, TimeoutError,
+)  # fmt: skip
+wild = st.sampled_from([np.nan, np.inf, -np.inf, 1e9, -50.0, 2.0])
+happenings = st.one_of(
+    st.tuples(st.just("raise"), anything),
+    st.tuples(st.just("late"), st.floats(0.0, 0.19)),
+    st.tuples(st.sampled_from(["lost", "no answer", "signal", "cancel", "freeze", "fault", "status"]), st.none()),
+    st.tuples(st.just("dead"), st.integers(1, 30)),
+    st.tuples(st.just("counter"), st.integers(-200, 200)),
+    st.tuples(st.just("clock"), st.floats(-3.0, 3.0)),
+    st.tuples(st.just("reading"), st.tuples(st.sampled_from(["angle", "current", "velocity"]), wild)),
+    st.tuples(st.just("force"), wild),
+)
+
+
+@st.composite
+def sequences_of_events(draw):
+    """Return events that begin anywhere in a run and then follow each other closely: into the stop, and into its end."""
+    at, events = draw(st.integers(1, 420)), []
+    for kind, what in draw(st.lists(happenings, max_size=6)):
+        events.append(Event(at, kind, what))
+        at += draw(st.integers(0, 60))
+    return events
+
+
+own_errors = st.none() | st.tuples(st.sampled_from(["report", "journal", "limits"]), st.integers(1, 60), anything)
+
+
+@st.composite
+def bad_plans(draw):
+    """Return what makes a plan that nobody should have made: it leaps, leaves the limits, or is no number."""
+    at, joint, value = draw(st.integers(0, 60)), draw(st.integers(0, 1)), draw(wild)
+    length = draw(st.integers(1, 10))
+
+    def spoil(plan):
+        reference = plan.reference.copy()
+        reference[at : at + length, joint] = value
+        return Plan(reference, plan.first, plan.stop)
+
+    return spoil
+
+
+def check_every_invariant(clock, reads_back, human, happens, plan, own):
+    rig = RIGS[clock, reads_back]
+    run = RunSettings(name="x", run="with_human" if human else "exo_alone", purpose="train", duration_s=0.5)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "x.parquet"
+        simulated = simulate(rig, run, TRAJECTORY, path, happens, plan=plan, own=own)
+        sent_is_within_limits(simulated)
+        motion_stops_within_the_stated_number_of_cycles(simulated)
+        the_abort_is_told(simulated, folder)
+        drives_are_disabled_or_it_is_said_that_they_are_not(simulated)
+        only_drawn_transitions_were_made(simulated)
+
+
+def sent_is_within_limits(run):
+    lockstep = run.rig.rig.clock == "lockstep"
+    for j, drive in enumerate(run.rig.rig.drive):
+        low, high = drive.angle_rad
+        last, at = 0.0, None
+        for told in run.rig.told:
+            if told.joint != j:
+                continue
+            assert low - ROUNDING_RAD <= told.reference <= high + ROUNDING_RAD
+            elapsed = 1.0 / RATE if lockstep or at is None else told.time - at + 1.0 / RATE
+            assert abs(told.reference - last) <= drive.speed_rad_s * elapsed + ROUNDING_RAD
+            last, at = told.reference, told.time
+
+
+def motion_stops_within_the_stated_number_of_cycles(run):
+    """As docs/safety.md states it."""
+    if run.aborted_at is None:
+        return
+    for j, drive in enumerate(run.rig.rig.drive):
+        told = [t for t in run.rig.told if t.joint == j and t.control != 0]
+        before = [t.reference for t in told if t.time <= run.aborted_at]
+        after = [t.reference for t in told if t.time > run.aborted_at]
+        moving = np.flatnonzero(np.abs(np.diff(before[-1:] + after)) > ROUNDING_RAD)
+        slowing = ceil(drive.speed_rad_s / run.rig.rig.safety.deceleration_rad_s2 * RATE)
+        assert moving.size == 0 or moving[-1] < slowing
+        assert len(after) <= slowing + HOLD_SAMPLES
+
+
+def the_abort_is_told(run, folder):
+    supervisor, result = run.supervisor, run.result
+    if not any(told.control != 0 for told in run.rig.told):
+        assert isinstance(result, BaseException)  # refused before anything was enabled; it went to the caller as it was
+        return
+    if run.first_reason is not None:
+        assert supervisor.why.startswith(run.first_reason)
+    if supervisor.why is None:
+        assert isinstance(result, Outcome)
+        assert RECORDING.read(result.path).metadata.get("abort") is None
+        assert only_disabling_failed(run)
+        return
+    assert isinstance(result, ExoidError), repr(result)
+    assert supervisor.why in str(result)
+    assert result.exit_code == (1 if supervisor.fault else 3)
+    for aborted in Path(folder).glob("*.parquet"):
+        assert RECORDING.read(aborted).metadata["abort"] == supervisor.why
+    assert bool(supervisor.fault) == bool(list(Path(folder).glob("*.log")))
+
+
+def only_disabling_failed(run):
+    """Tell whether what was raised befell nothing but attempts to disable, the last of which went through."""
+    first = min(t.time for t in run.rig.told if t.control == 0)
+    return all(at >= first for at, _ in run.rig.raised)
+
+
+def drives_are_disabled_or_it_is_said_that_they_are_not(run):
+    for drive in run.rig.drives:
+        if drive.control == 0:
+            continue
+        assert run.rig.failed_to_disable[drive.joint] >= DISABLE_TRIES
+        assert f"could not be disabled: drive {drive.settings.joint}" in run.supervisor.why.replace(
+            "; drive", ": drive"
+        ) or ("could not be disabled" in run.supervisor.why and drive.settings.joint in run.supervisor.why)
+        assert "USE THE EMERGENCY STOP" in str(run.result)
+
+
+def only_drawn_transitions_were_made(run):
+    for before, after in zip(run.states, run.states[1:], strict=False):
+        assert after in TRANSITIONS[before]
+    if any(told.control != 0 for told in run.rig.told):
+        assert run.states[-1] in (State.DISABLED, State.ABORT)
+
+
+sequences = given(
+    clock=st.sampled_from(["real_time", "lockstep"]), reads_back=st.booleans(), human=st.booleans(), happens=sequences_of_events(),
+    plan=st.none() | bad_plans(), own=own_errors,
+)  # fmt: skip
+relaxed = dict(deadline=None, suppress_health_check=list(HealthCheck))
+
+
+@sequences
+@settings(max_examples=60, derandomize=True, **relaxed)
+def test_whatever_happens_the_leg_is_stopped_within_its_limits_and_it_is_said_why(
+    clock, reads_back, human, happens, plan, own
+):
+    check_every_invariant(clock, reads_back, human, happens, plan, own)
+
+
+@pytest.mark.slow
+@sequences
+@settings(max_examples=10_000, database=None, **relaxed)
+def test_ten_thousand_times_the_leg_is_stopped_within_its_limits_and_it_is_said_why(
+    clock, reads_back, human, happens, plan, own
+):
+    check_every_invariant(clock, reads_back, human, happens, plan, own)
+
+
+def test_a_simulated_run_to_which_nothing_happens_is_complete(tmp_path):
+    run = RunSettings(name="x", run="with_human", purpose="train", duration_s=0.5)
+    for clock in ("real_time", "lockstep"):
+        simulated = simulate(RIGS[clock, True], run, TRAJECTORY, tmp_path / f"{clock}.parquet", [])
+        assert isinstance(simulated.result, Outcome), simulated.result
+        assert (simulated.result.samples, simulated.result.missed) == (25, 0)
+        assert simulated.states == [
+            State.IDLE, State.CHECK, State.RAMP, State.RUN, State.RAMP_DOWN, State.DISABLED,
+        ]  # fmt: skip
+        moved = {told.reference for told in simulated.rig.told}
+        assert len(moved) > 80
