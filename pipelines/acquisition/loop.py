@@ -13,7 +13,7 @@ from pipelines.acquisition.machine import Machine, Row
 from pipelines.acquisition.pace import Lockstep, PhaseLock
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.states import State, Supervisor
-from pipelines.errors import DeviceError
+from pipelines.errors import DeviceError, Unanswered
 
 REPORT_S = 0.1
 DISABLE_TRIES = 3
@@ -176,14 +176,19 @@ class Loop:
     async def _stop_drive(self, joint: int) -> str | None:
         """Slow one drive down and disable it, whatever happens to the others; return why it could not be disabled."""
         drive, period = self.machine.drives[joint], 1.0 / self._rate
-        due = self.supervisor.sent_at + period
+        due, answered = self.supervisor.sent_at + period, time.monotonic()
         try:
             for reference, halt in self.supervisor.stopping(joint):
                 # On the host's clock: the device's counter may be what has failed. What is late is not caught up
                 # with, so that set-points never come faster than samples.
                 await asyncio.sleep(0.0 if drive.in_lockstep else max(0.0, due - time.monotonic()))
                 due = max(due, time.monotonic()) + period
-                self.supervisor.feel(joint, (await drive.exchange(reference, halt=halt)).torque)
+                try:
+                    self.supervisor.feel(joint, (await drive.exchange(reference, halt=halt)).torque)
+                    answered = time.monotonic()
+                except Unanswered:  # a lost reply alone is no reason to take a moving leg's torque away
+                    if time.monotonic() - answered > self.machine.rig.safety.watchdog_s:
+                        raise
         except BaseException as error:  # whatever it is, the drive may still hear that it shall disable
             self.supervisor.abort(error)
         return await self._disable(joint)

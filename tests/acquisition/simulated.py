@@ -5,6 +5,7 @@ import heapq
 import selectors
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
+from math import sin
 from unittest.mock import patch
 
 from pipelines.acquisition import journal, loop, machine, pace
@@ -12,7 +13,7 @@ from pipelines.acquisition.acquire import _finish, _record
 from pipelines.acquisition.device import Device
 from pipelines.acquisition.loop import Loop, run_to_its_end
 from pipelines.acquisition.states import Supervisor
-from pipelines.errors import DeviceError
+from pipelines.errors import DeviceError, Unanswered
 from pipelines.registers import Block
 from pipelines.settings.rig import registers_of
 
@@ -84,6 +85,11 @@ class SimulatedDrive:
     stuck_status: bool = False
     """Whether the status word tells the opposite of what is."""
 
+    latched: int = 0
+    seen: float = 0.0
+    velocity: float = 0.0
+    """Counter, angle and speed of the sample that is latched."""
+
     def __post_init__(self):
         self.read, self.write = Block(registers_of(self.map.read)), Block(registers_of(self.map.write))
 
@@ -97,12 +103,21 @@ class SimulatedDrive:
         if self.enabled:
             self.angle = told["reference"]
 
+    @property
+    def count(self):
+        return self.rig.count() if self.frozen_at is None else self.frozen_at
+
+    def latch(self):
+        """Take a sample, where a new one is due."""
+        if self.count != self.latched:
+            self.velocity = (self.angle - self.seen) * RATE / (self.count - self.latched)
+            self.latched, self.seen = self.count, self.angle
+
     def words(self):
-        count = self.rig.count() if self.frozen_at is None else self.frozen_at
         values = {
-            "sequence": max(count + self.ahead, 0), "time": max(count / RATE + self.clock_ahead, 0.0),
-            "angle": self.angle, "velocity": 0.0, "current": 0.0, "temperature": 20.0, "reference": self.angle,
-            "status": (self.enabled != self.stuck_status) | 8 * self.fault,
+            "sequence": max(self.count + self.ahead, 0), "time": max(self.count / RATE + self.clock_ahead, 0.0),
+            "angle": self.seen, "velocity": self.velocity, "current": 0.1 * sin(self.count), "temperature": 20.0,
+            "reference": self.angle, "status": (self.enabled != self.stuck_status) | 8 * self.fault,
         }  # fmt: skip
         return self.read.encode(values | self.wrong)
 
@@ -137,7 +152,7 @@ class SimulatedRig:
         befalls = None
         while self.events and self.events[0].at <= self.requests:
             event = self.events.pop(0)
-            if event.kind in ("raise", "late", "lost", "no answer", "dead"):
+            if event.kind in ("raise", "late", "lost", "no answer", "dead", "broken"):
                 befalls = event
             else:
                 self._do(event)
@@ -173,14 +188,12 @@ class SimulatedRig:
         """Serve a request, or let what is due befall it."""
         event = self.happen()
         drive = self.of(device.label)
-        dead = self.dead.get(device.label, 0)
-        if event and event.kind == "dead":
-            dead = event.what
-        if dead:
-            self.dead[device.label] = dead - 1
-            event = Event(0, "lost")
+        if event and event.kind in ("dead", "broken"):
+            self.dead[device.label] = [event.kind] * event.what
         kind = event.kind if event else ""
-        arrived = kind not in ("lost", "raise")
+        if self.dead.get(device.label):
+            kind = self.dead[device.label].pop()
+        arrived = kind in ("", "late", "no answer")
         if write is not None and drive:
             block, words = write
             told = block.decode(words)
@@ -194,10 +207,12 @@ class SimulatedRig:
         await asyncio.sleep(event.what if kind == "late" else LATENCY_S)
         if write is not None and drive and arrived:
             drive.take(words)
-        if kind in ("lost", "no answer"):
-            await asyncio.sleep(self.rig.safety.watchdog_s)
-            self.raised.append((self.clock.now, DeviceError("no answer")))
-            raise DeviceError(f"{device.label}: did not answer")
+        if kind in ("lost", "no answer", "dead"):
+            await asyncio.sleep(self.rig.safety.longest_reply_s)
+            raise Unanswered(f"{device.label}: did not answer")
+        if kind == "broken":
+            self.raised.append((self.clock.now, DeviceError("broken")))
+            raise DeviceError(f"{device.label}: the connection is broken")
         return self._read(drive, write, read)
 
     def _read(self, drive, write, read):
@@ -205,8 +220,10 @@ class SimulatedRig:
             return []
         address, count = read
         if drive is None:
-            values = {"sequence": self.count(), "force_x": self.force, "force_y": 0.0, "force_z": 0.0}
+            values = {"sequence": self.count(), "force_x": self.force, "force_y": sin(self.count()), "force_z": 0.0}
             return self.sensor_block.encode(values)
+        if count == drive.read.count:
+            drive.latch()
         block = drive.words()
         start = address - drive.read.address
         if write is not None and self.rig.clock == "lockstep":
@@ -246,7 +263,8 @@ def simulate(rig, settings, trajectory, path, events, *, plan=None, own=None):
     sensors = rig.sensor if settings.run == "with_human" else ()
     supervisor = Supervisor(rig, RATE, sensors)
     run = Run(simulated, supervisor, None, None, None, [supervisor.state])
-    metadata = {"run": settings.run, "purpose": "train", "sample_rate_hz": RATE, "config": {"run": {"duration_s": settings.duration_s}}}  # fmt: skip
+    metadata = {"run": settings.run, "purpose": "train", "sample_rate_hz": RATE}
+    metadata |= {"config": {"run": {"duration_s": settings.duration_s}}}
     with _patched(simulated, time, run, plan, own) as report:
         try:
             run_to_its_end(
@@ -284,7 +302,7 @@ def _patched(simulated, time, run, plan, own):
     async def check_identity(device, identity):
         pass
 
-    async def read(device, address, count):
+    async def read(device, address, count, *, in_motion=False):
         return await simulated.answer(device, None, (address, count))
 
     async def write(device, block, words):
