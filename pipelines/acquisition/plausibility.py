@@ -81,7 +81,7 @@ class Plausibility:
                 or self._frozen(j, found, samples, travel)
             )
             if why:
-                return f"drive {drive.joint} ({drive.host}:{drive.port}, unit {drive.unit}): {why}"
+                return f"{self._rig.label_of(drive)}: {why}"
         return self._cuffs(row.forces, samples, travel)
 
     def _clock(self, drive: DriveSettings, before: Reading, found: Reading, sequence: int) -> str | None:

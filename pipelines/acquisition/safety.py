@@ -55,9 +55,8 @@ class Limits:
             silent_s = (row.sequence - self._felt.setdefault(cuff, row.sequence)) / self._rate
             if silent_s > self._rig.safety.watchdog_s + sensor.every / self._rate:
                 return (
-                    f"watchdog: no new sample from sensor {sensor.cuff} ({self._rig.line_of(sensor).place}, unit "
-                    f"{sensor.unit}) for {silent_s:.3f} s, allowed are {self._rig.safety.watchdog_s:g} s; its counter "
-                    "stands still, or what it sends is no number"
+                    f"watchdog: no new sample from {self._rig.label_of(sensor)} for {silent_s:.3f} s, allowed are "
+                    f"{self._rig.safety.watchdog_s:g} s; its counter stands still, or what it sends is no number"
                 )
         return None
 

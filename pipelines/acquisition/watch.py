@@ -15,8 +15,7 @@ class Watch:
     """The first drive's counter and clock, which are the machine's; times ``now`` are the host's, s."""
 
     def __init__(self, rig: RigSettings, sample_rate_hz: float) -> None:
-        drive = rig.drive[0]
-        self._label = f"drive {drive.joint} ({drive.host}:{drive.port}, unit {drive.unit})"
+        self._label = rig.label_of(rig.drive[0])
         self._rate = sample_rate_hz
         self._longest_s = rig.safety.watchdog_s
         self._most = 1 + ceil(self._longest_s * sample_rate_hz)

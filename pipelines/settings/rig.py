@@ -356,6 +356,11 @@ class RigSettings(Settings):
         """Return the line that a device is on."""
         return TcpLine(host=device.host, port=device.port) if device.line is None else self.line[device.line]
 
+    def label_of(self, device: DriveSettings | SensorSettings) -> str:
+        """Return what errors call a device: what it is, and where."""
+        name = f"drive {device.joint}" if isinstance(device, DriveSettings) else f"sensor {device.cuff}"
+        return f"{name} ({self.line_of(device).place}, unit {device.unit})"
+
     def known_geometry(self) -> dict[str, float]:
         """Return the lengths that are known of this rig's leg; a virtual rig's are its plant's unless the file says."""
         plant = {name: getattr(self.plant, name) for name in GeometrySettings.model_fields} if self.plant else {}

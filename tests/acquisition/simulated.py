@@ -11,6 +11,7 @@ from unittest.mock import patch
 from pipelines.acquisition import journal, loop, machine, pace
 from pipelines.acquisition.acquire import _finish, _record
 from pipelines.acquisition.device import Device
+from pipelines.acquisition.line import Line
 from pipelines.acquisition.loop import Loop, run_to_its_end
 from pipelines.acquisition.states import Supervisor
 from pipelines.errors import DeviceError, Unanswered
@@ -296,7 +297,7 @@ def _patched(simulated, time, run, plan, own):
         if place == "report":
             fail()
 
-    async def connect(device):
+    async def connect(line):
         pass
 
     async def check_identity(device, identity):
@@ -327,9 +328,9 @@ def _patched(simulated, time, run, plan, own):
             stack.enter_context(patch.object(module, "time", time))
         stack.enter_context(patch("asyncio.events.new_event_loop", lambda: time))
         # The line has no part in this: every way to ask a device goes to the simulated rig.
-        for request in (connect, check_identity, read, write, exchange):
+        for request in (check_identity, read, write, exchange):
             stack.enter_context(patch.object(Device, request.__name__, request))
-        stack.enter_context(patch.object(Device, "close", lambda device: None))
+        stack.enter_context(patch.object(Line, "connect", connect))
         stack.enter_context(patch.object(Supervisor, "abort", watched_abort))
         stack.enter_context(patch.object(Supervisor, "_go", watched_go))
         if plan:
