@@ -110,7 +110,9 @@ MUTATIONS: dict[str, Mutation] = {
 }
 
 RARE: dict[str, Mutation] = {
-    "dribble": lambda rng, f: [piece for byte in bytes(f) * 20 for piece in (bytes([byte ^ rng.randrange(2)]), 0.002)],
+    "dribble": lambda rng, f: [
+        piece for byte in (bytes(f) * 20)[:200] for piece in (bytes([byte ^ rng.randrange(2)]), 0.002)
+    ],
     "flood": lambda rng, f: [rng.randbytes(65536)] * 64,
     "flood of replies": lambda rng, f: [bytes(replace(f, body=_flipped(rng, f.body))) * 500] * 20,
 }
