@@ -1,4 +1,4 @@
-"""Modbus TCP frames, right and wrong in every way that a grammar of them can be."""
+"""Modbus TCP and RTU frames, right and wrong in every way that a grammar of them can be."""
 
 from __future__ import annotations
 
@@ -30,14 +30,29 @@ class Frame:
     protocol: int = 0
     length: int | None = None
     """What the head says; None for the truth."""
+    rtu: bool = False
+    """Whether unit and body travel alone, with a checksum; a lie about the rest is one about that."""
 
     def __bytes__(self) -> bytes:
+        if self.rtu:
+            data = bytes([self.unit]) + self.body
+            return data + (crc(data) ^ self.protocol ^ (self.length or 0)).to_bytes(2, "little")
         length = len(self.body) + 1 if self.length is None else self.length
         return struct.pack(">HHHB", self.transaction, self.protocol, length, self.unit) + self.body
 
 
+def crc(data: bytes) -> int:
+    """Return the checksum of an RTU frame ("Modbus over serial line" V1.02, 6.2.2)."""
+    remainder = 0xFFFF
+    for byte in data:
+        remainder ^= byte
+        for _ in range(8):
+            remainder = remainder >> 1 ^ (0xA001 if remainder & 1 else 0)
+    return remainder
+
+
 def parsed(data: bytes) -> Frame:
-    """Return a whole frame as its parts."""
+    """Return a whole Modbus TCP frame as its parts."""
     transaction, protocol, length, unit = struct.unpack(">HHHB", data[:7])
     return Frame(transaction, unit, data[7:], protocol, length)
 

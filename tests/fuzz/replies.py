@@ -8,6 +8,7 @@ import re
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
@@ -38,6 +39,8 @@ class Peer:
         self.open = 0
         self.sent = bytearray()
         """The last that was sent, on all connections."""
+        self.asked: Frame
+        """The last request of an operation."""
         self.transcript: list[str] = []
         self.answered = 0
 
@@ -47,24 +50,23 @@ class Peer:
         return self._server.sockets[0].getsockname()[1]
 
     async def end(self) -> None:
-        """Listen no more, and wait until every connection has ended."""
+        """Listen no more."""
         self._server.close()
-        while self.open:
-            await asyncio.sleep(0.001)
 
     def honest(self, request: Frame) -> Script:
         """Answer as the right device, all of whose values are 0."""
-        return [bytes(Frame(request.transaction, request.unit, self._body(request, None)))]
+        return [bytes(replace(request, length=None, body=self._body(request, None)))]
 
     def hostile(self, rng: Random, right_share: float) -> Callable[[Frame], Script]:
         """Return what answers as a generator tells."""
 
         def answer(request: Frame) -> Script:
             self.answered += 1
-            frame = Frame(request.transaction, request.unit, self._body(request, rng))
+            frame = replace(request, length=None, body=self._body(request, rng))
             name, script = ("right", [bytes(frame)]) if rng.random() < right_share else mutated(rng, frame)
             sent = ["hang up" if s is HANG_UP else s if isinstance(s, float) else s[:300].hex() for s in script[:8]]
             self.transcript.append(f"{bytes(request).hex()} -> {name}: {sent}")
+            self.asked = request
             return script
 
         return answer
@@ -91,13 +93,22 @@ class Peer:
         sending = asyncio.ensure_future(self._send(writer, []))
         with suppress(OSError, asyncio.IncompleteReadError):
             while True:
-                head = await reader.readexactly(7)
-                request = parsed(head + await reader.readexactly(int.from_bytes(head[4:6], "big") - 1))
+                request = await (self._rtu_request(reader) if self._rig.line else self._tcp_request(reader))
                 sending.cancel()  # who asks anew listens no more
                 sending = asyncio.ensure_future(self._send(writer, self.answer(request)))
         sending.cancel()
         self.open -= 1
         writer.close()
+
+    async def _tcp_request(self, reader: asyncio.StreamReader) -> Frame:
+        head = await reader.readexactly(7)
+        return parsed(head + await reader.readexactly(int.from_bytes(head[4:6], "big") - 1))
+
+    async def _rtu_request(self, reader: asyncio.StreamReader) -> Frame:
+        head = await reader.readexactly(2)
+        head += await reader.readexactly({3: 4, 16: 5, 23: 9}[head[1]])  # where bytes are counted, the count ends it
+        rest = await reader.readexactly(2 if head[1] == 3 else head[-1] + 2)
+        return Frame(0, head[0], head[1:] + rest[:-2], rtu=True)
 
     async def _send(self, writer: asyncio.StreamWriter, script: Script) -> None:
         with suppress(OSError):
@@ -130,7 +141,7 @@ class Client:
             with suppress(DeviceError):
                 await self._connect_once()
                 return
-            self.close()
+            await self._hang_up()
         raise TimeoutError(f"an honest peer was not reached in {TRIES} tries")
 
     async def _connect_once(self) -> None:
@@ -140,28 +151,31 @@ class Client:
                 update={
                     "drive": tuple(d.model_copy(update=here) for d in self._rig.drive),
                     "sensor": tuple(s.model_copy(update=here) for s in self._rig.sensor),
+                    "line": {name: line.at(f"127.0.0.1:{self._port}") for name, line in self._rig.line.items()},
                 }
             ),
             with_sensors=True,
         )
         self._parts: list[Drive | Sensor] = [*self.machine.drives, *self.machine.sensors]
         await self.machine.connect()
+        self._connections = self.peer.open
 
     async def renew(self) -> None:
         """Connect anew where a connection has ended."""
         await asyncio.sleep(0)
-        if self.peer.open < len(self._parts):
-            self.close()
+        if self.peer.open < self._connections:
+            await self._hang_up()
             await self._connect()
-
-    def close(self) -> None:
-        """Close all connections."""
-        self.machine.close()
 
     async def end(self) -> None:
         """Close everything, the peer too."""
-        self.close()
+        await self._hang_up()
         await self.peer.end()
+
+    async def _hang_up(self) -> None:
+        self.machine.close()
+        while self.peer.open:
+            await asyncio.sleep(0.001)
 
     async def operate(self, rng: Random) -> str:
         """Try one operation on hostile replies; return what came of it, raise what must not come of it."""
@@ -194,8 +208,7 @@ class Client:
         else:
             found = await asyncio.wait_for(device.exchange(part.tell, [1, 2, 3], part.told), HANG_S)
             expected = b"\x17\x1c" + b"".join(word.to_bytes(2, "big") for word in found)
-        request = parsed(bytes.fromhex(self.peer.transcript[-1].partition(" ")[0]))
-        if bytes(Frame(request.transaction, unit, expected)) not in self.peer.sent:
+        if bytes(replace(self.peer.asked, length=None, unit=unit, body=expected)) not in self.peer.sent:
             raise AssertionError(f"accepted {expected.hex()}, which no frame of the peer's held")
 
     async def _look(self, rng: Random) -> None:
@@ -213,11 +226,16 @@ class Client:
 
 
 def hostile_rigs() -> list[RigSettings]:
-    """Return the plain rig, with its integers and with floats in their place, both of little patience."""
+    """Return the plain rig, with floats in place of its integers, and all on one RTU line; all of little patience."""
     text = (datasets() / "rigs" / "plain.toml").read_text()
     text = re.sub(r"^watchdog_s = [^#\n]*", f"watchdog_s = {TIMEOUT_S} ", text, flags=re.MULTILINE)
+    shared = re.sub(r"^(map = .*)$", r'\1\nline = "leg"', text, flags=re.MULTILINE)
     with TemporaryDirectory() as folder:
-        return [_load(text, Path(folder)), _load(re.sub('"u?int32"', '"float32"', text), Path(folder))]
+        return [
+            _load(text, Path(folder)),
+            _load(re.sub('"u?int32"', '"float32"', text), Path(folder)),
+            _load(f'{shared}\n[line.leg]\ntransport = "rtu_over_tcp"\n', Path(folder)),
+        ]
 
 
 def _load(text: str, folder: Path) -> RigSettings:
@@ -231,8 +249,8 @@ async def fuzz(seed: int, inputs: int, only: int | None = None, seconds: float =
     outcome = Outcome("replies", seed)
     said = _listen_to_asyncio()
     rigs = hostile_rigs()
-    clients = [Client(rigs[k % 2]) for k in range(SIDE_BY_SIDE if only is None else 1)]
-    numbers = iter(range(1 << 60)) if only is None else iter([only])
+    clients = [Client(rigs[k % len(rigs)]) for k in range(SIDE_BY_SIDE if only is None else len(rigs))]
+    numbers = iter(range(1 << 60)) if only is None else iter([only] * len(rigs))
     until, before = time.monotonic() + seconds, peak_mib()
 
     async def work(client: Client) -> None:
