@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.operator import Terminal
+from exoid_cli.operator import Terminal, confirm_move
 
 if TYPE_CHECKING:
     from pipelines.acquisition.check.latency import Latency
@@ -29,8 +29,12 @@ def check(
     by_hand: Annotated[
         bool, typer.Option("--by-hand", help="Then disable the drives and say what to move and press by hand.")
     ] = False,
+    move: Annotated[
+        bool, typer.Option("--move", help="Then, if nothing is wrong, let the drives move 0.05 rad to and fro.")
+    ] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Move without asking, for scripts.")] = False,
 ) -> None:
-    """Ask every device of a rig and say what is wrong; nothing is moved.
+    """Ask every device of a rig and say what is wrong; nothing moves unless told to.
 
     \b
     Examples:
@@ -43,8 +47,10 @@ def check(
 
     if rate_hz is None and config:
         rate_hz = Experiment.load(config).acquire.sample_rate_hz
-    console.say(f"{file}: asking every device, moving nothing")
-    report = check_rig(file, rate_hz, run, Terminal() if by_hand else None)
+    console.say(f"{file}: asking every device")
+    if move and not yes:
+        confirm_move()
+    report = check_rig(file, rate_hz, run, Terminal() if by_hand else None, move=move)
     console.emit(report.as_json())
     _show(report)
     if report.findings:
@@ -75,6 +81,13 @@ def _show(report: "RigReport") -> None:
     if sensors:
         console.say("\nSensors, mean ± noise in N")
         console.table(("", "x", "y", "z", "samples/s"), map(_sensor, sensors), numbers="x, y, z, samples/s")
+    if report.answers:
+        console.say("\nMoved by the drives")
+        rows = [
+            (a.joint, f"{a.gain:.3f}", f"{a.delay_s * 1e3:.0f}", f"{a.torque_with_speed:.2f}") for a in report.answers
+        ]
+        headings = ("joint", "angle per set-point", "delay ms", "torque with speed")
+        console.table(headings, rows, numbers=", ".join(headings[1:]))
     for what, rate in (("all devices", report.together), ("the drives alone", report.drives_alone)):
         if rate:
             _show_rate(what, rate, report.rate_hz)

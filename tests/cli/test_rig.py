@@ -1,5 +1,6 @@
 """``exoid rig``: serve and check."""
 
+import io
 import json
 
 import pytest
@@ -30,3 +31,11 @@ def test_a_rig_file_that_cannot_be_used_is_exit_code_2(exoid, tmp_path):
     rig = tmp_path / "rig.toml"
     rig.write_text("name = 1\n")
     assert exoid("rig", "check", rig).code == 2
+
+
+@pytest.mark.parametrize(("option", "words"), [("--move", "add --yes if it is safe"), ("--by-hand", "is no terminal")])
+def test_without_a_terminal_nobody_is_asked_and_nothing_moves(exoid, monkeypatch, option, words):
+    monkeypatch.setattr("sys.stdin", io.StringIO("yes\n"))
+    outcome = exoid("rig", "check", datasets() / "rigs" / "plain.toml", option)
+    assert outcome.code == 2
+    assert words in outcome.err

@@ -8,6 +8,7 @@ from typing import Literal
 
 from pipelines.acquisition.check.by_hand import Operator, by_hand
 from pipelines.acquisition.check.finding import Finding
+from pipelines.acquisition.check.guided import guided, refuse_far_from_zero
 from pipelines.acquisition.check.look import RigReport, look, probes_of
 from pipelines.acquisition.embedded import embedded
 from pipelines.acquisition.machine import Machine
@@ -22,8 +23,10 @@ def check_rig(
     rate_hz: float | None = None,
     run: Literal["exo_alone", "with_human"] = "exo_alone",
     operator: Operator | None = None,
+    *,
+    move: bool = False,
 ) -> RigReport:
-    """Ask every device of a rig and say what is wrong; move nothing.
+    """Ask every device of a rig and say what is wrong; move nothing unless asked to.
 
     Parameters
     ----------
@@ -35,6 +38,8 @@ def check_rig(
         Whether somebody is in the machine: only an empty one shows its sensors' zeros.
     operator : Operator, optional
         Who moves the joints and presses the cuffs, if all devices answer.
+    move : bool
+        Whether the drives shall move the joints a little, once nothing else is wrong.
     """
     rig = load_rig(path)
     if rate_hz is None and rig.plant:
@@ -43,10 +48,25 @@ def check_rig(
     settings = RunSettings(name="check", run=run, purpose="train")
     place = embedded(rig, path, settings, rate_hz) if rig.embedded and rate_hz else nullcontext(rig)
     with place as present, nullcontext() if rig.clock == "lockstep" else urgent():
-        return asyncio.run(_check(present, rate_hz, run == "exo_alone", operator))
+        report, start = asyncio.run(_check(present, rate_hz, run == "exo_alone", operator))
+        if move and not report.findings:
+            if not report.by_hand:
+                refuse_far_from_zero(start)
+            report.answers, report.findings = guided(present, start, rate_hz or _counted(report), run)
+        return report
 
 
-async def _check(rig: RigSettings, rate_hz: float | None, alone: bool, operator: Operator | None) -> RigReport:
+def _counted(report: RigReport) -> float:
+    """Return the rate at which the first drive was found to sample."""
+    clock = report.devices[0].clock
+    assert clock and clock.counter_hz  # else there were findings
+    return clock.counter_hz
+
+
+async def _check(
+    rig: RigSettings, rate_hz: float | None, alone: bool, operator: Operator | None
+) -> tuple[RigReport, list[float]]:
+    """Return what was found, and where the leg stands at the end of it, rad."""
     machine = Machine(rig, with_sensors=True)
     try:
         report = await look(machine, rate_hz, alone=alone)
@@ -56,6 +76,6 @@ async def _check(rig: RigSettings, rate_hz: float | None, alone: bool, operator:
                 report.findings += await by_hand(probes_of(machine), rig, rate_hz, operator)
             except DeviceError as error:
                 report.findings.append(Finding("rig", str(error)))
-        return report
+        return report, [] if report.findings else [(await drive.look()).angle for drive in machine.drives]
     finally:
         machine.close()

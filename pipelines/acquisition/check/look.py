@@ -9,6 +9,7 @@ import numpy as np
 from pipelines.acquisition.check.agreement import check_velocity
 from pipelines.acquisition.check.clock import TOLERANCE, Clock, check_clock, check_latch, measure_clock
 from pipelines.acquisition.check.finding import Finding
+from pipelines.acquisition.check.guided import Answer
 from pipelines.acquisition.check.latency import Latency
 from pipelines.acquisition.check.plausible import check_registers
 from pipelines.acquisition.check.probe import Probe, Series
@@ -60,6 +61,8 @@ class RigReport:
     drives_alone: Rate | None = None
     by_hand: bool = False
     """Whether a person moved it."""
+    answers: list[Answer] = field(default_factory=list)
+    """How the joints answered when they were moved."""
     findings: list[Finding] = field(default_factory=list)
 
     def as_json(self) -> dict:
@@ -68,6 +71,7 @@ class RigReport:
         return {
             "rate_hz": self.rate_hz,
             "by_hand": self.by_hand,
+            "moved": [asdict(answer) for answer in self.answers],
             "devices": [device.as_json() for device in self.devices],
             **{
                 name: {"cycles_hz": rate.cycles_hz, "late": rate.late, "cycle": rate.cycle.as_json()} if rate else None

@@ -1,0 +1,209 @@
+"""A small slow movement by the drives themselves, made and watched by the machinery that records every run."""
+
+import json
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.acquisition.acquire import acquire
+from pipelines.acquisition.check.agreement import check_velocity
+from pipelines.acquisition.check.finding import Finding
+from pipelines.acquisition.loop import Progress
+from pipelines.contracts import RECORDING
+from pipelines.errors import DeviceError, SettingsError
+from pipelines.settings.acquire import RunSettings
+from pipelines.settings.rig import RigSettings, registers_of
+
+AMPLITUDE_RAD = 0.05
+PERIOD_S = 4.0
+"""Of the hip; the knee moves twice as fast, so that each answer tells whose it is."""
+ROOM_RAD = 0.1
+"""How far beyond the movement an angle may go before it is stopped, within the rig's own limits."""
+SPEED_RAD_S = 1.0
+NEAR_ZERO_RAD = 0.1
+"""How far from zero a joint may stand: where a sign is wrong, its drive leaps by twice that when it is enabled."""
+LONGEST_DELAY_S = 0.3
+GAIN = 0.25
+"""How far the angle's answer to the set-point may be from one."""
+SEEN_RAD = 0.002
+"""Movement of a set-point from which on an answer to it can be judged."""
+ALIKE = 0.2
+"""Correlation of torque and speed from which on the torque's sign is known."""
+JOINTS = ("hip", "knee")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """How a joint answers its set-point."""
+
+    joint: str
+    gain: float
+    """Angle per set-point."""
+    delay_s: float
+    torque_with_speed: float
+    """Correlation of torque with speed; friction makes it positive."""
+
+
+def refuse_far_from_zero(angles: Sequence[float]) -> None:
+    """Refuse to enable drives whose signs nobody has seen, where a wrong one would make them leap."""
+    for joint, angle in zip(JOINTS, angles, strict=True):
+        if abs(angle) > NEAR_ZERO_RAD:
+            raise SettingsError(
+                f"--move: the {joint} stands at {angle:.3f} rad, expected within ±{NEAR_ZERO_RAD:g} rad of zero, since "
+                "a drive of wrong sign leaps by twice its angle; let the leg hang straight, or add --by-hand"
+            )
+
+
+def guided(rig: RigSettings, start: Sequence[float], rate_hz: float, run: str) -> tuple[list[Answer], list[Finding]]:
+    """Move each joint a little to and fro about where it stands, and judge its answer.
+
+    Parameters
+    ----------
+    rig : RigSettings
+        As it is reached; its limits are made tighter for this.
+    start : (J,) sequence
+        Where the leg stands, rad.
+    run : str
+        ``exo_alone`` or ``with_human``.
+    """
+    folder = Path(tempfile.mkdtemp(prefix="exoid-check-"))
+    rig_file, excitation, output = folder / "rig.toml", folder / "excitation.toml", folder / "guided.parquet"
+    rig_file.write_text(_toml_file(_tight(rig, start)))
+    excitation.write_text(_toml_file(_motion(start)))
+    settings = RunSettings(name="guided", run=run, purpose="train", duration_s=2 * PERIOD_S)
+    seen: list[Progress] = []
+    try:
+        acquire(rig_file, settings, excitation, output, rate_hz, report=seen.append)
+    except DeviceError as error:  # the folder stays: the message names a file in it
+        return [], [Finding("rig", f"the guided movement was stopped: {error}"), *_first_signs(rig, seen)]
+    frame = RECORDING.read(output).frame
+    shutil.rmtree(folder)
+    reference = _sent(np.asarray(frame["time_s"], float), start)
+    answers, findings = [], list[Finding]()
+    for j, drive in enumerate(rig.drive):
+        columns = {name: np.asarray(frame[f"{drive.joint}_{name}"], float) for name in ("angle_rad", "torque_nm")}
+        gains, delay = _answer(columns["angle_rad"], reference, rate_hz)
+        speed = np.gradient(reference[:, j]) * rate_hz * np.sign(gains[j])
+        torque = float(np.corrcoef(columns["torque_nm"], speed)[0, 1])
+        answers.append(Answer(drive.joint, float(gains[j]), delay, torque))
+        findings += _judged(rig, j, gains, torque)
+        velocity = registers_of(rig.map.drive[drive.map].read).get("velocity")
+        if velocity:
+            t, dq = np.asarray(frame["time_s"]), np.asarray(frame[f"{drive.joint}_velocity_rad_s"], float)
+            where = f"map.drive.{drive.map}.read"
+            findings += check_velocity(f"drive {drive.joint}", where, velocity, t, columns["angle_rad"], dq)
+    return answers, findings
+
+
+def _tight(rig: RigSettings, start: Sequence[float]) -> dict[str, Any]:
+    """Return the rig's settings with limits about where the leg stands."""
+    room = AMPLITUDE_RAD + ROOM_RAD
+    drives = tuple(
+        drive.model_copy(
+            update={
+                "angle_rad": (max(drive.angle_rad[0], angle - room), min(drive.angle_rad[1], angle + room)),
+                "speed_rad_s": min(drive.speed_rad_s, SPEED_RAD_S),
+            }
+        )
+        for drive, angle in zip(rig.drive, start, strict=True)
+    )
+    tight = rig.model_copy(update={"drive": drives, "embedded": False})
+    return tight.model_dump(mode="json", exclude_none=True)
+
+
+def _motion(start: Sequence[float]) -> dict[str, Any]:
+    return {
+        "unit": "rad",
+        "omega_rad_s": 2 * np.pi / PERIOD_S,
+        "theta0_rad": list(start),
+        "a": [[AMPLITUDE_RAD, 0.0], [0.0, AMPLITUDE_RAD]],
+        "b": [[0.0, 0.0], [0.0, 0.0]],
+    }
+
+
+def _sent(t: NDArray, start: Sequence[float]) -> NDArray:
+    """Return the set-points (n, J) at instants (n,) since the recording began, which is in phase with the motion.
+
+    Not those of the recording: they are the drive's own where it tells them, in a unit of its own.
+    """
+    phase = 2 * np.pi / PERIOD_S * t
+    return np.array(start) + AMPLITUDE_RAD * np.column_stack([np.sin(phase), np.sin(2 * phase)])
+
+
+def _toml_file(settings: dict[str, Any]) -> str:
+    return "".join(f"{key} = {_toml(value)}\n" for key, value in settings.items())
+
+
+def _toml(value: Any) -> str:
+    """Write a value on one line; what is no table is written as JSON is."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(key)} = {_toml(one)}" for key, one in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return json.dumps(value)
+
+
+def _answer(angle: NDArray, reference: NDArray, rate_hz: float) -> tuple[NDArray, float]:
+    """Fit angle(t) = gains @ reference(t - delay) + constant; return gains (J,) and delay (s)."""
+    fits = []
+    for lag in range(max(1, min(round(LONGEST_DELAY_S * rate_hz), len(angle) // 4))):
+        Y = np.column_stack([reference[: len(reference) - lag], np.ones(len(reference) - lag)])
+        values = np.linalg.lstsq(Y, angle[lag:], rcond=None)[0]
+        fits.append((float(np.mean((angle[lag:] - Y @ values) ** 2)), lag, values[:-1]))
+    _, lag, gains = min(fits, key=lambda fit: fit[:2])
+    return gains, lag / rate_hz
+
+
+def _judged(rig: RigSettings, j: int, gains: NDArray, torque: float) -> Iterator[Finding]:
+    drive, other = rig.drive[j], rig.drive[1 - j]
+    name, where, gain, across = f"drive {drive.joint}", f"map.drive.{drive.map}", gains[j], gains[1 - j]
+    if abs(gain) < GAIN and abs(across) > 1.0 - GAIN:
+        yield Finding(
+            name,
+            f"its angle follows the set-point of drive {other.joint}: the angles are swapped; exchange host, port and "
+            "unit of the two in the rig file",
+            "angle",
+        )
+    elif abs(gain) < GAIN:
+        yield Finding(name, f"its angle does not follow its set-point (it goes {gain:.2f} as far); is it enabled?")
+    elif gain < 0:
+        yield Finding(
+            name,
+            f"its angle goes against its set-point ({gain:.2f} as far): the sign of {where}.read.angle.scale or of "
+            f"{where}.write.reference.scale is wrong; --by-hand tells which",
+            "angle",
+        )
+    elif abs(gain - 1.0) > GAIN:
+        yield Finding(
+            name,
+            f"its angle goes {gain:.3g} times as far as its set-point: unit or scale of {where}.read.angle and "
+            f"{where}.write.reference differ; correct the wrong one",
+            "angle",
+        )
+    if abs(gain) >= GAIN and torque < -ALIKE:
+        yield Finding(
+            name,
+            f"its torque goes against its speed (correlation {torque:.2f}), as if friction drove it: turn the sign of "
+            f"{where}.read.current.scale",
+            "current",
+        )
+
+
+def _first_signs(rig: RigSettings, seen: Sequence[Progress]) -> Iterator[Finding]:
+    """Judge what was seen before a movement was stopped."""
+    rows = [progress.row for progress in seen if progress.row is not None]
+    for j in range(len(rig.drive)):
+        reference = np.array([row.drives[j].reference for row in rows])
+        angle = np.array([row.drives[j].angle for row in rows])
+        if len(rows) < 2 or np.ptp(reference) < SEEN_RAD:
+            continue
+        away = reference - reference[0]
+        gains = np.zeros(len(rig.drive))
+        gains[j] = away @ (angle - angle[0]) / (away @ away)
+        yield from _judged(rig, j, gains, 0.0)

@@ -1,0 +1,68 @@
+"""A small movement by the drives tells whether set-point, angle, torque and velocity go the same way."""
+
+import pytest
+
+from pipelines.acquisition.check import guided
+from pipelines.errors import SettingsError
+
+READ = 'angle = { address = 104, type = "int32", scale = 1e-6, unit = "rad" }'
+WRITE = 'reference = { address = 200, type = "int32", scale = 1e-6, unit = "rad" }'
+CURRENT = 'current = { address = 108, type = "int32", scale = 0.1, unit = "mA" }'
+VELOCITY = 'velocity = { address = 106, type = "int32", scale = 1e-5, unit = "rad/s" }'
+MOVE = {"move": True}
+
+
+@pytest.fixture(autouse=True)
+def _short(monkeypatch):
+    monkeypatch.setattr(guided, "PERIOD_S", 2.0)
+
+
+def told(report):
+    return "\n".join(map(str, report.findings))
+
+
+def test_a_right_rig_answers_its_set_points(checked):
+    report = checked(options=MOVE, rest_rad="[0.0, 0.0]")
+    assert told(report) == ""
+    assert [answer.joint for answer in report.answers] == ["hip", "knee"]
+    for answer in report.answers:
+        assert answer.gain == pytest.approx(1.0, abs=guided.GAIN)
+        assert 0 <= answer.delay_s < 0.1
+        assert answer.torque_with_speed > guided.ALIKE
+
+
+@pytest.mark.parametrize(
+    ("was", "believed", "words"),
+    [
+        (READ, READ.replace("1e-6", "-1e-6"), "its angle goes against its set-point"),
+        (CURRENT, CURRENT.replace("0.1", "-0.1"), "its torque goes against its speed"),
+        (VELOCITY, VELOCITY.replace("1e-5", "-1e-5"), "velocity is negative where the angle grows"),
+        (WRITE, WRITE.replace("1e-6", "2e-6"), "times as far as its set-point: unit or scale of"),
+    ],
+    ids=["sign of the angle", "sign of the current", "sign of the velocity", "scale of the set-point"],
+)
+def test_a_wrong_sign_or_scale_is_told_by_the_answer(checked, was, believed, words):
+    report = checked(options=MOVE, believed={was: believed}, rest_rad="[0.0, 0.0]")
+    assert [finding.device for finding in report.findings if words in finding.text] == ["drive hip", "drive knee"]
+
+
+def test_a_set_point_in_the_wrong_unit_is_stopped_before_the_leg_goes_far(checked):
+    report = checked(options=MOVE, believed={WRITE: WRITE.replace('"rad"', '"deg"')}, rest_rad="[0.0, 0.0]")
+    assert "rig: the guided movement was stopped: " in told(report)
+
+
+def test_a_leg_away_from_zero_is_not_moved_before_its_signs_are_known(checked):
+    with pytest.raises(SettingsError, match="a drive of wrong sign leaps by twice its angle"):
+        checked(options=MOVE, rest_rad="[0.3, -0.6]", coulomb_nm="[40.0, 40.0]")
+
+
+def test_nothing_is_moved_where_something_is_wrong(checked):
+    controls = []
+
+    def note(device, function, written):
+        if written:
+            controls.append(written[-1])
+
+    report = checked(options=MOVE, believed={"value = 0x4653": "value = 0x4654"}, fault=note, rest_rad="[0.0, 0.0]")
+    assert report.findings and not report.answers
+    assert set(controls) <= {0}
