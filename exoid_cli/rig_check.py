@@ -99,6 +99,8 @@ def _identity(device: "DeviceReport") -> str:
     wrong = [entry for entry in device.identity if entry["found"] != entry["expected"]]
     if wrong:
         return ", ".join(f"0x{entry['found']:04X}, expected 0x{entry['expected']:04X}" for entry in wrong)
+    if device.latency is None:
+        return "no answer"
     return "as expected" if device.identity else "none asked for"
 
 

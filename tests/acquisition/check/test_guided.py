@@ -36,14 +36,22 @@ def test_a_right_rig_answers_its_set_points(checked):
     [
         (READ, READ.replace("1e-6", "-1e-6"), "its angle goes against its set-point"),
         (CURRENT, CURRENT.replace("0.1", "-0.1"), "its torque goes against its speed"),
-        (VELOCITY, VELOCITY.replace("1e-5", "-1e-5"), "velocity is negative where the angle grows"),
         (WRITE, WRITE.replace("1e-6", "2e-6"), "times as far as its set-point: unit or scale of"),
     ],
-    ids=["sign of the angle", "sign of the current", "sign of the velocity", "scale of the set-point"],
+    ids=["sign of the angle", "sign of the current", "scale of the set-point"],
 )
 def test_a_wrong_sign_or_scale_is_told_by_the_answer(checked, was, believed, words):
     report = checked(options=MOVE, believed={was: believed}, rest_rad="[0.0, 0.0]")
-    assert [finding.device for finding in report.findings if words in finding.text] == ["drive hip", "drive knee"]
+    assert [finding.device for finding in report.findings if words in finding.text] == ["drive hip", "drive knee"], (
+        told(report)
+    )
+
+
+@pytest.mark.parametrize("scale", ["-1e-5", "3e-5"])
+def test_a_velocity_of_the_wrong_sign_or_scale_stops_the_movement(checked, scale):
+    report = checked(options=MOVE, believed={VELOCITY: VELOCITY.replace("1e-5", scale)}, rest_rad="[0.0, 0.0]")
+    assert "rig: the guided movement was stopped: " in told(report)
+    assert "velocity" in told(report)
 
 
 def test_a_set_point_in_the_wrong_unit_is_stopped_before_the_leg_goes_far(checked):
