@@ -24,7 +24,7 @@ def checked(rig_file, serve, monkeypatch):
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             port = probe.getsockname()[1]
-        changes = {"watchdog_s": 2.0, "rest_rad": "[0.4, -0.6]", **changes}
+        changes = {"watchdog_s": 10.0, "rest_rad": "[0.4, -0.6]", **changes}
         rig = rig_file(shipped, port, replace, **changes)
         seen = rig_file(shipped, port, replace | (believed or {}), **changes)
         options = options or {}
