@@ -109,7 +109,9 @@ def _tight(rig: RigSettings, start: Sequence[float]) -> dict[str, Any]:
         )
         for drive, angle in zip(rig.drive, start, strict=True)
     )
-    tight = rig.model_copy(update={"drive": drives, "embedded": False})
+    # The narrower file lies elsewhere, and what files it names would be looked for there.
+    lines = {name: line.with_files_in(Path.cwd()) for name, line in rig.line.items()}
+    tight = rig.model_copy(update={"drive": drives, "line": lines, "embedded": False})
     return tight.model_dump(mode="json", exclude_none=True)
 
 
