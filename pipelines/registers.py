@@ -11,6 +11,8 @@ _FORMAT = {
     "float64": "d",
 }  # fmt: skip
 
+_STEP = {"big": 1, "little": -1}
+
 
 class Block:
     """Registers that travel in one exchange, from the lowest address to the highest."""
@@ -20,21 +22,22 @@ class Block:
         self.names = tuple(registers)
         self.address = min(r.address for r in registers.values())
         self.count = max(r.address + r.registers for r in registers.values()) - self.address
-        # Words are picked in the order in which one big-endian structure of all values holds them.
-        self._places = [place for r in registers.values() for place in self._words(r)]
-        self._pick = itemgetter(*self._places) if len(self._places) > 1 else lambda words: (words[self._places[0]],)
-        self._words_format = struct.Struct(f">{len(self._places)}H")
+        # Bytes are picked in the order in which one big-endian structure of all values holds them.
+        self._places = [place for r in registers.values() for place in self._bytes(r)]
+        self._pick = itemgetter(*self._places)
+        self._words_format = struct.Struct(f">{self.count}H")
         self._values_format = struct.Struct(">" + "".join(_FORMAT[r.type] for r in registers.values()))
         self._scales = [r.si for r in registers.values()]
         self._ranges = [raw_range(r) for r in registers.values()]
 
-    def _words(self, register: Register) -> list[int]:
-        words = list(range(register.address - self.address, register.address - self.address + register.registers))
-        return words if register.word_order == "big" else words[::-1]
+    def _bytes(self, register: Register) -> list[int]:
+        first = register.address - self.address
+        words = list(range(first, first + register.registers))[:: _STEP[register.word_order]]
+        return [2 * word + byte for word in words for byte in (0, 1)[:: _STEP[register.byte_order]]]
 
     def decode(self, words: Sequence[int]) -> dict[str, float]:
         """Return the SI values in ``count`` words that were read at ``address``."""
-        raw = self._values_format.unpack(self._words_format.pack(*self._pick(words)))
+        raw = self._values_format.unpack(bytes(self._pick(self._words_format.pack(*words))))
         return {
             name: value * scale + offset
             for name, value, (scale, offset) in zip(self.names, raw, self._scales, strict=True)
@@ -46,10 +49,10 @@ class Block:
         for name, (scale, offset), limits in zip(self.names, self._scales, self._ranges, strict=True):
             value = (values[name] - offset) / scale
             raw.append(value if limits is None else min(max(round(value), limits[0]), limits[1]))
-        words = [0] * self.count
-        for place, word in zip(self._places, self._words_format.unpack(self._values_format.pack(*raw)), strict=True):
-            words[place] = word
-        return words
+        packed = bytearray(2 * self.count)
+        for place, byte in zip(self._places, self._values_format.pack(*raw), strict=True):
+            packed[place] = byte
+        return list(self._words_format.unpack(packed))
 
     def span(self, name: str) -> float:
         """Return after which difference an unsigned counter begins anew, in SI units; 0 for one that does not."""

@@ -10,40 +10,40 @@ from pipelines.settings.rig import DriveMap, RigSettings, SensorMap, registers_o
 
 
 def refuse_slow_lines(rig: RigSettings, sample_rate_hz: float, *, with_sensors: bool) -> None:
-    """Refuse a sample rate that one of the lines cannot keep up with even where devices answer at once.
+    """Refuse a sample rate that the lines cannot keep up with even where devices answer at once.
 
     Raises
     ------
     SettingsError
-        Tells the line and its highest rate.
+        Tells the line that takes longest, and the highest rate.
     """
-    for name, highest in highest_rates(rig, with_sensors=with_sensors).items():
-        if sample_rate_hz > highest:
-            on_it = sum(device.line == name for device in (*rig.drive, *(rig.sensor if with_sensors else ())))
-            raise SettingsError(
-                f"line {name} ({rig.line[name].place}): {sample_rate_hz:g} samples a second are asked for, at most "
-                f"{floor(highest)} fit through it with {on_it} device{'s' * (on_it > 1)} on it; raise baud_rate, give "
-                "devices lines of their own, or lower acquire.sample_rate_hz"
-            )
+    highest, slowest = highest_rate(rig, with_sensors=with_sensors)
+    if slowest is not None and sample_rate_hz > highest:
+        raise SettingsError(
+            f"line {slowest} ({rig.line[slowest].place}): {sample_rate_hz:g} samples a second are asked for, at most "
+            f"{floor(highest)} fit through; raise baud_rate, give devices lines of their own, or lower "
+            "acquire.sample_rate_hz"
+        )
 
 
-def highest_rates(rig: RigSettings, *, with_sensors: bool) -> dict[str, float]:
-    """Return the most samples a second, Hz, by line; of a line whose speed is not known, infinity."""
-    busy, look = defaultdict[str | None, float](float), defaultdict[str | None, float](float)
-    for place, drive in enumerate(rig.drive):
-        line, registers = rig.line_of(drive), rig.map.drive[drive.map]
-        busy[drive.line] += line.exchange_s(exchange_characters(registers))
-        if not place:  # the first drive's counter is looked at before every exchange
-            look[drive.line] = line.exchange_s(read_characters(registers.read.sequence.registers))
+def highest_rate(rig: RigSettings, *, with_sensors: bool) -> tuple[float, str | None]:
+    """Return the most samples a second, Hz, and the line that a sample waits for longest.
+
+    A cycle looks at the first drive's counter, exchanges the drives, then reads the sensors. Lines work side by
+    side, devices on one line take turns. Infinity and None where the speed of no line is known.
+    """
+    first = rig.drive[0]
+    look = rig.line_of(first).exchange_s(read_characters(rig.map.drive[first.map].read.sequence.registers))
+    drives, sensors = defaultdict[str | None, float](float), defaultdict[str | None, float](float)
+    for drive in rig.drive:
+        drives[drive.line] += rig.line_of(drive).exchange_s(exchange_characters(rig.map.drive[drive.map]))
     for sensor in rig.sensor if with_sensors else ():
-        characters = read_characters(_count(rig.map.sensor[sensor.map]))
-        busy[sensor.line] += rig.line_of(sensor).exchange_s(characters) / sensor.every
-    rates = {}
-    for name in rig.line:
-        # An answer later than this share of a sample is too old to build on: see PhaseLock.
-        longest = max(busy[name] + look[name], look[name] / SLOW)
-        rates[name] = 1.0 / longest if longest else float("inf")
-    return rates
+        sensors[sensor.line] += rig.line_of(sensor).exchange_s(read_characters(_count(rig.map.sensor[sensor.map])))
+    # An answer later than this share of a sample is too old to build on: see PhaseLock.
+    longest = max(look + max(drives.values()) + max(sensors.values(), default=0.0), look / SLOW)
+    busy = {name: drives.get(name, 0.0) + sensors.get(name, 0.0) for name in rig.line}
+    slowest = max(busy, key=lambda name: busy[name], default=None)
+    return (1.0 / longest, slowest) if longest else (float("inf"), None)
 
 
 def exchange_characters(registers: DriveMap) -> int:

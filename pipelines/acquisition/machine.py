@@ -164,10 +164,10 @@ class Drive:
     def _reading(self, words: list[int]) -> Reading:
         told = self._decoded(self.told, words)
         status = int(told.get("status", 0))
-        if fault := status & self.map.fault_mask:
+        if fault := self.map.told_faults(status):
             reset = "" if self.map.fault_reset is None else ", with --reset-faults where the drive is to clear it"
             raise DeviceError(
-                f"{self.device.label}: reports a fault (status bits 0x{fault:04X}); see the drive's manual, "
+                f"{self.device.label}: reports a fault (status bits {fault}); see the drive's manual, "
                 f"clear the fault and start again{reset}"
             )
         self._counted = int(self._sequence(told["sequence"]))

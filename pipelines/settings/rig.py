@@ -125,6 +125,9 @@ class DriveMap(Settings):
     halt: int | None = Field(None, description="Control word that holds the leg where a stop has led it; else enable.")
     fault_reset: int | None = Field(None, description="Control word that clears a fault, for --reset-faults.")
     fault_mask: int = Field(0, ge=0, description="Bits of the status word that mean a fault; 0 for none.")
+    faults: dict[Annotated[int, Field(ge=0, lt=64)], str] = Field(
+        default_factory=dict, description="What a fault bit means, by its number; bit 0 is the lowest."
+    )
     enabled_mask: int = Field(0, ge=0, description="Bits of the status word that tell whether it is enabled; 0: none.")
     enabled_value: int = Field(0, ge=0, description="What these bits are while it is enabled.")
 
@@ -135,6 +138,12 @@ class DriveMap(Settings):
         for name in ("fault_mask", "enabled_mask"):
             if getattr(self, name) and self.read.status is None:
                 raise ValueError(f"{name}: needs a status register; add read.status or leave the mask out")
+        for bit in self.faults:
+            if not self.fault_mask >> bit & 1:
+                raise ValueError(
+                    f"faults: bit {bit} is not one of fault_mask 0x{self.fault_mask:04X}; add 0x{1 << bit:04X} to the "
+                    "mask, or leave the name out"
+                )
         if self.enabled_value & ~self.enabled_mask:
             raise ValueError(
                 f"enabled_value: found 0x{self.enabled_value:04X}, expected bits of enabled_mask "
@@ -150,6 +159,14 @@ class DriveMap(Settings):
                 same = " and ".join(name for name, value in words.items() if value == word)
                 raise ValueError(f"{same}: both are 0x{word:04X}, expected different control words; correct one")
         return self
+
+    def told_faults(self, status: int) -> str:
+        """Return the fault bits of a status word, and their names as far as they have any; nothing without a fault."""
+        found = status & self.fault_mask
+        names = [self.faults.get(bit, f"bit {bit}") for bit in range(found.bit_length()) if found >> bit & 1]
+        if not found:
+            return ""
+        return f"0x{found:04X}" + (f": {', '.join(names)}" if self.faults else "")
 
 
 class SensorMap(Settings):

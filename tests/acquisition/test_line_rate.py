@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.acquisition.line_rate import highest_rates
+from pipelines.acquisition.line_rate import highest_rate
+from pipelines.settings import datasets
 from pipelines.settings.rig import load_rig
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -28,23 +29,32 @@ def on_serial_lines(rig_file, apart, baud_rate, silence):
 )
 def test_docs_tell_what_fits_through_serial_lines(rig_file, apart, baud_rate, silence, rate):
     rig = on_serial_lines(rig_file, apart, baud_rate, silence)
-    assert floor(min(highest_rates(rig, with_sensors=False).values())) == rate
+    assert floor(highest_rate(rig, with_sensors=False)[0]) == rate
     page = (DOCS / "rig.md").read_text()
     assert re.search(rf"\b{rate}\b", page)
 
 
-def test_sensors_take_their_share_of_a_line_and_less_when_read_less_often(rig_file):
-    def rate(every, with_sensors=True):
-        on_it = {f'map = "{kind}"': f'map = "{kind}"\nline = "leg"' for kind in ("servo", "force")}
-        on_it['map = "force"'] += f"\nevery = {every}"
-        table = '[line.leg]\ntransport = "rtu"\nserial_port = "x"\n'
-        rig = rig_file(shipped="real_time", replace={**on_it, "[map.drive.servo]\n": table + "[map.drive.servo]\n"})
-        return highest_rates(load_rig(rig), with_sensors=with_sensors)["leg"]
-
-    assert rate(1) < rate(4) < rate(1, with_sensors=False)
+def test_sensors_on_a_line_take_their_share_of_every_sample_that_reads_them(rig_file):
+    on_it = {f'map = "{kind}"': f'map = "{kind}"\nline = "leg"' for kind in ("servo", "force")}
+    table = '[line.leg]\ntransport = "rtu"\nserial_port = "x"\n'
+    rig = load_rig(
+        rig_file(shipped="real_time", replace={**on_it, "[map.drive.servo]\n": table + "[map.drive.servo]\n"})
+    )
+    # Characters of 11 bits at 19200 baud, and 3.5 of silence before each of the frames: 2 of the look, 4 of the drives.
+    character = 11 / 19200
+    look, drives, sensors = (17 + 7) * character, 2 * (52 + 7) * character, 4 * (29 + 7) * character
+    assert highest_rate(rig, with_sensors=False) == (pytest.approx(1 / (look + drives)), "leg")
+    assert highest_rate(rig, with_sensors=True) == (pytest.approx(1 / (look + drives + sensors)), "leg")
 
 
 def test_nothing_is_said_of_the_speed_of_a_network(rig_file):
     table = '[line.leg]\ntransport = "tcp"\n'
     changes = {'map = "servo"': 'map = "servo"\nline = "leg"', "[map.drive.servo]\n": table + "[map.drive.servo]\n"}
-    assert highest_rates(load_rig(rig_file(replace=changes)), with_sensors=True) == {"leg": float("inf")}
+    assert highest_rate(load_rig(rig_file(replace=changes)), with_sensors=True) == (float("inf"), None)
+
+
+def test_the_template_tells_what_fits_through_its_lines_and_that_is_enough():
+    path = datasets() / "rigs" / "lab.toml"
+    rate, _ = highest_rate(load_rig(path), with_sensors=True)
+    assert f"at most {floor(rate)} samples a second fit" in path.read_text()
+    assert rate > 100.0

@@ -265,6 +265,9 @@ def test_a_fault_bit_ends_the_run(stopped):
         device.rig.drives[1].servo.fault = True
 
     assert "reports a fault (status bits 0x0008); see the drive's manual" in stopped(fault=After(10, complain))
+    named = {"fault_mask = 0x0008": 'faults = { 3 = "over-current" }\nfault_mask = 0x0008'}
+    why = stopped(fault=After(10, complain), replace=named)
+    assert "reports a fault (status bits 0x0008: over-current); see the drive's manual" in why
 
 
 def test_a_clock_in_another_unit_than_the_rig_file_says_is_noticed(stopped):

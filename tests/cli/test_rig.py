@@ -39,3 +39,23 @@ def test_without_a_terminal_nobody_is_asked_and_nothing_moves(exoid, monkeypatch
     outcome = exoid("rig", "check", datasets() / "rigs" / "plain.toml", option)
     assert outcome.code == 2
     assert words in outcome.err
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1", "127.0.0.9", "::1"])
+def test_a_rig_listens_on_loopback_without_further_ado(exoid, monkeypatch, tmp_path, address):
+    asked = []
+    monkeypatch.setattr("pipelines.rig.server.serve_file", lambda *given, **named: asked.append(named["bind"]))
+    outcome = exoid("rig", tmp_path / "rig.toml", "--bind", address)
+    assert (outcome.code, outcome.err, asked) == (0, "", [address])
+
+
+@pytest.mark.parametrize("address", ["0.0.0.0", "::", "192.168.0.5", "localhost"])
+def test_a_rig_lets_other_computers_in_only_when_told_so_and_warns(exoid, monkeypatch, tmp_path, address):
+    asked = []
+    monkeypatch.setattr("pipelines.rig.server.serve_file", lambda *given, **named: asked.append(named["bind"]))
+    refused = exoid("rig", tmp_path / "rig.toml", "--bind", address)
+    assert (refused.code, asked) == (2, [])
+    assert "Modbus has no authentication" in refused.err
+    allowed = exoid("rig", tmp_path / "rig.toml", "--bind", address, "--anyone")
+    assert (allowed.code, asked) == (0, [address])
+    assert f"the rig listens on {address}, and Modbus has no authentication" in allowed.err

@@ -47,6 +47,19 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
          "expected units per count; every value would be the offset"),
         ("angle_rad = [-0.35, 1.75]", "angle_rad = [1.75, -0.35]", "drive[0]: angle_rad: found [1.75, -0.35], expected "
          "the lowest angle first; swap them"),
+        ('map = "servo"', 'map = "servo"\nline = "leg"', "line: found 'leg' at unit 1, expected a table below [line]: "
+         "there is none"),
+        ("[map.drive.servo]\n", "[line.leg]\ntransport = 'tcp'\n[map.drive.servo]\n", "line.leg: no device is on it; "
+         'remove it, or give one line = "leg"'),
+        ("[map.drive.servo]\n", "[line.leg]\ntransport = 'rs485'\n[map.drive.servo]\n", "line.leg.transport: found "
+         "'rs485', expected one of 'tcp', 'rtu', 'rtu_over_tcp', 'tls'"),
+        ("[map.drive.servo]\n", "[line.leg]\nhost = 'leg'\n[map.drive.servo]\n", "line.leg.transport: missing; add it"),
+        ("unit = 2\n", "unit = 2\nline = 'leg'\nport = 502\n", "drive[1]: port: found beside line = 'leg', which says "
+         "where the device is; remove one"),
+        ("[map.drive.servo]\n", "[line.leg]\ntransport = 'tls'\nkey = 'a.key'\n[map.drive.servo]\n", "line.leg: "
+         "certificate and key belong together; give both or neither"),
+        ("[map.drive.servo]\n", "[map.drive.servo]\nfaults = { 5 = 'hot' }\n", "map.drive.servo: faults: bit 5 is not "
+         "one of fault_mask 0x0008; add 0x0020 to the mask, or leave the name out"),
         ('joint = "knee"', 'joint = "hip"', "drive: found hip, hip, expected one for the hip, then one for the knee"),
     ],
 )  # fmt: skip
@@ -58,3 +71,24 @@ def test_a_bad_rig_file_is_refused_in_one_line_with_the_keys_path(tmp_path, old,
     with pytest.raises(SettingsError) as caught:
         load_rig(path)
     assert str(caught.value) == f"{path}: {message}"
+
+
+def test_fault_bits_are_told_by_their_names_and_those_without_by_their_number():
+    servo = (
+        load_rig(RIGS / "lab.toml")
+        .map.drive["servo"]
+        .model_copy(update={"fault_mask": 0x00A8, "faults": {3: "over-current", 7: "too hot"}})
+    )
+    assert servo.told_faults(0x0107) == ""
+    assert servo.told_faults(0xFFFF) == "0x00A8: over-current, bit 5, too hot"
+    assert servo.model_copy(update={"faults": {}}).told_faults(0x0008) == "0x0008"
+
+
+def test_a_recording_does_not_tell_where_keys_lie(tmp_path):
+    line = "[line.leg]\ntransport = 'tls'\nca = 'secret/ca.pem'\n"
+    text = (RIGS / "plain.toml").read_text().replace('map = "servo"', 'map = "servo"\nline = "leg"')
+    (tmp_path / "rig.toml").write_text(text.replace("[map.drive.servo]\n", line + "[map.drive.servo]\n"))
+    rig = load_rig(tmp_path / "rig.toml")
+    assert rig.line["leg"].ca == tmp_path / "secret" / "ca.pem"
+    assert rig.public()["line"]["leg"]["transport"] == "tls"
+    assert "secret" not in str(rig.public())

@@ -123,10 +123,10 @@ def _faults(probe: Probe, drive: Drive, series: Series) -> Iterator[Finding]:
     if "status" not in series.block.registers:
         return
     status = int(series.of("status")[-1])
-    if bits := status & drive.map.fault_mask:
+    if bits := drive.map.told_faults(status):
         yield Finding(
             probe.name,
-            f"reports a fault (status 0x{status:04X}, of which 0x{bits:04X} mean a fault); see the drive's manual and "
+            f"reports a fault (status 0x{status:04X}, fault bits {bits}); see the drive's manual and "
             f"clear it, or correct {probe.map_path}.fault_mask",
             "status",
         )

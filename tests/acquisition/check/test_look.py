@@ -151,5 +151,5 @@ def test_a_sensor_that_is_frozen_is_found(checked, altered):
 def test_a_fault_and_a_current_at_rest_are_found(checked, altered):
     altered(lambda device, values: "status" in values and values.update(status=8.0, current=9.0))
     said = told(checked())
-    assert "reports a fault (status 0x0008, of which 0x0008 mean a fault)" in said
+    assert "reports a fault (status 0x0008, fault bits 0x0008)" in said
     assert "current reads 9 A, expected less than" in said
