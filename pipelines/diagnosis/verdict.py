@@ -19,7 +19,7 @@ from pipelines.effects import Effect
 from pipelines.estimation.regression import MASK
 from pipelines.model import effect_named
 
-HIGHEST = 0.97
+HIGHEST = 0.96
 """A probability never claims more than calibration has shown: some causes that nobody lists look like a listed one."""
 OF_THREE = 0.5
 """Three causes together can imitate nearly anything: each is as likely there as not."""
@@ -127,7 +127,8 @@ def _never_rising(causes: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def _probability(d: Diagnosis, among_rivals: float) -> float:
     """Return how likely a named cause is: among its rivals, and that what is missing is of this kind at all."""
     crowded = OF_THREE if len(d.causes) > 2 else 1.0
-    return HIGHEST * crowded * d.standing.trust * min(among_rivals, 1.0)
+    # Each cause is doubted for what all of them leave.
+    return HIGHEST * crowded * d.standing.trust ** len(d.causes) * min(among_rivals, 1.0)
 
 
 def _tie(effect: Effect, other: str, probability: float, d: Diagnosis) -> dict[str, Any]:
