@@ -42,6 +42,9 @@ bench: $(INSTALLED) ## measure speed
 fuzz: $(INSTALLED) ## hostile replies against the client, hostile requests against the rig: 60,000 of each
 	$(BIN)/python -m tests.fuzz
 
+faults: $(INSTALLED) ## let every fault loose on a run and write docs/faults.md from what became of it
+	$(BIN)/python -m tests.faults docs/faults.md
+
 blind: $(INSTALLED) ## examine `exoid diagnose` on 300 sessions whose truth it cannot see; SEEDS=reporting to report
 	$(BIN)/python -m tests.blind --cases 300 --seeds $(SEEDS) --out build/blind
 

@@ -73,7 +73,7 @@ class Loop:
     def _pace(self) -> Lockstep | PhaseLock:
         rig = self.machine.rig
         if rig.clock == "lockstep":
-            return Lockstep()
+            return Lockstep(self.machine.drives[0].count)
         return PhaseLock(self._rate, self.machine.drives[0].count, rig.safety.watchdog_s)
 
     async def _follow(self) -> None:

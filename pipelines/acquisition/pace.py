@@ -36,9 +36,18 @@ def urgent() -> Iterator[None]:
 class Lockstep:
     """The devices wait for the exchange."""
 
+    def __init__(self, counter: Callable[[], Awaitable[int]]) -> None:
+        self._counter = counter
+        self._asked: int | None = None
+
     async def wait(self, last: int) -> int:
-        """Return at once; the exchange after that of sample ``last`` finds the next one."""
-        return last + 1
+        """Return at once; the exchange after that of sample ``last`` finds the next one.
+
+        Where that exchange has brought nothing, it is looked up which one is next: the answer may have been lost, or
+        the request.
+        """
+        again, self._asked = last == self._asked, last
+        return max(last + 1, await self._counter()) if again else last + 1
 
 
 class PhaseLock:

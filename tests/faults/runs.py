@@ -3,6 +3,7 @@
 import asyncio
 import re
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -39,6 +40,14 @@ RESOLUTION = {("angle", "rad"): 1e-6, ("velocity", "rad_s"): 1e-5, ("torque", "n
 
 
 @dataclass(frozen=True)
+class Latched:
+    """A sample that the rig has latched, and when, s."""
+
+    sample: Samples
+    at: float
+
+
+@dataclass(frozen=True)
 class Result:
     """What became of a run."""
 
@@ -58,30 +67,31 @@ class Result:
         return sum(count for _, count in self.metadata.get("gaps", []))
 
 
-def rig_file(folder: Path, port: int, **changes: object) -> Path:
+def rig_file(folder: Path, port: int, **changes: float) -> Path:
     """Write the plain rig, all on one port, with short ramps."""
     text = (datasets() / "rigs" / "plain.toml").read_text().replace("embedded = true", "embedded = false", 1)
     text = re.sub(r"^(map = .*)$", rf"\1\nport = {port}", text, flags=re.MULTILINE)
-    for key, value in {"ramp_s": 0.4, "settle_s": 0.1, "watchdog_s": WATCHDOG_S, **changes}.items():
+    text = text.replace("[safety]\n", "[safety]\nreply_s = 0\n")
+    short = {"ramp_s": 0.4, "settle_s": 0.1, "watchdog_s": WATCHDOG_S, "reply_s": REPLY_S}
+    for key, value in {**short, **changes}.items():
         text, count = re.subn(rf"^{key} = [^#\n]*", f"{key} = {value} ", text, flags=re.MULTILINE)
         assert count, key
-    text = text.replace("[safety]\n", f"[safety]\nreply_s = {REPLY_S}\n")
     path = folder / f"rig{port}.toml"
     path.write_text(text)
     return path
 
 
 @contextmanager
-def served(folder: Path, run: str) -> Iterator[tuple[int, dict[int, Samples]]]:
+def served(folder: Path, run: str) -> Iterator[tuple[int, dict[int, Latched]]]:
     """Serve the rig; yields its port, and all that it latches by number."""
     path = rig_file(folder, 502)
     rig = load_rig(path)
-    plant, latched = server.build_plant(rig, path, run, SEED, RATE), dict[int, Samples]()
+    plant, latched = server.build_plant(rig, path, run, SEED, RATE), dict[int, Latched]()
     advance = plant.run
 
     def remembered(*arguments: object) -> Samples:
         sample = advance(*arguments)
-        latched[int(sample.sequence[0])] = sample
+        latched[int(sample.sequence[0])] = Latched(sample, time.monotonic())
         return sample
 
     plant.run = remembered
@@ -107,28 +117,41 @@ def served(folder: Path, run: str) -> Iterator[tuple[int, dict[int, Samples]]]:
         thread.join()
 
 
-def run_through(fault: Fault, folder: Path, run: str = "exo_alone", duration_s: float = 1.0) -> Result:
-    """Record a run with a fault between client and rig."""
+def run_through(
+    fault: Fault,
+    folder: Path,
+    run: str = "exo_alone",
+    duration_s: float = 1.0,
+    motion: str = EXCITATION,
+    **changes: float,
+) -> Result:
+    """Record a run with a fault between client and rig; ``changes`` are of the rig file."""
     excitation, output = folder / "excitation.toml", folder / "run.parquet"
-    excitation.write_text(EXCITATION)
+    excitation.write_text(motion)
     settings = RunSettings(name="run", run=run, purpose="train", duration_s=duration_s, seed=SEED)
     with served(folder, run) as (port, latched), Proxy(port, fault) as proxy:
         why = None
         try:
-            acquire(rig_file(folder, proxy.port), settings, excitation, output, RATE)
+            acquire(rig_file(folder, proxy.port, **changes), settings, excitation, output, RATE)
         except DeviceError as error:
             why = str(error)
-    disabled = {words[CONTROL] for words in proxy.written.values()} == {DISABLE}
+    disabled = are_disabled(proxy)
     kept = output if why is None else folder / "run.aborted.parquet"
+    assert kept.exists(), why
     table = RECORDING.read(kept)
     wrong = wrong_rows(table.frame, latched)
     wrong_s = (len(wrong) - int(np.argmax(wrong))) / RATE if wrong.any() else 0.0
     return Result(why, table.frame, table.metadata, int(wrong.sum()), wrong_s, disabled)
 
 
-def wrong_rows(frame: pd.DataFrame, latched: dict[int, Samples]) -> np.ndarray:
+def are_disabled(proxy: Proxy) -> bool:
+    """Tell whether the last that each drive was told is to take its torque away."""
+    return {words[CONTROL] for words in proxy.written.values()} == {DISABLE}
+
+
+def wrong_rows(frame: pd.DataFrame, latched: dict[int, Latched]) -> np.ndarray:
     """Return (rows,) whether a row holds a value that was not latched with its number."""
-    truth = [latched[number] for number in frame["sequence"]]
+    truth = [latched[number].sample for number in frame["sequence"]]
     began = truth[0].time[0] - frame["time_s"].iloc[0]
     wrong = np.abs(frame["time_s"].to_numpy() + began - [sample.time[0] for sample in truth]) > 3e-6
     for (quantity, unit), resolution in RESOLUTION.items():

@@ -1,0 +1,82 @@
+"""``make faults``: let every fault loose on a run and write what became of it into docs/faults.md."""
+
+import argparse
+import re
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from pipelines.acquisition.journal import journal_of
+from pipelines.acquisition.recover import recover
+from pipelines.contracts import RECORDING
+from tests.faults.faults import Case, cases
+from tests.faults.process import fill_the_disk, send, strike
+from tests.faults.runs import run_through, wrong_rows
+
+TABLE = """\
+## Each fault
+| fault | the run | samples missing | samples wrong | what is said |
+|---|---|---|---|---|
+"""
+"""The end of the page, which is measured; what stands above it is written by hand."""
+
+
+def rows() -> Iterator[str]:
+    """Yield a line of the table for each fault."""
+    for case in cases():
+        with TemporaryDirectory() as folder:
+            yield _row(case, Path(folder))
+    for name, blow in (
+        ("Ctrl-C (SIGINT)", send(signal.SIGINT)),
+        ("SIGTERM", send(signal.SIGTERM)),
+        ("the disk is full", fill_the_disk),
+        ("kill -9 (SIGKILL)", send(signal.SIGKILL)),
+    ):
+        with TemporaryDirectory() as folder:
+            ended = strike(Path(folder), blow, rows=40)
+            journal = journal_of(ended.output)
+            if journal.exists():
+                made = recover(journal)
+                missing, wrong = made.account.missed, _wrong(made.path, ended.latched)
+                fate = (
+                    "is killed, `exoid recover` makes a recording" if ended.code < 0 else "stops, then `exoid recover`"
+                )
+                yield f"| {name} | {fate} | {missing} | {wrong} | {_plain(ended.said) or made.account.abort} |\n"
+            else:
+                kept = Path(folder) / "run.aborted.parquet"
+                yield f"| {name} | stops | 0 | {_wrong(kept, ended.latched)} | {_plain(ended.said)} |\n"
+
+
+def _row(case: Case, folder: Path) -> str:
+    result = run_through(case.fault, folder, case.run)
+    wrong = f"{result.wrong}, then wrong for {result.wrong_s:g} s" if result.wrong else "0"
+    fate = "goes on" if result.why is None else "stops"
+    return f"| {case.name} | {fate} | {result.missing} | {wrong} | {_plain(result.why or '')} |\n"
+
+
+def _wrong(path: Path, latched: dict) -> int:
+    return int(wrong_rows(RECORDING.read(path).frame, latched).sum())
+
+
+def _plain(text: str) -> str:
+    """Return a reason without what differs from run to run, and without what always follows it."""
+    text = re.sub(r"127\.0\.0\.1:\d+", "127.0.0.1:502", text.removeprefix("exoid: "))
+    text = re.sub(r"/\S*/run\.parquet", "run.parquet", text)
+    return re.sub(r"; the leg was stopped.*", "", text)
+
+
+def main() -> None:
+    """Measure, and write the table in place of the old one."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("page", type=Path, nargs="?", default=Path("docs/faults.md"))
+    page = parser.parse_args().page
+    table = []
+    for row in rows():
+        print(row, end="", flush=True)
+        table.append(row)
+    by_hand, heading, _ = page.read_text(encoding="utf-8").partition(TABLE)
+    page.write_text(by_hand + (heading or TABLE) + "".join(table), encoding="utf-8")
+
+
+main()
