@@ -3,6 +3,7 @@
 import asyncio
 import errno
 import ssl
+import sys
 import termios
 from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
@@ -28,6 +29,7 @@ class Line:
     def __init__(self, settings: LineSettings, timeout_s: float, name: str | None = None) -> None:
         self.place = settings.place
         self.client = _client(settings, timeout_s, self._told)
+        self.client.set_max_no_responses(sys.maxsize)  # the watchdog decides for how long silence is borne
         check_replies(self.client)
         self.devices: list[str] = []
         """Who is on it."""

@@ -39,9 +39,7 @@ def rows() -> Iterator[str]:
             if journal.exists():
                 made = recover(journal)
                 missing, wrong = made.account.missed, _wrong(made.path, ended.latched)
-                fate = (
-                    "is killed, `exoid recover` makes a recording" if ended.code < 0 else "stops, then `exoid recover`"
-                )
+                fate = "is killed, then `exoid recover`" if ended.code < 0 else "stops, then `exoid recover`"
                 yield f"| {name} | {fate} | {missing} | {wrong} | {_plain(ended.said) or made.account.abort} |\n"
             else:
                 kept = Path(folder) / "run.aborted.parquet"
@@ -50,7 +48,7 @@ def rows() -> Iterator[str]:
 
 def _row(case: Case, folder: Path) -> str:
     result = run_through(case.fault, folder, case.run)
-    wrong = f"{result.wrong}, then wrong for {result.wrong_s:g} s" if result.wrong else "0"
+    wrong = f"{result.wrong}, the last {result.wrong_s:g} s" if result.wrong else "0"
     fate = "goes on" if result.why is None else "stops"
     return f"| {case.name} | {fate} | {result.missing} | {wrong} | {_plain(result.why or '')} |\n"
 
