@@ -193,14 +193,19 @@ class Sensor:
         safety = rig.safety
         self.device = Device(f"sensor {settings.cuff}", settings.unit, line, safety.watchdog_s, safety.longest_reply_s)
         self.block = Block(registers_of(self.map.read))
+        self._patience_s, self._answered = safety.watchdog_s, 0.0
         self._last: float | None = None
 
     async def look(self) -> tuple[float, float, float] | None:
-        """Return the force (N), or None where the sensor has no new sample or does not answer."""
+        """Return the force (N), or None where the sensor has no new sample or, for once, does not answer."""
+        self._answered = self._answered or time.monotonic()
         try:
             told = self.block.decode(await self.device.read(self.block.address, self.block.count, in_motion=True))
         except Unanswered:
+            if time.monotonic() - self._answered > self._patience_s:
+                raise
             return None
+        self._answered = time.monotonic()
         stale, self._last = told["sequence"] == self._last, told["sequence"]
         return None if stale else (told["force_x"], told["force_y"], told["force_z"])
 
