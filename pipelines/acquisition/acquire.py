@@ -20,6 +20,7 @@ from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.pace import urgent
 from pipelines.acquisition.plan import check_start, check_trajectory, make_plan
 from pipelines.acquisition.recorded import account_of, place_for, write_recording
+from pipelines.acquisition.sampling import sampling_of
 from pipelines.acquisition.states import State, Supervisor
 from pipelines.contracts import RECORDING
 from pipelines.contracts.provenance import describe
@@ -80,7 +81,9 @@ def acquire(
     RECORDING.refuse_place(output)
     journal = journal_of(output)
     refuse_leftover(journal)
-    metadata = _metadata(rig, run, trajectory, sample_rate_hz, mechanism or MechanismSettings())
+    with about(rig_path):
+        recorded_hz = sample_rate_hz * rig.samples_per_cycle(sample_rate_hz)
+    metadata = _metadata(rig, run, trajectory, recorded_hz, mechanism or MechanismSettings())
     metadata |= {"trajectory": trajectory_path.name}
     metadata |= describe([trajectory_path, rig_path], {"run": run.model_dump(mode="json"), "rig": rig.public()})
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # what it would print, our errors say
@@ -106,7 +109,8 @@ async def _record(
 ) -> None:
     """Move the leg and write the journal, which says at its end why the run was stopped early, if it was."""
     rig = supervisor.rig
-    machine = Machine(rig, with_sensors=run.run == "with_human")
+    with_human = run.run == "with_human"
+    machine = Machine(rig, with_sensors=with_human, samples_per_cycle=rig.samples_per_cycle(supervisor.rate))
     report(Progress(duration_s=run.duration_s))
     try:
         supervisor.check()
@@ -118,10 +122,12 @@ async def _record(
             raise DeviceError(why)
         plan = make_plan(rig, trajectory, start, run.duration_s, supervisor.rate)
         supervisor.take(plan, start)
+        sampling = sampling_of(machine, supervisor.rate, supervisor.judge_records)
         try:
             with Journal(path, ["time_s", *columns_of(machine)], metadata) as journal:
-                await Loop(machine, supervisor, plan, journal, report, stopped_by).run()
-                journal.end(supervisor.why)
+                loop = Loop(machine, supervisor, sampling, plan, journal, report, stopped_by)
+                await loop.run()
+                journal.end(supervisor.why, loop.found())
         except OSError as error:  # a full disk must not hide that a drive could not be disabled
             raise DeviceError(
                 f"{path}: cannot be written ({error}); make room, then `exoid recover {path}` makes a recording "

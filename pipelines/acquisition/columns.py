@@ -9,8 +9,6 @@ from pipelines.mechanics.motion import CUFFS
 Columns = dict[str, Callable[[Row], float]]
 
 QUANTITIES = ("angle", "torque", "reference", "velocity", "current", "temperature")
-OPTIONAL = ("velocity", "temperature")
-"""Quantities that a drive may have no register for."""
 
 
 def columns_of(machine: Machine) -> Columns:
@@ -19,13 +17,13 @@ def columns_of(machine: Machine) -> Columns:
     for j, drive in enumerate(machine.drives):
         joint = Joint(drive.settings.joint)
         for quantity in QUANTITIES:
-            if quantity in drive.told.names or quantity not in OPTIONAL:
+            if quantity in drive.recorded:
                 columns[joint.column(quantity)] = _of_drive(j, quantity)
     for sensor in machine.sensors:
         cuff = sensor.settings.cuff
         for i, axis in enumerate("xyz"):
             columns[f"{cuff}_force_{axis}_n"] = _of_cuff(CUFFS.index(cuff), i)
-    columns["sequence"] = lambda row: row.sequence
+    columns["sequence"] = lambda row: row.drives[0].sequence
     return columns
 
 

@@ -52,6 +52,18 @@ class Device:
         request = self._client.read_holding_registers
         return await self._ask(what, count, within_s, request, address=address, count=count)
 
+    async def read_fifo(self, address: int, words: int) -> list[int]:
+        """Return what a queue holds, read by FC24: whole records of so many words, or nothing."""
+        what = f"reading the queue at register {address}"
+        response = await self._request(what, self._within(True), self._client.read_fifo_queue, address=address)
+        found = list(getattr(response, "values", []))
+        if len(found) % words:
+            raise DeviceError(
+                f"{self.label}: answered {what} with {len(found)} registers, expected a multiple of {words}; "
+                "compare ring.words in the rig file with the device's manual"
+            )
+        return found
+
     async def write(self, block: Block, words: Sequence[int]) -> None:
         """Write a block by FC16."""
         what = f"writing registers {_range(block)}"
@@ -84,6 +96,18 @@ class Device:
         **arguments: Any,
     ) -> list[int]:
         """Send a request and return the words of the answer, ``words`` of them where it is to bring any."""
+        response = await self._request(what, within_s, request, **arguments)
+        if words is not None and len(response.registers) != words:
+            raise DeviceError(
+                f"{self.label}: answered {what} with {len(response.registers)} registers, expected {words}; "
+                "compare the register map in the rig file with the device's manual"
+            )
+        return list(response.registers)
+
+    async def _request(
+        self, what: str, within_s: float, request: Callable[..., Awaitable[ModbusPDU]], **arguments: Any
+    ) -> ModbusPDU:
+        """Send a request and return its answer; raise DeviceError where there is none, or a refusal."""
         try:
             response = await self.line.ask(within_s, request, **arguments, device_id=self._unit)
         except (ModbusException, OSError) as error:
@@ -104,12 +128,7 @@ class Device:
                 f"{self.label}: answered {what} with Modbus exception {code}{meaning}; "
                 "compare the register map in the rig file with the device's manual"
             )
-        if words is not None and len(response.registers) != words:
-            raise DeviceError(
-                f"{self.label}: answered {what} with {len(response.registers)} registers, expected {words}; "
-                "compare the register map in the rig file with the device's manual"
-            )
-        return list(response.registers)
+        return response
 
 
 def _range(block: Block) -> str:

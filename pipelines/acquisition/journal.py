@@ -8,7 +8,7 @@ import fcntl
 import io
 import json
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +24,8 @@ FLUSH_S = 0.2
 ENDING = ".journal"
 ABORT = b"abort"
 """Key under which a journal's last words say why the run was stopped early; empty where it was not."""
+FOUND = b"found"
+"""Key under which they hold what the run found out for its metadata."""
 
 
 def journal_of(output: Path) -> Path:
@@ -66,9 +68,12 @@ class Journal:
             self._waiting = []
         self._flushed = time.monotonic()
 
-    def end(self, abort: str | None) -> None:
-        """Say how the run ended: why it was stopped early, None if it was not. Only a killed run never says."""
-        self._last_words = {ABORT: abort or ""}
+    def end(self, abort: str | None, found: Mapping[str, Any] | None = None) -> None:
+        """Say how the run ended: why it was stopped early, None if it was not. Only a killed run never says.
+
+        ``found`` is what else its metadata shall tell that was not known before the run.
+        """
+        self._last_words = {ABORT: abort or "", FOUND: json.dumps(found or {})}
 
     def close(self) -> None:
         """Write the rest and close the file."""

@@ -4,6 +4,7 @@ import asyncio
 import time
 from collections.abc import Callable, Coroutine, Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from numpy.typing import NDArray
 
@@ -12,6 +13,7 @@ from pipelines.acquisition.journal import Journal
 from pipelines.acquisition.machine import Machine, Row
 from pipelines.acquisition.pace import Lockstep, PhaseLock
 from pipelines.acquisition.plan import Plan
+from pipelines.acquisition.sampling import Sampling
 from pipelines.acquisition.states import State, Supervisor
 from pipelines.errors import DeviceError, Unanswered
 
@@ -46,6 +48,7 @@ class Loop:
 
     machine: Machine
     supervisor: Supervisor
+    sampling: Sampling
     plan: Plan
     journal: Journal
     report: Report
@@ -56,6 +59,9 @@ class Loop:
 
     def __post_init__(self) -> None:
         self._rate = self.supervisor.rate
+        self._samples_hz = self._rate * self.machine.samples_per_cycle
+        self._next = 0
+        """Sample of the recording that is to come next."""
         self._recording_began: float | None = None
         self._columns = columns_of(self.machine)
         self._cycle = 0
@@ -70,11 +76,16 @@ class Loop:
             self.supervisor.abort(error)
         await self._stop()
 
+    def found(self) -> dict[str, Any]:
+        """Return what the run found out for the recording's metadata."""
+        clocks = self.sampling.clocks(self._recording_began or 0.0)
+        return {"clocks": clocks} if clocks else {}
+
     def _pace(self) -> Lockstep | PhaseLock:
         rig = self.machine.rig
         if rig.clock == "lockstep":
-            return Lockstep(self.machine.drives[0].count)
-        return PhaseLock(self._rate, self.machine.drives[0].count, rig.safety.watchdog_s)
+            return Lockstep(self.machine.count)
+        return PhaseLock(self._rate, self.machine.count, rig.safety.watchdog_s)
 
     async def _follow(self) -> None:
         """Send set-point after set-point; raise as soon as something is wrong."""
@@ -87,8 +98,9 @@ class Loop:
             row = await self._exchange(self.supervisor.next(found, time.monotonic()))
             if not self.supervisor.judge(row, time.monotonic()):
                 continue
-            self._keep(row, row.sequence - last.sequence - 1)
             last = self._row = row
+            for whole in await self.sampling.rows(row):
+                self._keep(whole)
             if time.monotonic() - self._reported >= REPORT_S:
                 self._tell()
 
@@ -113,16 +125,17 @@ class Loop:
         self._cycle += 1
         return await self.machine.cycle(reference, self._cycle)
 
-    def _keep(self, row: Row, missed: int) -> None:
+    def _keep(self, row: Row) -> None:
         """Write a sample, and note those missed before it."""
-        first, stop, index = self.plan.first, self.plan.stop, self.supervisor.index(row)
-        missing = range(max(index - missed, first), min(index, stop))
+        sample, stop = self.supervisor.sample(row), (self.plan.stop - self.plan.first) * row.samples_per_cycle
+        missing = range(self._next, min(sample, stop))
         if missing:
-            self.gaps.append(((missing.start - first) / self._rate, len(missing)))
-        if not first <= index < stop:
+            self.gaps.append((missing.start / self._samples_hz, len(missing)))
+        self._next = max(sample + 1, 0)
+        if not 0 <= sample < stop:
             return
         if self._recording_began is None:
-            self._recording_began = row.time - (index - first) / self._rate
+            self._recording_began = row.time - sample / self._samples_hz
         try:
             self.journal.append([row.time - self._recording_began, *(value(row) for value in self._columns.values())])
         except OSError as error:
@@ -144,7 +157,7 @@ class Loop:
                 row=row,
                 samples=self.journal.rows,
                 missed=sum(count for _, count in self.gaps),
-                rate_hz=(index + 2) / (self._reported - self._enabled_at),
+                rate_hz=(index + 2) * row.samples_per_cycle / (self._reported - self._enabled_at),
                 abort=why,
             )
         )

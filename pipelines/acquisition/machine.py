@@ -2,14 +2,17 @@
 
 import asyncio
 import time
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.acquisition.clocks import Bounds
 from pipelines.acquisition.device import Device
 from pipelines.acquisition.line import Line, lines_of
+from pipelines.acquisition.ring import Queue, Ring
 from pipelines.errors import DeviceError, SettingsError, Unanswered
 from pipelines.mechanics.motion import CUFFS
 from pipelines.registers import Block
@@ -23,6 +26,13 @@ STATUS_PAUSE_S = 0.002
 
 LOOKS = 9
 """Readings from which the distance between the drives' counters is taken."""
+CLOCK_SHARE = 0.1
+"""Share of a sample within which the clocks of drives that sample together tell the same time."""
+MOST_LOOKS = 200
+"""How many it may take where samples come faster than replies."""
+
+
+Answer = TypeVar("Answer")
 
 
 class Counter:
@@ -30,16 +40,15 @@ class Counter:
 
     def __init__(self, span: float) -> None:
         self._span = span
-        self._turns = 0
         self._last: float | None = None
 
     def __call__(self, value: float) -> float:
-        """Return the value with every turn of the register added."""
-        # Less than half a span back is a turn; anything else is a step of the device's own.
-        if self._span and self._last is not None and value < self._last - self._span / 2:
-            self._turns += 1
+        """Return the value with every turn of the register added, forwards or, for an older sample, backwards."""
+        if self._span and self._last is not None:
+            # What is less than half a span away is a turn; anything else is a step of the device's own.
+            value += self._span * round((self._last - value) / self._span)
         self._last = value
-        return value + self._turns * self._span
+        return value
 
 
 @dataclass(frozen=True)
@@ -75,23 +84,56 @@ class Drive:
         self._patience_s = rig.safety.watchdog_s
         self._sequence = Counter(self.told.span("sequence"))
         self._time = Counter(self.told.span("time"))
+        self._ring_time = Counter(self.told.span("time"))
+        self.bounds: Bounds | None = None
+        """Told of every reply, where somebody wants to know when the drive samples."""
+        self.ring = self._its_ring() if rig.sampling == "recorder" else None
+        self.recorded = self._recorded()
+        """Quantities that the samples which are kept of it hold."""
+        self._temperature = np.nan
         self._sent = np.nan
         self._counted = 0
         self.touched = False
         """Whether it has been told anything, so that it must be disabled."""
 
-    async def look(self) -> Reading:
+    def _its_ring(self) -> Ring | Queue:
+        settings = self.map.ring
+        assert settings  # a rig file that asks for recorders has one for every drive
+        return (Ring if settings.fifo is None else Queue)(self.device, settings, self._newest)
+
+    def _recorded(self) -> frozenset[str]:
+        if self.ring is None or self.map.ring is None:
+            return frozenset({"angle", "torque", "current", "reference", *self.told.names})
+        ring = registers_of(self.map.ring.record)
+        return frozenset({"angle", "torque", "current", *ring, *({"temperature"} & set(self.told.names))})
+
+    async def look(self, *, in_motion: bool = False) -> Reading:
         """Read without telling the drive anything."""
-        return self._reading(await self.device.read(self.told.address, self.told.count))
+        sent = time.perf_counter()
+        return self._reading(await self.device.read(self.told.address, self.told.count, in_motion=in_motion), sent)
 
     async def count(self) -> int:
         """Read the sample counter alone; without an answer it stands where it was."""
+        sent = time.perf_counter()
         try:
             words = await self.device.read(self._counter.address, self._counter.count, in_motion=True)
         except Unanswered:
             return self._counted
-        self._counted = int(self._sequence(self._decoded(self._counter, words)["sequence"]))
-        return self._counted
+        return self._newest(self._decoded(self._counter, words)["sequence"], sent)
+
+    async def drain(self, newest: int) -> list[Reading]:
+        """Return samples of its ring not returned before, up to the ``newest`` known to be there, oldest first."""
+        assert self.ring  # who drains has looked at the rig file
+        return [self._of_ring(number, record) for number, record in await self.ring.drain(newest)]
+
+    def _newest(self, sequence: float, sent: float | None) -> int:
+        """Return the number of the sample that a reply to a request of then tells, which may be its newest."""
+        number = int(self._sequence(sequence))
+        if sent is not None:
+            if self.bounds:
+                self.bounds.told(number, sent, time.perf_counter())
+            self._counted = number
+        return number
 
     async def exchange(self, reference: float, *, halt: bool = False) -> Reading:
         """Send a set-point (rad) and return the sample that is latched; ``halt`` where the leg is to stand there."""
@@ -100,9 +142,10 @@ class Drive:
         words = self._words(reference, control)
         # Nobody knows which set-point a drive follows that did not answer.
         before, self._sent = self._sent, np.nan
+        sent = time.perf_counter()
         answer = await self.device.exchange(self.tell, words, self.told)
         self._sent = before
-        reading = self._reading(answer)
+        reading = self._reading(answer, sent)
         self._sent = reference
         return reading
 
@@ -161,7 +204,7 @@ class Drive:
                 )
         return told
 
-    def _reading(self, words: list[int]) -> Reading:
+    def _reading(self, words: list[int], sent: float) -> Reading:
         told = self._decoded(self.told, words)
         status = int(told.get("status", 0))
         if fault := self.map.told_faults(status):
@@ -170,17 +213,30 @@ class Drive:
                 f"{self.device.label}: reports a fault (status bits {fault}); see the drive's manual, "
                 f"clear the fault and start again{reset}"
             )
-        self._counted = int(self._sequence(told["sequence"]))
+        self._temperature = told.get("temperature", np.nan)
         return Reading(
-            sequence=self._counted,
+            sequence=self._newest(told["sequence"], sent),
             time=self._time(told["time"]),
             angle=told["angle"],
             torque=told["current"] * self.settings.torque_per_ampere,
             current=told["current"],
             velocity=told.get("velocity", np.nan),
-            temperature=told.get("temperature", np.nan),
+            temperature=self._temperature,
             reference=told.get("reference", self._sent),
             enabled=self._is_enabled(status) if self.map.enabled_mask else None,
+        )
+
+    def _of_ring(self, number: int, told: Mapping[str, float]) -> Reading:
+        """Return a record as a sample; temperature is what the last exchange told."""
+        return Reading(
+            sequence=number,
+            time=self._ring_time(told["time"]),
+            angle=told["angle"],
+            torque=told["current"] * self.settings.torque_per_ampere,
+            current=told["current"],
+            velocity=told.get("velocity", np.nan),
+            temperature=self._temperature,
+            reference=told.get("reference", np.nan),
         )
 
 
@@ -217,11 +273,12 @@ class Row:
     drives: tuple[Reading, ...]
     forces: NDArray
     """(4, 3) N; NaN where a sensor was not read or had nothing new."""
+    samples_per_cycle: int = 1
 
     @property
     def sequence(self) -> int:
-        """The first drive's sample counter: the machine's."""
-        return self.drives[0].sequence
+        """The cycle it belongs to: the first drive's sample counter is the machine's."""
+        return self.drives[0].sequence // self.samples_per_cycle
 
     @property
     def time(self) -> float:
@@ -237,15 +294,20 @@ class Row:
 class Machine:
     """All devices of a rig."""
 
-    def __init__(self, rig: RigSettings, *, with_sensors: bool) -> None:
+    def __init__(self, rig: RigSettings, *, with_sensors: bool, samples_per_cycle: int = 1) -> None:
+        """Take the devices of a rig; drives take so many samples from one set-point to the next."""
         self.rig = rig
         line_of = lines_of(rig)
         self.drives = [Drive(rig, settings, line_of(settings)) for settings in rig.drive]
         self.sensors = [Sensor(rig, settings, line_of(settings)) for settings in rig.sensor] if with_sensors else []
+        self.samples_per_cycle = samples_per_cycle
+        self._latches = rig.sampling == "cyclic" and rig.clocks == "common"
         self._parts: list[Drive | Sensor] = [*self.drives, *self.sensors]
-        self._no_force = np.full((len(CUFFS), 3), np.nan)
-        self._ahead = [0 for _ in self.drives]
+        self.no_force = np.full((len(CUFFS), 3), np.nan)
+        self.leads = [0 for _ in self.drives]
         """How far each drive's counter is ahead of the first one's at the same sample."""
+        self.leads_are_vague = False
+        """Whether a slow line hides by how many samples."""
         self._last: Row | None = None
         self._answered = 0.0
 
@@ -270,11 +332,46 @@ class Machine:
         # Several looks: between two requests of one of them a drive may go on to its next sample.
         looks = [await asyncio.gather(*(drive.look() for drive in self.drives)) for _ in range(LOOKS)]
         ahead = np.array([[reading.sequence - look[0].sequence for reading in look] for look in looks])
-        self._ahead = np.median(ahead, axis=0).astype(int).tolist()
-        return Row(tuple(looks[-1]), await self.felt(0))
+        self.leads = np.median(ahead, axis=0).astype(int).tolist()
+        if self.rig.sampling == "recorder" and self.rig.clock == "real_time" and self.rig.clocks == "common":
+            await self._find_leads()
+        return Row(tuple(looks[-1]), await self.felt(0), self.samples_per_cycle)
+
+    async def _find_leads(self) -> None:
+        """Find out how far the counters are apart though they go on while one drive after the other is asked.
+
+        Replies bound it. Where the drives' clocks tell a distance within these bounds, they show the same time, and
+        it is that; else the bounds must be narrow enough to leave one.
+        """
+        rate_hz = self.rig.record_rate_hz
+        assert rate_hz  # a rig file that asks for recorders has it
+        bounds = [Bounds(1.0 / rate_hz) for _ in self.drives]
+        for drive, its in zip(self.drives, bounds, strict=True):
+            drive.bounds = its
+        try:
+            for _ in range(MOST_LOOKS):
+                readings = await asyncio.gather(*(drive.look() for drive in self.drives))
+                (origin, width), *others = [its.now() for its in bounds]
+                leads = [
+                    _lead(
+                        (origin - other[0]) * rate_hz, (width + other[1]) * rate_hz / 2, readings[0], reading, rate_hz
+                    )
+                    for other, reading in zip(others, readings[1:], strict=True)
+                ]
+                self.leads_are_vague = None in leads
+                if not self.leads_are_vague:
+                    break
+        finally:
+            for drive in self.drives:
+                drive.bounds = None
+        self.leads = [0, *(lead or 0 for lead in leads)]
+
+    async def count(self) -> int:
+        """Return the cycle that the first drive is in."""
+        return await self.drives[0].count() // self.samples_per_cycle
 
     async def cycle(self, reference: NDArray, number: int) -> Row:
-        """Send set-points (J,) rad and return the sample that is latched in all devices.
+        """Send set-points (J,) rad and return the sample that is latched in all devices, or in each its newest.
 
         An exchange that is not answered brings no new sample: the last one is returned again, until the watchdog's
         time is over. Nothing is sent twice, for a set-point that comes late is no set-point; only the first one,
@@ -299,30 +396,30 @@ class Machine:
         """
         if self.rig.clock == "lockstep":
             forces = await self.felt(number)
-            return Row(await self._exchange(reference), forces)
+            return Row(await self._exchange(reference), forces, self.samples_per_cycle)
         drives = await self._exchange(reference)
-        return Row(drives, await self.felt(number))
+        return Row(drives, await self.felt(number), self.samples_per_cycle)
 
     async def felt(self, number: int) -> NDArray:
         """Return the forces (4, 3) N of those sensors that are due in a cycle."""
         due = [sensor for sensor in self.sensors if number % sensor.settings.every == 0]
         if not due:
-            return self._no_force
-        forces = self._no_force.copy()
+            return self.no_force
+        forces = self.no_force.copy()
         for sensor, force in zip(due, await asyncio.gather(*(s.look() for s in due)), strict=True):
             if force is not None:
                 forces[CUFFS.index(sensor.settings.cuff)] = force
         return forces
 
     async def _exchange(self, reference: NDArray) -> tuple[Reading, ...]:
-        """Exchange every drive; one that has not latched the others' sample yet is asked again."""
+        """Exchange every drive; one that has not latched the others' sample yet is asked again if that is kept."""
         pairs = list(zip(self.drives, reference.tolist(), strict=True))
-        readings = await _all(drive.exchange(angle) for drive, angle in pairs)
+        readings = await all_answers(drive.exchange(angle) for drive, angle in pairs)
         until = time.monotonic() + self.rig.safety.watchdog_s
         while True:
-            counts = [reading.sequence - ahead for reading, ahead in zip(readings, self._ahead, strict=True)]
+            counts = [reading.sequence - ahead for reading, ahead in zip(readings, self.leads, strict=True)]
             late = [j for j, count in enumerate(counts) if count < max(counts)]
-            if not late:
+            if not late or not self._latches:
                 return tuple(readings)
             if time.monotonic() > until:
                 break
@@ -331,11 +428,12 @@ class Machine:
                 readings[j] = await self.drives[j].exchange(reference[j])
         raise DeviceError(
             f"{self.drives[late[0]].device.label}: its sample counter lags behind the others' for "
-            f"{self.rig.safety.watchdog_s:g} s; check the drives' synchronisation"
+            f'{self.rig.safety.watchdog_s:g} s; check the drives\' synchronisation, or set clocks = "own" in the rig '
+            "file if each has a clock of its own"
         )
 
 
-async def _all(asked: Iterable[Awaitable[Reading]]) -> list[Reading]:
+async def all_answers(asked: Iterable[Awaitable[Answer]]) -> list[Answer]:
     """Return all answers, once there are all: none shall be left for the next request to find."""
     answers = await asyncio.gather(*asked, return_exceptions=True)
     failures = [answer for answer in answers if isinstance(answer, BaseException)]
@@ -343,3 +441,11 @@ async def _all(asked: Iterable[Awaitable[Reading]]) -> list[Reading]:
     for failure in sorted(failures, key=lambda failure: isinstance(failure, Unanswered)):
         raise failure
     return [answer for answer in answers if not isinstance(answer, BaseException)]
+
+
+def _lead(bounded: float, margin: float, first: Reading, other: Reading, rate_hz: float) -> int | None:
+    """Return how many samples a drive is ahead, by its replies ``bounded`` give or take ``margin``; None if unclear."""
+    by_clock = other.sequence - first.sequence - (other.time - first.time) * rate_hz
+    if abs(by_clock - round(by_clock)) < CLOCK_SHARE and abs(round(by_clock) - bounded) <= margin + 0.5:
+        return round(by_clock)
+    return round(bounded) if margin <= 0.5 else None

@@ -58,6 +58,7 @@ class Plausibility:
     def __init__(self, rig: RigSettings, sample_rate_hz: float) -> None:
         self._rig = rig
         self._rate = sample_rate_hz
+        self._drives_hz = sample_rate_hz * rig.samples_per_cycle(sample_rate_hz)
         self._last: Row | None = None
         self._first = 0
         self._sent: NDArray | None = None
@@ -88,16 +89,16 @@ class Plausibility:
         """Hold a drive's clock against its counter."""
         samples, seconds = found.sequence - before.sequence, found.time - before.time
         allowed = CLOCK_SAMPLES + CLOCK_SHARE * abs(samples)
-        if sequence - self._first < SETTLED_SAMPLES or abs(seconds * self._rate - samples) <= allowed:
+        if sequence - self._first < SETTLED_SAMPLES or abs(seconds * self._drives_hz - samples) <= allowed:
             return None
         return (
             f"its clock went on by {seconds:.6f} s while its counter went on by {samples} samples of "
-            f"{1 / self._rate:.6f} s; one of the two leapt: was it restarted, or is its answer damaged?"
+            f"{1 / self._drives_hz:.6f} s; one of the two leapt: was it restarted, or is its answer damaged?"
         )
 
     def _leap(self, drive: DriveSettings, before: Reading, found: Reading) -> str | None:
         """Hold an angle against the one before it, the speed limit, and the speed that the drive tells."""
-        seconds = (found.sequence - before.sequence) / self._rate
+        seconds = (found.sequence - before.sequence) / self._drives_hz
         if seconds <= 0.0:
             return None
         speed = (found.angle - before.angle) / seconds
@@ -107,7 +108,7 @@ class Plausibility:
                 f"its limit of {drive.speed_rad_s:g} rad/s; check the encoder, or the word order in the rig file"
             )
         told = 0.5 * (before.velocity + found.velocity)
-        if seconds * self._rate < 1.5 and abs(speed - told) > SPEED_SHARE * drive.speed_rad_s:
+        if seconds * self._drives_hz < 1.5 and abs(speed - told) > SPEED_SHARE * drive.speed_rad_s:
             return (
                 f"its angle went on at {speed:.3f} rad/s while it told a speed of {told:.3f} rad/s; check the encoder, "
                 "or the registers of angle and velocity in the rig file"

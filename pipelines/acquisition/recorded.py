@@ -1,12 +1,13 @@
 """A recording made of a journal, whether its run has ended, was stopped or was killed; an hour takes no more memory."""
 
-from dataclasses import dataclass
+import json
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pipelines.acquisition.journal import ABORT, JournalFile
+from pipelines.acquisition.journal import ABORT, FOUND, JournalFile
 from pipelines.contracts import RECORDING
 
 PIECE_ROWS = 32768
@@ -25,6 +26,8 @@ class Account:
     """First missing time, s, and number of missing samples; what an early end left out is none."""
     abort: str | None
     """Why the run was stopped early, None if it was not."""
+    found: dict[str, Any] = field(default_factory=dict)
+    """What else the run found out for its metadata."""
 
     @property
     def missed(self) -> int:
@@ -58,7 +61,7 @@ def account_of(journal: JournalFile) -> Account:
     abort = last_words[ABORT].decode() or None
     if not abort:
         gaps = gaps + _gaps(np.array([reached - 1, planned]), rate_hz)
-    return Account(samples, planned, rate_hz, gaps, abort)
+    return Account(samples, planned, rate_hz, gaps, abort, json.loads(last_words.get(FOUND, "{}")))
 
 
 def _gaps(index: np.ndarray, rate_hz: float) -> list[tuple[float, int]]:
@@ -69,7 +72,8 @@ def _gaps(index: np.ndarray, rate_hz: float) -> list[tuple[float, int]]:
 
 def write_recording(journal: JournalFile, path: Path, account: Account, **more: Any) -> None:
     """Write what a journal holds as ``recording/1``; ``more`` goes into its metadata."""
-    metadata = journal.metadata | {"gaps": account.gaps} | ({"abort": account.abort} if account.abort else {}) | more
+    abort = {"abort": account.abort} if account.abort else {}
+    metadata = journal.metadata | account.found | {"gaps": account.gaps} | abort | more
     RECORDING.write_pieces(path, journal.pieces(PIECE_ROWS), metadata)
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.acquisition.machine import Row
+from pipelines.acquisition.machine import Reading, Row
 from pipelines.errors import DeviceError
 from pipelines.mechanics.motion import CUFFS
 from pipelines.settings.rig import DriveSettings, RigSettings, SensorSettings
@@ -26,26 +26,42 @@ class Limits:
         self._felt: dict[int, int] = {}
         """Of each cuff the machine's counter at its last fresh sample."""
         self._last: Row | None = None
+        self._recorded: dict[int, Reading] = {}
+        """Of each drive the last sample that it recorded itself."""
 
     def violation(self, row: Row) -> str | None:
         """Return which limit a sample breaks, None if it keeps them all."""
         last, self._last = self._last, row
-        for j, (drive, found) in enumerate(zip(self._rig.drive, row.drives, strict=True)):
-            low, high = drive.angle_rad
-            if not low <= found.angle <= high:
-                return f"{drive.joint} angle {found.angle:.3f} rad is outside its limits {low:g} to {high:g} rad"
-            speed = found.velocity
-            if np.isnan(speed):
-                # The drive tells no speed: what the angle did since the last sample.
-                before = row if last is None else last
-                step = found.angle - before.drives[j].angle
-                speed = step * self._rate / max(row.sequence - before.sequence, 1)
-            # Written so that a NaN breaks every limit.
-            if not abs(speed) <= drive.speed_rad_s:
-                return f"{drive.joint} speed {speed:.3f} rad/s is above its limit of {drive.speed_rad_s:g} rad/s"
-            if not abs(found.torque) <= drive.torque_nm:
-                return f"{drive.joint} torque {found.torque:.1f} N·m is above its limit of {drive.torque_nm:g} N·m"
+        for j, found in enumerate(row.drives):
+            if why := self._sample_violation(j, found, found if last is None else last.drives[j]):
+                return why
         return self.force_violation(row.forces) or self._silence(row)
+
+    def record_violation(self, records: Sequence[Sequence[Reading]]) -> str | None:
+        """Return which limit a sample breaks of those that each drive recorded itself; None if all keep them."""
+        for j, samples in enumerate(records):
+            for found in samples:
+                if why := self._sample_violation(j, found, self._recorded.get(j, found)):
+                    return why
+                self._recorded[j] = found
+        return None
+
+    def _sample_violation(self, joint: int, found: Reading, before: Reading) -> str | None:
+        drive = self._rig.drive[joint]
+        low, high = drive.angle_rad
+        if not low <= found.angle <= high:
+            return f"{drive.joint} angle {found.angle:.3f} rad is outside its limits {low:g} to {high:g} rad"
+        speed = found.velocity
+        if np.isnan(speed):
+            # The drive tells no speed: what the angle did since the last sample.
+            samples = max(found.sequence - before.sequence, 1)
+            speed = (found.angle - before.angle) * self._rate * self._rig.samples_per_cycle(self._rate) / samples
+        # Written so that a NaN breaks every limit.
+        if not abs(speed) <= drive.speed_rad_s:
+            return f"{drive.joint} speed {speed:.3f} rad/s is above its limit of {drive.speed_rad_s:g} rad/s"
+        if not abs(found.torque) <= drive.torque_nm:
+            return f"{drive.joint} torque {found.torque:.1f} N·m is above its limit of {drive.torque_nm:g} N·m"
+        return None
 
     def _silence(self, row: Row) -> str | None:
         """Return which cuff sensor has told nothing for too long: its limit would be watched by nobody."""

@@ -11,7 +11,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.acquisition.machine import Row
+from pipelines.acquisition.machine import Reading, Row
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.plausibility import Plausibility
 from pipelines.acquisition.safety import Limits, refuse_leap, slowing
@@ -160,6 +160,12 @@ class Supervisor:
             raise DeviceError(why)
         return True
 
+    def judge_records(self, records: Sequence[Sequence[Reading]]) -> None:
+        """Raise DeviceError where a sample that a drive recorded itself is reason to stop."""
+        self._refuse_after_abort()
+        if why := self._limits.record_violation(records):
+            raise DeviceError(why)
+
     def has_followed(self, row: Row) -> bool:
         """Tell whether the plan is at its end with a sample."""
         # What is sent while a sample is latched is reached at the end of the next one.
@@ -168,6 +174,16 @@ class Supervisor:
     def index(self, row: Row) -> int:
         """Return which set-point of the plan a sample carries; outside the plan before and after it."""
         return row.sequence - self._first - 2
+
+    def sample(self, row: Row) -> int:
+        """Return how many samples of its drives a row is after the beginning of the recording, if not before it.
+
+        Set-point m of the plan is reached 2 + m cycles after the first. Time 0 is where the trajectory begins, half a
+        cycle before the plan's first set-point is reached.
+        """
+        cycle = row.samples_per_cycle
+        reached = row.drives[0].sequence - (self._first + 2) * cycle
+        return reached - (self._plan.first - 1) * cycle - cycle // 2 - 1
 
     def abort(self, error: BaseException) -> None:
         """Stop, whatever it was; the first reason is kept."""

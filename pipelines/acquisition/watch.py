@@ -1,8 +1,8 @@
 """Whether samples keep coming, and the machine's counter and clock go on as they should."""
 
 from math import ceil
+from typing import Protocol
 
-from pipelines.acquisition.machine import Row
 from pipelines.errors import DeviceError
 from pipelines.settings.rig import RigSettings
 
@@ -11,16 +11,28 @@ RATE_TOLERANCE = 0.05
 """How far the devices' clock may be from the rate that was asked for, and after how many samples that is looked at."""
 
 
-class Watch:
-    """The first drive's counter and clock, which are the machine's; times ``now`` are the host's, s."""
+class Told(Protocol):
+    """A sample, or a row of them."""
 
-    def __init__(self, rig: RigSettings, sample_rate_hz: float) -> None:
-        self._label = rig.label_of(rig.drive[0])
+    @property
+    def sequence(self) -> int:
+        """The counter."""
+
+    @property
+    def time(self) -> float:
+        """The device's clock, s."""
+
+
+class Watch:
+    """One drive's counter and clock, the first one's are the machine's; times ``now`` are the host's, s."""
+
+    def __init__(self, rig: RigSettings, sample_rate_hz: float, joint: int = 0) -> None:
+        self._label = rig.label_of(rig.drive[joint])
         self._rate = sample_rate_hz
         self._longest_s = rig.safety.watchdog_s
         self._most = 1 + ceil(self._longest_s * sample_rate_hz)
 
-    def begin(self, row: Row, now: float) -> None:
+    def begin(self, row: Told, now: float) -> None:
         """Begin with a sample."""
         self._first = self._last = row
         self._fresh = now
@@ -41,7 +53,7 @@ class Watch:
                 f"samples within the watchdog's {self._longest_s:g} s; was it restarted?"
             )
 
-    def take(self, row: Row, now: float) -> bool:
+    def take(self, row: Told, now: float) -> bool:
         """Tell whether a sample is a new one; refuse one that does not go on from the last."""
         self.look(row.sequence, now)
         if row.sequence == self._last.sequence:
@@ -52,7 +64,7 @@ class Watch:
         self._last, self._fresh = row, now
         return True
 
-    def _check_clock(self, row: Row) -> None:
+    def _check_clock(self, row: Told) -> None:
         """Refuse a device clock that does not go on with the samples."""
         if not row.time > self._last.time:
             raise DeviceError(
@@ -60,7 +72,7 @@ class Watch:
                 f"from {self._last.sequence} to {row.sequence}; was it restarted?"
             )
 
-    def _check_rate(self, row: Row) -> None:
+    def _check_rate(self, row: Told) -> None:
         """Refuse a device clock that does not tell the sample rate; a wrong unit in the rig file shows here."""
         found = (row.sequence - self._first.sequence) / max(row.time - self._first.time, 1e-9)
         if not abs(found / self._rate - 1.0) <= RATE_TOLERANCE:

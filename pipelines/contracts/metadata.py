@@ -78,6 +78,16 @@ class Controller(Keys):
     limit_nm: Positive | None = None
 
 
+class Clock(Keys):
+    """How a drive's clock goes beside the first drive's."""
+
+    offset_s: Finite
+    rate_ppm: Finite
+    offset_error_s: NotNegative | None = None
+    rate_error_ppm: NotNegative | None = None
+    corrected: bool
+
+
 class RunKeys(TableKeys):
     """What a run knows of itself."""
 
@@ -92,5 +102,6 @@ class RunKeys(TableKeys):
     gaps: list[tuple[Finite, Annotated[int, Field(gt=0)]]] | None = None
     abort: str | None = None
     recovered: bool | None = None
+    clocks: dict[str, Clock] | None = None
     controller: dict[str, Controller] | None = None
     geometry: Geometry | None = None

@@ -2,12 +2,13 @@
 
 import asyncio
 import ssl
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
 from typing import cast
 
 from pymodbus.framer import FramerType
+from pymodbus.pdu import ModbusPDU
 from pymodbus.server import ModbusSerialServer, ModbusTcpServer, ModbusTlsServer
 from pymodbus.simulator import SimDevice
 
@@ -18,7 +19,9 @@ from pipelines.settings.line import LineSettings, NetworkLine, RtuLine, RtuOverT
 
 
 @asynccontextmanager
-async def listening(line: LineSettings, devices: list[SimDevice]) -> AsyncIterator[str]:
+async def listening(
+    line: LineSettings, devices: list[SimDevice], requests: Sequence[type[ModbusPDU]] = ()
+) -> AsyncIterator[str]:
     """Serve devices on a line for as long as the block lasts; yields the place where clients find them.
 
     Parameters
@@ -27,6 +30,8 @@ async def listening(line: LineSettings, devices: list[SimDevice]) -> AsyncIterat
         A network line's ``host`` is the address to bind to, its ``port`` may be 0 for a free one. A serial
         line's port is a pseudo-terminal; its ``serial_port`` becomes a link to that, unless it is empty.
     devices : list of SimDevice
+    requests : sequence of ModbusPDU types
+        Requests that are served otherwise than by pymodbus.
 
     Raises
     ------
@@ -38,11 +43,11 @@ async def listening(line: LineSettings, devices: list[SimDevice]) -> AsyncIterat
     if isinstance(line, RtuLine):
         with null_modem() as (ours, theirs), _linked(line.serial_port, theirs) as place:
             bus = ModbusSerialServer(devices, port=ours, baudrate=line.baud_rate, ignore_missing_devices=True)
-            async with _serving(bus, place):
+            async with _serving(bus, place, requests):
                 yield place
         return
     server = _network_server(line, devices)
-    async with _serving(server, line.place):
+    async with _serving(server, line.place, requests):
         number = cast(asyncio.Server, server.transport).sockets[0].getsockname()[1]
         yield f"{line.host}:{number}"
 
@@ -58,7 +63,11 @@ def _network_server(line: NetworkLine, devices: list[SimDevice]) -> ModbusTcpSer
 
 
 @asynccontextmanager
-async def _serving(server: ModbusTcpServer | ModbusSerialServer, place: str) -> AsyncIterator[None]:
+async def _serving(
+    server: ModbusTcpServer | ModbusSerialServer, place: str, requests: Sequence[type[ModbusPDU]]
+) -> AsyncIterator[None]:
+    for request in requests:
+        server.decoder.register(request)
     try:
         if not await guarded(server).listen():
             raise DeviceError(

@@ -1,7 +1,8 @@
 """The virtual rig on the wire: drives and force sensors as Modbus devices, all latched at one instant.
 
-In lockstep a sample lasts until every drive has been exchanged once (FC23: set-point in, sample out), so a
-run depends on seeds and set-points alone. In real time samples come on the rig's own clock.
+In lockstep a cycle (a sample, or those that a ring takes from one set-point to the next) lasts until every drive has
+been exchanged once (FC23: set-point in, sample out), so a run depends on seeds and set-points alone. In real time
+samples come on the rig's own clock, or on a clock of each drive's own.
 """
 
 import asyncio
@@ -24,8 +25,10 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 from pipelines.errors import SettingsError, about
 from pipelines.mechanics.motion import CUFFS
 from pipelines.registers import Block
+from pipelines.rig.clocks import OwnClock
 from pipelines.rig.listening import listening
 from pipelines.rig.plant import JOINTS, Plant, Samples
+from pipelines.rig.ring import Ring, fifo_request
 from pipelines.rig.sealed import hidden_effects
 from pipelines.rig.servo import Servo
 from pipelines.settings.line import LineSettings, RtuLine, TcpLine
@@ -48,12 +51,16 @@ READ_WRITE = 23
 
 
 def build_plant(rig: RigSettings, path: Path, run: str, seed: int = 0, sample_rate_hz: float | None = None) -> Plant:
-    """Return the plant of a rig file, with what it hides."""
+    """Return the plant of a rig file, with what it hides; ``sample_rate_hz`` is that of set-points."""
     if rig.plant is None:
         raise SettingsError(f"{path}: plant: missing, so there is no machine to play; add a [plant], see docs/rig.md")
     hidden = hidden_effects(path.parent / rig.plant.sealed) if rig.plant.sealed else ()
+    cycle_hz = sample_rate_hz or rig.plant.sample_rate_hz
     with about(path):
-        return Plant(rig.plant, run, seed, hidden, sample_rate_hz)
+        device_hz = cycle_hz * rig.samples_per_cycle(cycle_hz)
+        # What a device samples between the plant's samples is interpolated: those must lie closely.
+        finer = max(1, round(rig.plant.drive_rate_hz / device_hz)) if any(rig.plant.clock_ppm) else 1
+        return Plant(rig.plant, run, seed, hidden, device_hz * finer)
 
 
 class Device:
@@ -73,13 +80,17 @@ class Device:
     def as_served(self) -> SimDevice:
         """Return the device as the server knows it."""
         held = {entry.address: entry.value for entry in self.identity}
-        for block in self.blocks:
-            held |= dict.fromkeys(range(block.address, block.address + block.count), 0)
+        for span in self.spans():
+            held |= dict.fromkeys(span, 0)
         # One SimData for each stretch of addresses: what lies between does not exist.
         stretches = groupby(enumerate(sorted(held)), lambda numbered: numbered[1] - numbered[0])
         addresses = [[address for _, address in stretch] for _, stretch in stretches]
         data = [SimData(a[0], values=[held[i] for i in a], datatype=DataType.REGISTERS) for a in addresses]
         return SimDevice(self.unit, simdata=data, action=self._serve)
+
+    def spans(self) -> tuple[range, ...]:
+        """Return the addresses it takes, beside those of its identity."""
+        return tuple(range(block.address, block.address + block.count) for block in self.blocks)
 
     async def _serve(
         self, function: int, first: int, address: int, count: int, registers: list[int], written: list | None
@@ -90,7 +101,8 @@ class Device:
         self.rig.catch_up()  # before a write takes effect: until now the old set-point held
         self.written |= written is not None
         if written is None:
-            self.show(self.rig.sample)
+            self.show(self.latched())
+            self.show_records(address, count)
             if function == READ_WRITE:
                 self.rig.exchanged(self)
         return None
@@ -99,9 +111,16 @@ class Device:
         """Tell whether registers may be written; those that only tell something may not."""
         return False
 
+    def latched(self) -> Samples:
+        """Return the sample that the device tells now."""
+        return self.rig.sample
+
     def show(self, sample: Samples) -> None:
         """Put a sample into the registers."""
         raise NotImplementedError
+
+    def show_records(self, address: int, count: int) -> None:
+        """Put into the registers what is asked for of a record of earlier samples; nothing where there is none."""
 
     def _put(self, block: Block, values: dict[str, float]) -> None:
         start = block.address - self.first
@@ -113,11 +132,19 @@ class Drive(Device):
 
     def __init__(self, rig: "VirtualRig", settings: DriveSettings, registers: DriveMap, servo: Servo) -> None:
         self.read, self.write = Block(registers_of(registers.read)), Block(registers_of(registers.write))
+        self.ring = Ring(registers.ring) if registers.ring else None
         super().__init__(rig, settings.unit, registers.identity, (self.read, self.write))
         self.joint = JOINTS.index(settings.joint)
         self.torque_per_ampere = settings.torque_per_ampere
         self.servo = servo
         self._beat: float | None = None
+        self.clock: OwnClock | None = None
+        self.sample: Samples | None = None
+        """Latest sample by its own clock."""
+
+    def spans(self) -> tuple[range, ...]:
+        """Return the addresses it takes, those of the ring among them."""
+        return super().spans() + (self.ring.spans if self.ring else ())
 
     def takes(self, address: int, count: int) -> bool:
         """Tell whether registers may be written; those that only tell something may not."""
@@ -135,11 +162,41 @@ class Drive(Device):
         if beat is None or beat != self._beat:
             self.servo.hear(told["reference"], int(told["control"]))
 
+    def record(self, samples: Samples) -> None:
+        """Take in what the plant did since the last time."""
+        if self.clock:
+            samples = self.clock.sampled(samples)
+            if len(samples.sequence):
+                self.sample = one(samples, -1)
+        if self.ring:
+            for k, sequence in enumerate(samples.sequence.tolist()):
+                self.ring.append(sequence, self._values(one(samples, k)))
+
+    def latched(self) -> Samples:
+        """Return the sample that the device tells now."""
+        return self.sample or self.rig.sample
+
     def show(self, sample: Samples) -> None:
         """Put a sample into the registers."""
         self.hear()
+        self._put(self.read, self._values(sample))
+
+    def show_records(self, address: int, count: int) -> None:
+        """Put into the registers what is asked for of the ring."""
+        if self.ring:
+            self.ring.show(self.registers, self.first, address, count)
+
+    def queue(self, address: int) -> list[int] | None:
+        """Return the oldest records of the queue at an address, which lets them go; None where there is no queue."""
+        if self.ring is None or self.ring.fifo != address:
+            return None
+        self.rig.catch_up()
+        return self.ring.taken()
+
+    def _values(self, sample: Samples) -> dict[str, float]:
+        """Return what the registers tell of a sample, by quantity."""
         j = self.joint
-        values = {
+        return {
             "sequence": sample.sequence[0] % (self.read.span("sequence") or 2**63),
             "time": sample.time[0] % (self.read.span("time") or np.inf),
             "angle": sample.angle[0, j],
@@ -150,7 +207,6 @@ class Drive(Device):
             "status": float(self.servo.status),
             "reference": sample.reference[0, j],
         }
-        self._put(self.read, values)
 
 
 class Sensor(Device):
@@ -168,19 +224,36 @@ class Sensor(Device):
         self._put(self.read, {"sequence": sequence, "force_x": x, "force_y": y, "force_z": z})
 
 
+def one(samples: Samples, k: int) -> Samples:
+    """Return the k-th of some samples."""
+    places = slice(k, k + 1 or None)
+    return Samples(**{name: values[places] for name, values in vars(samples).items()})
+
+
 class VirtualRig:
     """All devices of a rig and the plant behind them."""
 
-    def __init__(self, rig: RigSettings, plant: Plant) -> None:
+    def __init__(self, rig: RigSettings, plant: Plant, sample_rate_hz: float | None = None) -> None:
+        """Begin at rest; ``sample_rate_hz`` is that of set-points, where not the plant's settings'."""
         self.plant = plant
         self.lockstep = rig.clock == "lockstep"
+        cycle_hz = sample_rate_hz or plant.settings.sample_rate_hz
+        self.samples_per_cycle = round(plant.sample_rate_hz / cycle_hz)
         self.drives = [
             Drive(self, drive, rig.map.drive[drive.map], self._servo(rig, drive, rest))
             for drive, rest in zip(rig.drive, plant.reference, strict=True)
         ]
         self.sensors = [Sensor(self, sensor, rig.map.sensor[sensor.map]) for sensor in rig.sensor]
+        self._keep_own_time(cycle_hz * rig.samples_per_cycle(cycle_hz))
         self._advance(plant.reference)
         self._began = asyncio.get_running_loop().time()
+
+    def _keep_own_time(self, rate_hz: float) -> None:
+        """Give the drives the clocks that the settings ask for."""
+        settings = self.plant.settings
+        if any((*settings.clock_ppm, *settings.clock_offset_s)):
+            for drive, ppm, offset in zip(self.drives, settings.clock_ppm, settings.clock_offset_s, strict=True):
+                drive.clock = OwnClock(ppm, offset, rate_hz, self.plant.sample_rate_hz)
 
     def exchanged(self, drive: Device) -> None:
         """Note that a drive has been exchanged; after the last one the plant goes on, once its reply is sent."""
@@ -192,33 +265,37 @@ class VirtualRig:
         """Advance the plant to the sample that is due."""
         if self.lockstep:
             if not self._waiting:
-                self._advance(self.sample.angle[0])
+                self._advance(self.sample.angle[0], self.samples_per_cycle)
             return
         elapsed = asyncio.get_running_loop().time() - self._began
-        while self.sample.sequence[0] < int(elapsed * self.plant.sample_rate_hz):
-            self._advance(self.sample.angle[0])
+        due = int(elapsed * self.plant.sample_rate_hz) - int(self.sample.sequence[0])
+        if due > 0:
+            self._advance(self.sample.angle[0], due)
 
     async def keep_time(self) -> None:
         """Latch samples on the rig's own clock, for ever."""
         loop = asyncio.get_running_loop()
         while True:
-            due = self._began + (self.sample.sequence[0] + 1) / self.plant.sample_rate_hz
+            due = self._began + (self.sample.sequence[0] + self.samples_per_cycle) / self.plant.sample_rate_hz
             await asyncio.sleep(max(0.0, due - loop.time()))
             self.catch_up()
 
     def _servo(self, rig: RigSettings, drive: DriveSettings, rest: float) -> Servo:
         registers, deceleration = rig.map.drive[drive.map], rig.safety.deceleration_rad_s2
         rate, heartbeat_s = self.plant.sample_rate_hz, self.plant.settings.heartbeat_s
-        return Servo(registers, rest, drive.angle_rad, rate, deceleration, heartbeat_s)
+        return Servo(registers, rest, drive.angle_rad, rate, deceleration, heartbeat_s, self.samples_per_cycle)
 
-    def _advance(self, angle: NDArray) -> None:
-        """Go on by one sample from measured angles (J,) rad."""
-        told = []
+    def _advance(self, angle: NDArray, count: int = 1) -> None:
+        """Go on by some samples, during which the drives are told nothing new, from measured angles (J,) rad."""
         for drive in self.drives:
             drive.hear()
-            told.append(drive.servo.next(float(angle[drive.joint])))
-        enabled = np.array([enabled for _, enabled in told])
-        self.sample = self.plant.run(np.array([[reference for reference, _ in told]]), enabled)
+        told = [[drive.servo.next(float(angle[drive.joint])) for drive in self.drives] for _ in range(count)]
+        for enabled, following in groupby(told, lambda drives: [follows for _, follows in drives]):
+            references = np.array([[reference for reference, _ in drives] for drives in following])
+            samples = self.plant.run(references, np.array(enabled))
+            for drive in self.drives:
+                drive.record(samples)
+        self.sample = one(samples, -1)
         self._waiting = set(self.drives)
 
 
@@ -229,6 +306,7 @@ async def serve(
     announce: Announce,
     until: asyncio.Event,
     bind: str = "127.0.0.1",
+    sample_rate_hz: float | None = None,
 ) -> None:
     """Serve a rig on this machine until an event is set.
 
@@ -243,12 +321,18 @@ async def serve(
     until : asyncio.Event
     bind : str
         Address on which TCP ports listen.
+    sample_rate_hz : float, optional
+        Rate of set-points, where not the plant's settings'.
     """
-    virtual = VirtualRig(rig, plant)
+    virtual = VirtualRig(rig, plant, sample_rate_hz)
     on_line: dict[str | int, list[SimDevice]] = defaultdict(list)
+    queues: dict[str | int, dict[int, Callable]] = defaultdict(dict)
     for settings, device in zip((*rig.drive, *rig.sensor), (*virtual.drives, *virtual.sensors), strict=True):
         alone = settings.port if port is None else port
-        on_line[alone if settings.line is None else settings.line].append(device.as_served())
+        key = alone if settings.line is None else settings.line
+        on_line[key].append(device.as_served())
+        if isinstance(device, Drive):
+            queues[key][device.unit] = device.queue
     if port and len(on_line) > 1:
         raise SettingsError(
             f"--port: found {port} for {len(on_line)} lines, expected one line; leave it out for the places that the "
@@ -259,7 +343,8 @@ async def serve(
         async with AsyncExitStack() as servers:
             for key, devices in on_line.items():
                 name, line = (key, rig.line[key]) if isinstance(key, str) else (None, TcpLine.model_construct(port=key))
-                announce(await servers.enter_async_context(listening(_placed(line, bind, port), devices)), name)
+                served = listening(_placed(line, bind, port), devices, [fifo_request(queues[key])])
+                announce(await servers.enter_async_context(served), name)
             await until.wait()
     finally:
         if clock:
@@ -304,7 +389,7 @@ def serve_file(
                 loop.call_soon_threadsafe(until.set)
 
             threading.Thread(target=wait, daemon=True).start()
-        await serve(rig, plant, port, announce, until, bind)
+        await serve(rig, plant, port, announce, until, bind, sample_rate_hz)
 
     if rig.clock == "real_time":
         gc.freeze()  # else looking through all that was imported would cost several samples now and then

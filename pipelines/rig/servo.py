@@ -5,7 +5,7 @@ from math import ceil, isfinite
 from pipelines.settings.rig import DriveMap
 
 EXTRAPOLATED = 5
-"""Samples over which a drive goes on at its set-points' speed when none comes; then it slows down."""
+"""Cycles over which a drive goes on at its set-points' speed when none comes; then it slows down."""
 
 
 class Servo:
@@ -19,6 +19,7 @@ class Servo:
         sample_rate_hz: float,
         deceleration_rad_s2: float,
         heartbeat_s: float | None,
+        samples_per_cycle: int = 1,
     ) -> None:
         """Be a disabled drive at rest.
 
@@ -32,10 +33,13 @@ class Servo:
             How it slows down when nothing is told any more.
         heartbeat_s : float or None
             How long it may be told nothing before it disables itself; None for a drive without such a watchdog.
+        samples_per_cycle : int
+            Samples from one set-point to the next, within which it goes there in a straight line.
         """
         self.fault = False
         """Latched until a fault reset, and no drive with a fault is enabled."""
         self._map = registers
+        self._cycle = samples_per_cycle
         self._limits = angle_rad
         self._slowing = deceleration_rad_s2 / sample_rate_hz**2
         self._patience = None if heartbeat_s is None else ceil(heartbeat_s * sample_rate_hz)
@@ -78,10 +82,10 @@ class Servo:
     def _reference(self) -> float:
         if self._control == self._map.halt:
             return self._last
-        if self._unheard == 0:
-            return self._told
+        if self._unheard < self._cycle:
+            return self._last + (self._told - self._last) / (self._cycle - self._unheard)
         step = self._step
-        if self._unheard > EXTRAPOLATED:
+        if self._unheard >= self._cycle * (1 + EXTRAPOLATED):
             step = max(abs(step) - self._slowing, 0.0) * (1 if step > 0 else -1)
         low, high = self._limits
         return min(max(self._last + step, low), high)

@@ -57,6 +57,8 @@ class PlantSettings(Settings):
     heartbeat_s: float | None = Field(
         None, gt=0.0, description="How long a drive may be told nothing before it slows down and disables itself."
     )
+    clock_ppm: Pair = Field((0.0, 0.0), description="How much faster than the host's each drive's clock runs.")
+    clock_offset_s: Pair = Field((0.0, 0.0), description="What each drive's clock says at the start.")
     drive_rate_hz: float = Field(1000.0, gt=0.0, description="Rate of the drives' position loops.")
     kp_nm_rad: Pair = Field((1500.0, 600.0), description="Stiffness of the position loops.")
     kd_nm_s_rad: Pair = Field((120.0, 40.0), description="Damping of the position loops.")

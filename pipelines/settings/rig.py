@@ -10,6 +10,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 from pydantic.main import IncEx
 
+from pipelines.errors import SettingsError
 from pipelines.settings.base import Settings, load_toml
 from pipelines.settings.line import LineSettings, TcpLine
 from pipelines.settings.plant import PlantSettings
@@ -37,8 +38,11 @@ DIMENSION = {
 }  # fmt: skip
 """Units in which each quantity can be had."""
 
-MOST_REGISTERS = {"read": 125, "write": 121}
-"""What one FC23 exchange carries."""
+MOST_REGISTERS = {"read": 125, "write": 121, "record": 125}
+"""What one exchange carries."""
+
+MOST_QUEUED = 31
+"""Registers that one FC24 answer carries."""
 
 
 class Register(Settings):
@@ -105,6 +109,63 @@ class DriveWrite(Settings):
         return self
 
 
+class RingRecord(Settings):
+    """One record of a ring; addresses count from the record's own beginning."""
+
+    sequence: Register = Field(description="Sample counter, which counts as read.sequence does.")
+    time: Register = Field(description="The device's clock at the sample.")
+    angle: Register = Field(description="Joint angle.")
+    current: Register = Field(description="Motor current, positive where it pushes the angle upward.")
+    velocity: Register | None = Field(None, description="The drive's own velocity estimate.")
+    reference: Register | None = Field(None, description="Set-point in force; left out, recordings hold none.")
+
+
+class RingSettings(Settings):
+    """A drive's own record of its latest samples: a ring of registers read by FC03, or a queue read by FC24."""
+
+    newest: Register | None = Field(None, description="Of a ring: sequence number of the newest whole record.")
+    address: int | None = Field(None, ge=0, le=65535, description="Of a ring: where the record with number 0 begins.")
+    capacity: int | None = Field(None, ge=2, description="Of a ring: records in it; record n is the (n mod it)-th.")
+    fifo: int | None = Field(None, ge=0, le=65535, description="Of a queue: the address that FC24 asks for.")
+    words: int = Field(ge=1, le=MOST_REGISTERS["read"], description="Registers of 16 bits from one record to the next.")
+    record: RingRecord = Field(description="What a record holds.")
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> Self:
+        _refuse_bad_block(self.record, "record")
+        found = {name for name in ("newest", "address", "capacity") if getattr(self, name) is not None}
+        if (self.fifo is None) != (len(found) == 3) or (self.fifo is not None and found):
+            found |= set() if self.fifo is None else {"fifo"}
+            raise ValueError(
+                f"ring: found {', '.join(sorted(found)) or 'neither'}, "
+                "expected newest, address and capacity (a ring that FC03 reads), or fifo (a queue that FC24 reads)"
+            )
+        length = max(r.address + r.registers for r in registers_of(self.record).values())
+        if length > self.words:
+            raise ValueError(f"words: found {self.words}, but the record's registers take {length}; correct one")
+        if self.fifo is not None and self.words > MOST_QUEUED:
+            raise ValueError(f"words: found {self.words}, expected at most {MOST_QUEUED}, what an FC24 answer carries")
+        if self.newest is not None:
+            self._refuse_bad_ring(self.newest)
+        return self
+
+    def _refuse_bad_ring(self, newest: Register) -> None:
+        assert self.address is not None and self.capacity is not None  # a ring has all three
+        end = self.address + self.capacity * self.words
+        if end > 65536:
+            raise ValueError(f"capacity: found {self.capacity}, but such a ring ends beyond address 65535; lower it")
+        if self.address <= newest.address < end:
+            raise ValueError(f"newest: register {newest.address} is part of the ring itself; correct one address")
+        for name, register in (("newest", newest), ("record.sequence", self.record.sequence)):
+            span = 2 ** (16 * register.registers)
+            # Else records would change places when the counter begins anew.
+            if not register.type.startswith("u") or span % self.capacity:
+                raise ValueError(
+                    f"{name}.type: found {register.type} with a capacity of {self.capacity}, expected an unsigned "
+                    "counter whose range is a multiple of the capacity (any power of 2)"
+                )
+
+
 class SensorRead(Settings):
     """What a 3-axis force sensor tells; read in one block. Axes are those of the segment, see docs/contracts.md."""
 
@@ -130,6 +191,7 @@ class DriveMap(Settings):
     )
     enabled_mask: int = Field(0, ge=0, description="Bits of the status word that tell whether it is enabled; 0: none.")
     enabled_value: int = Field(0, ge=0, description="What these bits are while it is enabled.")
+    ring: RingSettings | None = Field(None, description="The drive's own record of its latest samples, if it has one.")
 
     @model_validator(mode="after")
     def _blocks_are_possible(self) -> Self:
@@ -148,6 +210,11 @@ class DriveMap(Settings):
             raise ValueError(
                 f"enabled_value: found 0x{self.enabled_value:04X}, expected bits of enabled_mask "
                 f"0x{self.enabled_mask:04X} only; correct one of them"
+            )
+        if self.ring and self.ring.record.sequence.type != self.read.sequence.type:
+            raise ValueError(
+                f"ring.record.sequence.type: found {self.ring.record.sequence.type}, expected "
+                f"{self.read.sequence.type} as in read.sequence: it is the same counter"
             )
         return self
 
@@ -319,6 +386,13 @@ class RigSettings(Settings):
     clock: Literal["lockstep", "real_time"] = Field(
         "real_time", description="Devices sample on their own clock, or (virtual rigs) once for each exchange."
     )
+    clocks: Literal["common", "own"] = Field(
+        "common", description="Drives sample at the same instants, or each by a clock of its own."
+    )
+    sampling: Literal["cyclic", "recorder"] = Field(
+        "cyclic", description="Samples are fetched with each set-point, or drained from the drives' own rings."
+    )
+    record_rate_hz: float | None = Field(None, gt=0.0, description="Samples a second in the drives' rings.")
     drive: tuple[DriveSettings, ...] = Field(min_length=1, description="The drives.")
     sensor: tuple[SensorSettings, ...] = Field((), description="Cuff force sensors, read with a human only.")
     line: dict[str, LineSettings] = Field(default_factory=dict, description="Lines that devices share, by name.")
@@ -349,6 +423,7 @@ class RigSettings(Settings):
                 raise ValueError(f"sensor: found two sensors at {cuff}, expected one; correct their cuffs")
         if self.plant is None and (self.embedded or self.clock == "lockstep"):
             raise ValueError("plant: missing; a virtual rig (embedded, or in lockstep) needs the machine it plays")
+        self._refuse_impossible_sampling()
         return self
 
     def _refuse_bad_lines(self) -> None:
@@ -377,6 +452,33 @@ class RigSettings(Settings):
         """Return what errors call a device: what it is, and where."""
         name = f"drive {device.joint}" if isinstance(device, DriveSettings) else f"sensor {device.cuff}"
         return f"{name} ({self.line_of(device).place}, unit {device.unit})"
+
+    def _refuse_impossible_sampling(self) -> None:
+        drifts = self.plant is not None and any((*self.plant.clock_ppm, *self.plant.clock_offset_s))
+        if self.clock == "lockstep" and (self.clocks == "own" or drifts):
+            raise ValueError('clock: found "lockstep", in which no time goes by; clocks of their own need "real_time"')
+        if self.sampling == "cyclic":
+            return
+        if self.record_rate_hz is None:
+            raise ValueError('record_rate_hz: missing; sampling = "recorder" needs the rate of the drives\' rings')
+        for i, drive in enumerate(self.drive):
+            if self.map.drive[drive.map].ring is None:
+                raise ValueError(
+                    f'drive[{i}].map: {drive.map} has no ring, which sampling = "recorder" drains; add '
+                    f'[map.drive.{drive.map}.ring], or set sampling = "cyclic"'
+                )
+
+    def samples_per_cycle(self, sample_rate_hz: float) -> int:
+        """Return how many samples the drives take from one set-point to the next, or raise a SettingsError."""
+        if self.sampling == "cyclic" or self.record_rate_hz is None:
+            return 1
+        ratio = self.record_rate_hz / sample_rate_hz
+        if ratio < 1.0 or abs(ratio - round(ratio)) > 1e-9:
+            raise SettingsError(
+                f"record_rate_hz: found {self.record_rate_hz:g} with set-points at {sample_rate_hz:g} Hz, expected a "
+                "whole multiple; change it or acquire.sample_rate_hz"
+            )
+        return round(ratio)
 
     def known_geometry(self) -> dict[str, float]:
         """Return the lengths that are known of this rig's leg; a virtual rig's are its plant's unless the file says."""

@@ -1,0 +1,114 @@
+"""A drive's own record of its samples, drained in blocks: a ring of registers (FC03) or a queue (FC24).
+
+What was overwritten before it could be drained is missing from what a drain returns, and shows as a gap in the sequence
+numbers. It is never taken for something else: every record carries its number, and the newest number is read once more
+after the records, so that one which the drive may have overwritten meanwhile is known.
+"""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+
+from pipelines.acquisition.device import Device
+from pipelines.registers import Block
+from pipelines.settings.rig import MOST_QUEUED, MOST_REGISTERS, RingSettings, registers_of
+
+MOST_READS = 4
+"""Reads in one drain; what is left waits for the next one, as set-points do not."""
+
+Record = Mapping[str, float]
+Numbered = Callable[[float, float | None], int]
+"""From what a counter's register held to the sample's number, which goes on beyond the register's width; and, where it
+was the drive's newest sample, when it was asked for (host's clock, s)."""
+
+
+class Ring:
+    """The ring of one drive, which FC03 reads."""
+
+    def __init__(self, device: Device, settings: RingSettings, numbered: Numbered) -> None:
+        assert settings.newest and settings.address is not None and settings.capacity  # a ring has all three
+        self._device = device
+        self._numbered = numbered
+        self._newest = Block({"newest": settings.newest})
+        self._record = Block(registers_of(settings.record))
+        self._span = int(self._record.span("sequence"))
+        self._address, self._capacity, self._words = settings.address, settings.capacity, settings.words
+        self.block = MOST_REGISTERS["read"] // settings.words
+        """Records that one read brings."""
+        self._next: int | None = None
+        self._doubted: int | None = None
+
+    async def drain(self, newest: int) -> list[tuple[int, Record]]:
+        """Return records not returned before, each with its sequence number, up to the ``newest`` known to be there.
+
+        The first drain returns none: it says where to begin.
+        """
+        first = newest + 1 if self._next is None else max(self._next, newest + 1 - self._capacity)
+        newest = min(newest, first + MOST_READS * self.block - 1)
+        if first > newest:
+            self._next = first
+            return []
+        read: list[tuple[int, Sequence[int]]] = []
+        while first <= newest:
+            # A read ends at the ring's end, where the numbers go on at its beginning.
+            count = min(newest + 1 - first, self.block, self._capacity - first % self._capacity)
+            place = self._address + first % self._capacity * self._words
+            words = await self._device.read(place, count * self._words, in_motion=True)
+            read += [(first + k, words[k * self._words : (k + 1) * self._words]) for k in range(count)]
+            first += count
+        sent = time.perf_counter()
+        words = await self._device.read(self._newest.address, self._newest.count, in_motion=True)
+        # The drive may have been writing the record after that one while these were read.
+        overwritten = self._numbered(self._newest.decode(words)["newest"], sent) + 1 - self._capacity
+        self._next = newest + 1  # not before all was answered: what was not is read again
+        return self._trusted([(number, words) for number, words in read if number > overwritten])
+
+    def _trusted(self, read: Sequence[tuple[int, Sequence[int]]]) -> list[tuple[int, Record]]:
+        """Return the records that hold the numbers they should.
+
+        A drive may count a record before it has written it whole, so one with another number is read once more;
+        if that does not help, it is left out.
+        """
+        records: list[tuple[int, Record]] = []
+        for number, words in read:
+            record = self._record.decode(words[self._record.address : self._record.address + self._record.count])
+            if record["sequence"] == number % self._span:
+                records.append((number, record))
+            elif self._doubted is None or number > self._doubted:
+                self._doubted = self._next = number
+                break
+        return records
+
+
+class Queue:
+    """The queue of one drive, which FC24 reads and which reading empties."""
+
+    def __init__(self, device: Device, settings: RingSettings, numbered: Numbered) -> None:
+        assert settings.fifo is not None  # a queue has an address
+        self._device = device
+        self._numbered = numbered
+        self._address, self._words = settings.fifo, settings.words
+        self._record = Block(registers_of(settings.record))
+        self.block = MOST_QUEUED // settings.words
+        """Records that one read brings."""
+        self._last: int | None = None
+
+    async def drain(self, newest: int) -> list[tuple[int, Record]]:
+        """Return records not returned before, each with its sequence number.
+
+        The first drain returns none: what had gathered in the queue before it is let go.
+        """
+        began, last = self._last is not None, newest if self._last is None else self._last
+        records: list[tuple[int, Record]] = []
+        for _ in range(MOST_READS):
+            words = await self._device.read_fifo(self._address, self._words)
+            for start in range(0, len(words), self._words):
+                place = start + self._record.address
+                record = self._record.decode(words[place : place + self._record.count])
+                number = self._numbered(record["sequence"], None)
+                if number > last:
+                    last = number
+                    records.append((number, record))
+            if len(words) < self.block * self._words:
+                break
+        self._last = last
+        return records if began else []

@@ -1,0 +1,207 @@
+"""Where the samples that are kept come from: the cycle itself, or the drives' own records and clocks beside it."""
+
+import asyncio
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.acquisition.align import Alignment
+from pipelines.acquisition.clocks import BUCKET_S, Bounds, Drift
+from pipelines.acquisition.machine import Drive, Machine, Reading, Row, all_answers
+from pipelines.acquisition.watch import Watch
+from pipelines.errors import DeviceError, Unanswered
+
+Judge = Callable[[Sequence[Sequence[Reading]]], None]
+"""Raises DeviceError where one of each drive's samples is reason to stop."""
+
+SECOND_LOOK = (0.3, 0.75)
+"""Shares of a sample after an exchange between which a drive with a clock of its own is looked at again: with both
+looks none of its samples passes unseen."""
+AIM = 0.1
+"""Share of a sample by which that look falls before or after the instant at which the drive's next one is expected."""
+
+
+class Sampling(Protocol):
+    """Tells which rows are to be kept."""
+
+    async def rows(self, row: Row) -> list[Row]:
+        """Return rows that are whole now that a cycle brought this one, oldest first."""
+
+    def clocks(self, since_s: float) -> dict[str, dict]:
+        """Return what is known of the drives' clocks, by joint, ``since_s`` of the first one's time."""
+
+
+class Latched:
+    """Drives latch their samples at one instant: a cycle's row is kept as it is."""
+
+    async def rows(self, row: Row) -> list[Row]:
+        """Return the cycle's row."""
+        return [row]
+
+    def clocks(self, since_s: float) -> dict[str, dict]:
+        """Return nothing: there is one clock."""
+        return {}
+
+
+class Cycled:
+    """Samples of one drive that the cycle brought, and a second look at each for a drive with a clock of its own."""
+
+    def __init__(self, drive: Drive, period_s: float, *, looks_again: bool) -> None:
+        self._drive, self._period_s, self._looks_again = drive, period_s, looks_again
+        self._dither = np.random.default_rng(0)
+
+    async def samples(self, reading: Reading) -> list[Reading]:
+        """Return what came since the last cycle, this cycle's reading among it."""
+        if not self._looks_again:
+            return [reading]
+        await asyncio.sleep(self._until_the_second_look())
+        try:
+            return [reading, await self._drive.look(in_motion=True)]
+        except Unanswered:
+            return [reading]
+
+    def _until_the_second_look(self) -> float:
+        """Return for how long to wait, s: until the next sample is due where that is in reach, as that tells most."""
+        low, high = (share * self._period_s for share in SECOND_LOOK)
+        due = self._drive.bounds.ahead(time.perf_counter()) if self._drive.bounds else None
+        aim = self._dither.uniform(low, high) if due is None else due + self._dither.normal(0.0, AIM) * self._period_s
+        return float(np.clip(aim, low, high))
+
+
+class Recorded:
+    """Samples that one drive kept itself, drained once they fill a read."""
+
+    def __init__(self, drive: Drive, patience_s: float) -> None:
+        assert drive.ring  # a rig file that asks for recorders has one for every drive
+        self._drive, self._block = drive, drive.ring.block
+        self._drained: int | None = None
+        self._patience_s = patience_s
+        self._silent_since: float | None = None
+
+    async def samples(self, reading: Reading) -> list[Reading]:
+        """Return what was drained; mostly nothing, until a read is worth its while."""
+        if self._drained is not None and reading.sequence < self._drained + self._block:
+            return []
+        try:
+            samples = await self._drive.drain(reading.sequence)
+        except Unanswered:
+            if self._silent_since is None:
+                self._silent_since = time.monotonic()
+            if time.monotonic() - self._silent_since > self._patience_s:
+                raise
+            return []  # the ring keeps them: the next drain brings what this one did not
+        self._silent_since = None
+        self._drained = samples[-1].sequence if samples else reading.sequence
+        return samples
+
+
+class Streams:
+    """Each drive's samples come by themselves, and are brought to the first one's instants."""
+
+    def __init__(self, machine: Machine, cycle_hz: float, judge: Judge) -> None:
+        rig, drives = machine.rig, machine.drives
+        self._machine, self._judge = machine, judge
+        self._rate_hz = cycle_hz * machine.samples_per_cycle
+        self._own = rig.clocks == "own"
+        period = 1.0 / self._rate_hz
+        self._sources: list[Recorded | Cycled] = [
+            Recorded(drive, rig.safety.watchdog_s)
+            if rig.sampling == "recorder"
+            else Cycled(drive, period, looks_again=j > 0)
+            for j, drive in enumerate(drives)
+        ]
+        self._watches = [Watch(rig, self._rate_hz, j) for j in range(1, len(drives))]
+        self._drifts = [Drift(self._rate_hz) for _ in drives[1:]]
+        self._leads = machine.leads
+        self._alignment = Alignment([self._position(j) for j in range(len(self._drifts))])
+        for drive in drives if self._own else ():
+            drive.bounds = Bounds(period)
+        self._forces: dict[int, NDArray] = {}
+        self._bucket_ends: float | None = None
+        self._last: Row | None = None
+
+    def _position(self, j: int) -> Callable[[int], float | None]:
+        """Return where the drive after the first ``j`` is in its own samples at one of the first drive's."""
+        if not self._own:
+            lead = self._leads[j + 1]
+            return lambda sequence: float(sequence + lead)
+        drift = self._drifts[j]
+        return lambda sequence: drift.estimate.position(sequence) if drift.estimate else None
+
+    async def rows(self, row: Row) -> list[Row]:
+        """Return rows that are whole now, at the first drive's instants; no sample has gone in that was not judged."""
+        now = time.monotonic()
+        self._watch(row, now)
+        pairs = zip(self._sources, row.drives, strict=True)
+        told = await all_answers(source.samples(reading) for source, reading in pairs)
+        self._judge(told)
+        if self._own:
+            self._compare(row, now)
+        if not np.isnan(row.forces).all():
+            self._forces[row.drives[0].sequence] = row.forces
+        return list(self._whole(told))
+
+    def _whole(self, told: Sequence[Sequence[Reading]]) -> Iterator[Row]:
+        for drives in self._alignment.rows(told):
+            sequence = drives[0].sequence
+            forces = self._forces.pop(sequence, self._machine.no_force)
+            for missed in [earlier for earlier in self._forces if earlier < sequence]:
+                del self._forces[missed]
+            self._last = Row(drives, forces, self._machine.samples_per_cycle)
+            yield self._last
+
+    def _watch(self, row: Row, now: float) -> None:
+        """Refuse to go on with a drive whose samples stop, or whose counter or clock leaps; the supervisor has a look
+        at the first one only.
+        """
+        for watch, reading in zip(self._watches, row.drives[1:], strict=True):
+            if self._bucket_ends is None:
+                watch.begin(reading, now)
+            else:
+                watch.take(reading, now)
+        self._bucket_ends = self._bucket_ends or now + BUCKET_S
+
+    def _compare(self, row: Row, now: float) -> None:
+        """Compare the clocks from time to time."""
+        if self._bucket_ends is None or now < self._bucket_ends:
+            return
+        self._bucket_ends = now + BUCKET_S
+        first, *others = (drive.bounds.close() if drive.bounds else None for drive in self._machine.drives)
+        for drift, other in zip(self._drifts, others, strict=True):
+            if first and other:
+                drift.add(row.drives[0].sequence, first, other)
+
+    def clocks(self, since_s: float) -> dict[str, dict]:
+        """Return offset and rate of each drive's clock against the first one's, by joint.
+
+        The offset is that at ``since_s`` of the first drive's clock.
+        """
+        found: dict[str, dict] = {}
+        for j, drift in enumerate(self._drifts, start=1):
+            if self._last is None or drift.estimate is None:
+                continue
+            first, other = self._last.drives[0], self._last.drives[j]
+            offset = other.time - first.time - drift.estimate.rate * (first.time - since_s)
+            found[self._machine.drives[j].settings.joint] = {
+                "offset_s": offset,
+                "offset_error_s": drift.estimate.lead_error / self._rate_hz,
+                "rate_ppm": 1e6 * drift.estimate.rate,
+                "rate_error_ppm": 1e6 * drift.estimate.rate_error,
+                "corrected": True,
+            }
+        return found
+
+
+def sampling_of(machine: Machine, cycle_hz: float, judge: Judge) -> Sampling:
+    """Return how the samples of a machine are to be had; set-points go out at ``cycle_hz``."""
+    if machine.rig.sampling == "cyclic" and machine.rig.clocks == "common":
+        return Latched()
+    if machine.rig.clocks == "common" and machine.leads_are_vague:
+        raise DeviceError(
+            "the lines are too slow to tell which samples of the drives' rings belong together; raise their speed, or "
+            'set clocks = "own" in the rig file'
+        )
+    return Streams(machine, cycle_hz, judge)

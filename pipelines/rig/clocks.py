@@ -1,0 +1,63 @@
+"""A virtual device's own clock: it samples the machine at instants of its own, which drift against other devices'."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.rig.plant import Samples
+from pipelines.signals.interpolation import cubic_weights
+
+DELAY = 2.5
+"""Samples of the plant from the instant at which a device samples to that at which it can tell."""
+KEPT = 16
+"""Samples of the plant that are looked back on, beside those that are new."""
+
+
+class OwnClock:
+    """Samples of the plant turned into those of a device whose clock gains ``ppm`` and began at ``offset_s``."""
+
+    def __init__(self, ppm: float, offset_s: float, rate_hz: float, plant_rate_hz: float) -> None:
+        self._rate = rate_hz
+        self._plant_rate = plant_rate_hz
+        self._gain = 1.0 + 1e-6 * ppm
+        self._offset_s = offset_s
+        self._told = 0
+        self._seen: Samples | None = None
+
+    def sampled(self, chunk: Samples) -> Samples:
+        """Return what the device can tell since the last time, given what the plant did since then; maybe nothing."""
+        seen = chunk if self._seen is None else _joined(_last(self._seen, KEPT), chunk)
+        self._seen = seen
+        latest = (seen.sequence[-1] + 1 - DELAY) / self._plant_rate
+        count = int(latest * self._rate * self._gain + 0.5)
+        numbers = np.arange(self._told, max(count, self._told))
+        self._told = max(count, self._told)
+        instants = (numbers + 0.5) / (self._rate * self._gain)
+        at = instants * self._plant_rate - 0.5 - seen.sequence[0]
+        told = _between(seen, np.maximum(at, 0.0))
+        began = round(self._offset_s * self._rate)
+        return replace(told, sequence=began + numbers, time=self._offset_s + instants * self._gain)
+
+
+def _between(seen: Samples, at: NDArray) -> Samples:
+    """Return the plant's samples at fractional places, by cubic interpolation."""
+    base = np.clip(np.floor(at).astype(int), 1, max(len(seen.time) - 3, 1))
+    x = at - base
+    weights = np.stack(cubic_weights(x))
+    places = np.minimum(base + np.arange(-1, 3)[:, np.newaxis], len(seen.time) - 1)
+    return Samples(**{f.name: _weighted(getattr(seen, f.name), places, weights) for f in fields(Samples)})
+
+
+def _weighted(values: NDArray, places: NDArray, weights: NDArray) -> NDArray:
+    shape = (*weights.shape, *(1,) * (values.ndim - 1))
+    return (weights.reshape(shape) * values[places]).sum(axis=0)
+
+
+def _last(samples: Samples, count: int) -> Samples:
+    return Samples(**{f.name: getattr(samples, f.name)[-count:] for f in fields(Samples)})
+
+
+def _joined(first: Samples, second: Samples) -> Samples:
+    both = ((f.name, getattr(first, f.name), getattr(second, f.name)) for f in fields(Samples))
+    return Samples(**{name: np.concatenate([a, b]) for name, a, b in both})

@@ -1,0 +1,80 @@
+"""A drive's own record of its latest samples, as the virtual rig serves it: a ring for FC03, or a queue for FC24."""
+
+from collections import deque
+from collections.abc import Callable, Mapping
+
+from pymodbus.constants import ExcCodes
+from pymodbus.pdu import ExceptionResponse, ModbusPDU
+from pymodbus.pdu.file_message import ReadFifoQueueRequest, ReadFifoQueueResponse
+
+from pipelines.registers import Block
+from pipelines.settings.rig import MOST_QUEUED, RingSettings, registers_of
+
+QUEUE_RECORDS = 4096
+"""What a queue holds; the oldest record makes room."""
+
+
+class Ring:
+    """The latest samples of one drive in its registers."""
+
+    def __init__(self, settings: RingSettings) -> None:
+        self._block = Block(registers_of(settings.record))
+        self._words = settings.words
+        self.address, self.capacity = settings.address or 0, settings.capacity or 0
+        self.newest = Block({"newest": settings.newest}) if settings.newest else None
+        self.fifo = settings.fifo
+        self.held = [0] * (self.capacity * self._words)
+        """The registers from ``address`` on."""
+        self.last = 0
+        """Sequence number of the newest record."""
+        self._queue: deque[list[int]] = deque(maxlen=QUEUE_RECORDS)
+
+    @property
+    def spans(self) -> tuple[range, ...]:
+        """The addresses it takes; a queue takes none."""
+        if self.newest is None:
+            return ()
+        newest = range(self.newest.address, self.newest.address + self.newest.count)
+        return newest, range(self.address, self.address + len(self.held))
+
+    def append(self, sequence: int, values: Mapping[str, float]) -> None:
+        """Add a sample; the oldest makes room."""
+        words = [0] * self._words
+        words[self._block.address : self._block.address + self._block.count] = self._block.encode(values)
+        if self.fifo is not None:
+            self._queue.append(words)
+            return
+        place = sequence % self.capacity * self._words
+        self.held[place : place + self._words] = words
+        self.last = sequence
+
+    def show(self, registers: list[int], first: int, address: int, count: int) -> None:
+        """Put that part of the ring into a device's ``registers`` which a request for ``count`` of them will see."""
+        low, high = max(address, self.address), min(address + count, self.address + len(self.held))
+        if low < high:
+            registers[low - first : high - first] = self.held[low - self.address : high - self.address]
+        if self.newest:
+            start = self.newest.address - first
+            told = self.newest.encode({"newest": self.last % self.newest.span("newest")})
+            registers[start : start + self.newest.count] = told
+
+    def taken(self) -> list[int]:
+        """Return as many whole records as one FC24 answer carries, and let them go."""
+        records = min(len(self._queue), MOST_QUEUED // self._words)
+        return [word for _ in range(records) for word in self._queue.popleft()]
+
+
+def fifo_request(queues: Mapping[int, Callable[[int], list[int] | None]]) -> type[ModbusPDU]:
+    """Return an FC24 request that devices answer: of each unit id a function from address to words, None for no queue.
+
+    pymodbus' own request answers with four constants.
+    """
+
+    class ReadFifo(ReadFifoQueueRequest):
+        async def datastore_update(self, context: object, device_id: int) -> ModbusPDU:
+            words = queues[device_id](self.address) if device_id in queues else None
+            if words is None:
+                return ExceptionResponse(self.function_code, ExcCodes.ILLEGAL_ADDRESS)
+            return ReadFifoQueueResponse(words, device_id, self.transaction_id)
+
+    return ReadFifo
