@@ -17,6 +17,9 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from rich.table import Table
 from rich.text import Text
 
+DRAWING_S = 0.0005
+"""How long the drawing of a live picture may hold up the work that it tells of."""
+
 
 class Console:
     """The terminal of one invocation; results go to stdout, progress and warnings to stderr."""
@@ -80,13 +83,23 @@ class Console:
             yield lambda done, note="": bar.update(task, completed=done, note=note)
 
     @contextmanager
-    def live(self) -> Iterator[Callable[[RenderableType], None]]:
-        """Keep a picture on the terminal while the block runs; yields ``show(renderable)``."""
+    def live(self, picture: RenderableType) -> Iterator[None]:
+        """Keep a picture on the terminal while the block runs, drawn ten times a second by a thread of its own.
+
+        It has the screen for itself, so that it is right after the window's size has changed; how it looked last stays
+        below what was there before.
+        """
         if not self._may_move:
-            yield lambda renderable: None
+            yield
             return
-        with Live(console=self.err, transient=True, refresh_per_second=10) as picture:
-            yield picture.update
+        interval = sys.getswitchinterval()
+        sys.setswitchinterval(DRAWING_S)
+        try:
+            with Live(picture, console=self.err, screen=True, refresh_per_second=10):
+                yield
+        finally:
+            sys.setswitchinterval(interval)
+            self.err.print(picture)
 
     @property
     def _may_move(self) -> bool:

@@ -33,10 +33,14 @@ class Progress:
     row: Row | None = None
     samples: int = 0
     missed: int = 0
+    gaps: int = 0
+    """In how many places samples were missed."""
     rate_hz: float = 0.0
     """Samples a second of wall time."""
     abort: str | None = None
     """Why the run is being stopped early."""
+    still_enabled: bool = False
+    """Whether a drive may still move the leg though it was told to disable."""
 
 
 Report = Callable[[Progress], None]
@@ -144,9 +148,9 @@ class Loop:
     def _tell(self) -> None:
         """Report how far the run is."""
         self._reported, row, duration = time.monotonic(), self._row, (self.plan.stop - self.plan.first) / self._rate
-        state, why = self.supervisor.state, self.supervisor.why
+        state, why, enabled = self.supervisor.state, self.supervisor.why, self.supervisor.still_enabled
         if row is None:
-            self.report(Progress(state, duration_s=duration, abort=why))
+            self.report(Progress(state, duration_s=duration, abort=why, still_enabled=enabled))
             return
         index = self.supervisor.index(row)
         self.report(
@@ -157,8 +161,10 @@ class Loop:
                 row=row,
                 samples=self.journal.rows,
                 missed=sum(count for _, count in self.gaps),
+                gaps=len(self.gaps),
                 rate_hz=(index + 2) * row.samples_per_cycle / (self._reported - self._enabled_at),
                 abort=why,
+                still_enabled=enabled,
             )
         )
 

@@ -62,6 +62,8 @@ class Supervisor:
         """The first reason to stop early; None while there is none."""
         self.fault: BaseException | None = None
         """The first error that was exoid's own."""
+        self.still_enabled = False
+        """Whether a drive may not have taken it that it was told to disable."""
         self.sent = np.zeros(len(rig.drive))
         """(J,) last set-points, rad; to begin with, where the leg stands."""
         self.sent_at = 0.0
@@ -226,6 +228,7 @@ class Supervisor:
         if not complaints:
             self._go(State.DISABLED)
             return
+        self.still_enabled = True
         self.why = f"{self.why or 'the run is complete'}; and could not be disabled: {'; '.join(complaints)}"
         if self.state is not State.ABORT:
             self._go(State.ABORT)
