@@ -404,3 +404,16 @@ def test_what_is_refused_in_a_whole_table_is_refused_alike_in_pieces_and_leaves_
     assert f"row {row}: found" in at_once
     assert refusal(RECORDING.write_pieces, path, in_pieces(swinging_leg, 7), run_metadata) == at_once
     assert not list(tmp_path.iterdir())
+
+
+def test_what_has_been_read_of_a_long_file_is_let_go(tmp_path, run_metadata):
+    n, groups = 20_000, 40
+    time = np.arange(n * groups) / 200.0
+    piece = {f"{joint}_{q}": np.sin(time[:n]) for joint in ("hip", "knee") for q in ("angle_rad", "torque_nm")}
+    tables = (pa.table({"time_s": time[g * n : (g + 1) * n], **piece}) for g in range(groups))
+    RECORDING.write_pieces(tmp_path / "long.parquet", tables, run_metadata)
+    before, most, rows = pa.total_allocated_bytes(), 0, 0
+    for table in RECORDING.scan(tmp_path / "long.parquet").pieces():
+        rows, most = rows + table.num_rows, max(most, pa.total_allocated_bytes() - before)
+    assert rows == n * groups
+    assert most < 0.25 * 5 * 8 * rows  # five columns of eight bytes
