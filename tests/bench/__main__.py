@@ -5,11 +5,21 @@ import os
 # Before NumPy is loaded: one core is what each comparison is about.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from tests.bench import bench_acquire, bench_all, bench_design, bench_diagnose, bench_simulate
+from tests.bench import (
+    bench_acquire,
+    bench_all,
+    bench_design,
+    bench_diagnose,
+    bench_operator_view,
+    bench_simulate,
+    bench_stream,
+)  # fmt: skip
 from tests.bench.report import show
 
 show("exoid design", bench_design.rows())
 show("exoid simulate", bench_simulate.rows())
 show("exoid diagnose", bench_diagnose.rows())
 show("exoid acquire", bench_acquire.rows())
+show("the operator's view", bench_operator_view.rows())
+show("exoid filter and identify", bench_stream.rows())
 show("make all", bench_all.rows())
