@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from pydantic import ValidationError
@@ -8,6 +8,7 @@ from pydantic import ValidationError
 from pipelines.registers import Block, raw_range
 from pipelines.settings.rig import REGISTERS, Register, SensorMap
 
+patient = settings(deadline=None)  # a busy computer is no fault of a block's
 INTEGERS = [name for name in REGISTERS if not name.startswith("float")]
 
 
@@ -68,6 +69,7 @@ def blocks(draw):
     return {name: registers[name] for name in names}, {name: draw(raws(registers[name].type)) for name in names}
 
 
+@patient
 @given(blocks())
 def test_whatever_a_register_can_hold_comes_back_in_any_type_and_order(drawn):
     registers, values = drawn
@@ -78,6 +80,7 @@ def test_whatever_a_register_can_hold_comes_back_in_any_type_and_order(drawn):
     assert block.decode(words) == {name: float(value) for name, value in values.items()}
 
 
+@patient
 @given(blocks(), st.data())
 def test_a_value_is_where_its_register_is_and_nowhere_else(drawn, data):
     registers, values = drawn
@@ -88,6 +91,7 @@ def test_a_value_is_where_its_register_is_and_nowhere_else(drawn, data):
     assert changed <= set(range(first, first + registers[name].registers))
 
 
+@patient
 @given(blocks(), st.lists(st.integers(0, 0xFFFF), min_size=60, max_size=60))
 def test_any_words_at_all_decode_to_something_for_each_register(drawn, words):
     registers, _ = drawn
@@ -95,6 +99,7 @@ def test_any_words_at_all_decode_to_something_for_each_register(drawn, words):
     assert list(block.decode((words * 2)[: block.count])) == list(registers)
 
 
+@patient
 @given(
     kind=st.sampled_from(INTEGERS),
     scale=st.floats(1e-9, 1e3).map(lambda scale: float(f"{scale:.6g}")),
@@ -111,6 +116,7 @@ def test_a_scaled_value_comes_back_to_half_a_count(kind, scale, negative, offset
     assert_allclose(block.decode(block.encode({"x": value}))["x"], value, rtol=0, atol=0.500001 * abs(scale) + rounding)
 
 
+@patient
 @given(st.integers(0, 10), st.integers(0, 10))
 def test_registers_that_overlap_are_refused_and_others_are_not(first, second):
     wide = {"type": "int32", "unit": "N"}
