@@ -1,10 +1,12 @@
 """All set-points of a run, made and checked before anything moves: from rest into the motion, the run, back to rest."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.acquisition.set_points import SetPoints
 from pipelines.errors import InputError
 from pipelines.mechanics.ramp import smooth_share
 from pipelines.mechanics.trajectory import Trajectory
@@ -19,7 +21,7 @@ RAMP_GROWTH = 1.2
 class Plan:
     """Set-points, one a sample; each is reached at its sample's end."""
 
-    reference: NDArray
+    reference: SetPoints | NDArray
     """(n, J) rad."""
     first: int
     """Index of the first sample that is recorded."""
@@ -43,26 +45,33 @@ def make_plan(
     duration_s : float
         Length of the recording.
     """
-    run = check_trajectory(rig, trajectory, duration_s, sample_rate_hz)
+    samples = check_trajectory(rig, trajectory, duration_s, sample_rate_hz)
     lead_in = _ramp(rig, trajectory, start, sample_rate_hz, before=True, end_s=duration_s)
     lead_out = _ramp(rig, trajectory, start, sample_rate_hz, before=False, end_s=duration_s)
-    plan = Plan(np.concatenate([lead_in, run, lead_out]), len(lead_in), len(lead_in) + len(run))
-    _refuse_ramps_outside(rig, plan, start, sample_rate_hz)
-    return plan
+    reference = SetPoints(lead_in, partial(_run, trajectory, sample_rate_hz), samples, lead_out)
+    _refuse_ramps_outside(rig, reference, start, sample_rate_hz)
+    return Plan(reference, reference.first, reference.stop)
 
 
-def check_trajectory(rig: RigSettings, trajectory: Trajectory, duration_s: float, sample_rate_hz: float) -> NDArray:
-    """Return a run's set-points (n, J), or refuse a trajectory that is too short or leaves the rig's limits."""
+def check_trajectory(rig: RigSettings, trajectory: Trajectory, duration_s: float, sample_rate_hz: float) -> int:
+    """Return how many set-points a run has, or refuse a trajectory that is too short or leaves the rig's limits."""
     if duration_s > trajectory.duration_s + 1e-9:
         raise InputError(
             f"the trajectory lasts {trajectory.duration_s:g} s and does not repeat, but the run's duration_s is "
             f"{duration_s:g}; shorten the run, or give the trajectory's omega_rad_s if it repeats"
         )
+    nowhere = np.empty((0, len(rig.drive)))
+    samples = round(duration_s * sample_rate_hz)
+    run = SetPoints(nowhere, partial(_run, trajectory, sample_rate_hz), samples, nowhere)
+    for first, piece in run.pieces():
+        _refuse_outside(rig, piece, first, sample_rate_hz)
+    return samples
+
+
+def _run(trajectory: Trajectory, sample_rate_hz: float, begin: int, end: int) -> NDArray:
+    """Return set-points (n, J) of the recorded part, from one sample to before another."""
     # A set-point is reached half a sample after the instant it belongs to, the middle of the window.
-    instants = (np.arange(round(duration_s * sample_rate_hz)) + 0.5) / sample_rate_hz
-    run = trajectory.at(instants)[0]
-    _refuse_outside(rig, run, instants, sample_rate_hz)
-    return run
+    return trajectory.at((np.arange(begin, end) + 0.5) / sample_rate_hz)[0]
 
 
 def check_start(rig: RigSettings, angle: NDArray) -> str | None:
@@ -114,44 +123,54 @@ def _first_outside(values: NDArray, low: float, high: float) -> int | None:
     return int(np.argmax(outside)) if outside.any() else None
 
 
-def _refuse_ramps_outside(rig: RigSettings, plan: Plan, rest: NDArray, rate: float) -> None:
+def _refuse_ramps_outside(rig: RigSettings, reference: SetPoints, rest: NDArray, rate: float) -> None:
     """Refuse a plan whose ways into and out of the run, or the seams between, leave the drives' limits.
 
     A run shorter than the trajectory's period does not show where the ramps lead: they run its other phases.
     """
-    speed = np.diff(np.vstack([rest, plan.reference, rest]), axis=0) * rate
+    for first, piece in reference.pieces():
+        begins, ends = first == 0, first + len(piece) == len(reference)
+        path = np.vstack([*([rest] if begins else []), piece, *([rest] if ends else [])])
+        # Index 0 of the path is where the leg stands.
+        _refuse_piece_outside(rig, reference, path, first + (0 if begins else 1), rate)
+
+
+def _refuse_piece_outside(rig: RigSettings, reference: SetPoints, path: NDArray, first: int, rate: float) -> None:
+    """Refuse a piece (n, J) of the path that begins and ends where the leg stands; its number in that is ``first``."""
+    speed = np.diff(path, axis=0) * rate
     for j, drive in enumerate(rig.drive):
         low, high = drive.angle_rad
-        if (k := _first_outside(plan.reference[:, j], low, high)) is not None:
+        if (k := _first_outside(path[:, j], low, high)) is not None:
             raise InputError(
-                f"the {drive.joint} would be at {plan.reference[k, j]:.3f} rad on the way "
-                f"{'into' if k < plan.first else 'out of'} the run, but the rig allows {low:g} to {high:g} rad; make "
-                "the excitation smaller, or record a whole period of it to see where it leaves the limits"
+                f"the {drive.joint} would be at {path[k, j]:.3f} rad on the way "
+                f"{'into' if first + k <= reference.first else 'out of'} the run, but the rig allows {low:g} to "
+                f"{high:g} rad; make the excitation smaller, or record a whole period of it to see where it leaves the "
+                "limits"
             )
         fastest = drive.speed_rad_s * (1.0 + 1e-9)
         if (k := _first_outside(speed[:, j], -fastest, fastest)) is not None:
             raise InputError(
-                f"the {drive.joint} would move at {speed[k, j]:.3f} rad/s {(k - plan.first) / rate:.3f} s after the "
-                f"run's beginning, but the rig allows {drive.speed_rad_s:g} rad/s; make the excitation slower"
+                f"the {drive.joint} would move at {speed[k, j]:.3f} rad/s {(first + k - reference.first) / rate:.3f} s "
+                f"after the run's beginning, but the rig allows {drive.speed_rad_s:g} rad/s; make the excitation slower"
             )
 
 
-def _refuse_outside(rig: RigSettings, run: NDArray, time: NDArray, rate: float) -> None:
-    """Refuse a motion that leaves the drives' limits."""
+def _refuse_outside(rig: RigSettings, run: NDArray, first: int, rate: float) -> None:
+    """Refuse a piece (n, J) of a run, from sample ``first`` on, that leaves the drives' limits."""
     margin = rig.safety.angle_margin_rad
     speed = np.diff(run, axis=0) * rate
     for j, drive in enumerate(rig.drive):
         low, high = drive.angle_rad[0] + margin, drive.angle_rad[1] - margin
         if (k := _first_outside(run[:, j], low, high)) is not None:
             raise InputError(
-                f"the {drive.joint} would be at {run[k, j]:.3f} rad at {time[k]:.3f} s, but the rig allows "
-                f"{low:g} to {high:g} rad (its limits less angle_margin_rad); make the excitation smaller, or design "
-                "it within the rig's limits"
+                f"the {drive.joint} would be at {run[k, j]:.3f} rad at {(first + k + 0.5) / rate:.3f} s, but the rig "
+                f"allows {low:g} to {high:g} rad (its limits less angle_margin_rad); make the excitation smaller, or "
+                "design it within the rig's limits"
             )
         if (k := _first_outside(speed[:, j], -drive.speed_rad_s, drive.speed_rad_s)) is not None:
             raise InputError(
-                f"the {drive.joint} would move at {speed[k, j]:.3f} rad/s at {time[k]:.3f} s, but the rig "
-                f"allows {drive.speed_rad_s:g} rad/s; make the excitation slower or smaller"
+                f"the {drive.joint} would move at {speed[k, j]:.3f} rad/s at {(first + k + 0.5) / rate:.3f} s, but the "
+                f"rig allows {drive.speed_rad_s:g} rad/s; make the excitation slower or smaller"
             )
         reference = Block(registers_of(rig.map.drive[drive.map].write))
         if not reference.holds("reference", low, high):

@@ -74,7 +74,7 @@ class Supervisor:
         self._plausibility = Plausibility(rig, sample_rate_hz)
         self._watch = Watch(rig, sample_rate_hz)
         self._speed = np.zeros_like(self.sent)
-        self._path = self.sent[np.newaxis]
+        self._start = self.sent
         self._index = 0
         self._first = 0
 
@@ -85,8 +85,8 @@ class Supervisor:
     def take(self, plan: Plan, start: NDArray) -> None:
         """Take the plan, and where the leg stood when it was made, (J,) rad."""
         self._plan = plan
-        self._path = np.vstack([start, plan.reference])
-        self.sent = self._path[0].copy()
+        self._start = start
+        self.sent = start.copy()
 
     def check_rest(self, row: Row) -> None:
         """Refuse to enable drives whose leg no longer stands where the plan begins, or breaks a limit."""
@@ -103,7 +103,7 @@ class Supervisor:
     def rest(self, now: float) -> NDArray:
         """Return the set-points (J,) rad with which the drives are enabled: where the leg stands."""
         self._refuse_after_abort()
-        self._send(self._path[0], np.zeros_like(self.sent), 0.0, now)
+        self._send(self._start, np.zeros_like(self.sent), 0.0, now)
         return self.sent
 
     def enabled(self, row: Row, waited_s: float) -> bool:
@@ -136,14 +136,15 @@ class Supervisor:
         """
         self._refuse_after_abort()
         self._watch.look(found, now)
-        index = min(found - self._first, len(self._path) - 1)
+        index = min(found - self._first, len(self._plan.reference))
         while self.state is not self._due(index):
             self._go(FOLLOWING[FOLLOWING.index(self.state) + 1])
         elapsed = (index - self._index) / self.rate
         if self.rig.clock == "real_time":  # a counter that leaps does not make time go by
             elapsed = min(elapsed, now - self.sent_at + 1.0 / self.rate)
-        step = self._path[index] - self._path[max(index - 1, 0)]
-        self._send(self._path[index], step * self.rate, elapsed, now)
+        reference = self._path(index)
+        step = reference - self._path(max(index - 1, 0))
+        self._send(reference, step * self.rate, elapsed, now)
         self._index = index
         return self.sent
 
@@ -171,7 +172,7 @@ class Supervisor:
     def has_followed(self, row: Row) -> bool:
         """Tell whether the plan is at its end with a sample."""
         # What is sent while a sample is latched is reached at the end of the next one.
-        return row.sequence - self._first >= len(self._path)
+        return row.sequence - self._first > len(self._plan.reference)
 
     def index(self, row: Row) -> int:
         """Return which set-point of the plan a sample carries; outside the plan before and after it."""
@@ -242,6 +243,10 @@ class Supervisor:
         if index - 1 < self._plan.first:
             return State.RAMP
         return State.RUN if index - 1 < self._plan.stop else State.RAMP_DOWN
+
+    def _path(self, index: int) -> NDArray:
+        """Return the set-points (J,) rad of the path, whose first is where the leg stood."""
+        return self._plan.reference[index - 1] if index else self._start
 
     def _refuse_after_abort(self) -> None:
         if self.why is not None:

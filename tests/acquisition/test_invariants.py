@@ -117,7 +117,7 @@ def bad_plans(draw):
     length = draw(st.integers(1, 10))
 
     def spoil(plan):
-        reference = plan.reference.copy()
+        reference = np.array(plan.reference)
         reference[at : at + length, joint] = value
         return Plan(reference, plan.first, plan.stop)
 

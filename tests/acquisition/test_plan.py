@@ -1,6 +1,8 @@
+import tracemalloc
+
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from pipelines.acquisition.plan import make_plan
 from pipelines.errors import InputError
@@ -27,13 +29,13 @@ def test_set_points_leave_rest_gently_meet_the_motion_at_its_speed_and_come_back
     # A jump in speed would be an acceleration of at least 0.1 rad/s in one sample, 20 rad/s².
     assert np.abs(acceleration).max() < 15.0
     instants = (np.arange(1000) + 0.5) / RATE
-    assert_allclose(plan.reference[plan.first : plan.stop], motion.at(instants)[0], atol=1e-12)
+    assert_allclose(np.asarray(plan.reference)[plan.first : plan.stop], motion.at(instants)[0], atol=1e-12)
 
 
 def test_before_the_recording_the_motion_itself_runs_for_the_settling_time(rig_file, motion):
     rig = load_rig(rig_file(settle_s=1.0))
     plan = make_plan(rig, motion, REST, 5.0, RATE)
-    before = plan.reference[plan.first - 200 : plan.first]
+    before = np.asarray(plan.reference)[plan.first - 200 : plan.first]
     assert_allclose(before, motion.at(np.arange(-200, 0) / RATE + 0.5 / RATE)[0], atol=1e-12)
 
 
@@ -41,7 +43,7 @@ def test_a_ramp_too_fast_for_a_joint_is_made_longer(rig_file, motion):
     slow = {"speed_rad_s = 3.0": "speed_rad_s = 0.55"}
     quiet = FourierTrajectory(motion.theta0, 0.1 * motion.a, 0.1 * motion.b, motion.omega)
     plan = make_plan(load_rig(rig_file(replace=slow)), quiet, REST, 5.0, RATE)
-    assert np.abs(np.diff(plan.reference[:, 0])).max() * RATE <= 0.55
+    assert np.abs(np.diff(np.asarray(plan.reference)[:, 0])).max() * RATE <= 0.55
     assert plan.first > (0.8 + 0.2) * RATE
 
 
@@ -78,3 +80,24 @@ def test_a_run_shorter_than_the_period_does_not_let_the_ramps_leave_the_limits(r
         make_plan(rig, half, REST, 5.0, RATE)
     assert "the hip would be at 1.7" in str(caught.value)
     assert "on the way into the run, but the rig allows -0.35 to 1.75 rad" in str(caught.value)
+
+
+def test_set_points_that_are_computed_as_they_come_due_are_those_that_were_checked(rig_file, motion, monkeypatch):
+    monkeypatch.setattr("pipelines.acquisition.set_points.PIECE", 64)
+    reference = make_plan(load_rig(rig_file()), motion, REST, 5.0, RATE).reference
+    every = np.asarray(reference)
+    assert every.shape == (len(reference), 2)
+    assert_array_equal(np.array([reference[k] for k in range(len(reference))]), every)
+    pieces = list(reference.pieces())
+    assert_array_equal(np.vstack([piece[k > 0 :] for k, (_, piece) in enumerate(pieces)]), every)
+    assert [first for first, _ in pieces] == [max(64 * k - 1, 0) for k in range(len(pieces))]
+
+
+def test_the_plan_of_an_hour_takes_no_more_memory_than_that_of_a_minute(rig_file, motion):
+    peaks = []
+    for duration_s in (60.0, 3600.0):
+        tracemalloc.start()
+        make_plan(load_rig(rig_file()), motion, REST, duration_s, 1000.0)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 1.5 * peaks[0]

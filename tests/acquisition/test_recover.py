@@ -181,3 +181,35 @@ def test_the_values_survive_to_the_last_bit(killed, tmp_path):
     recover(killed)
     frame = RECORDING.read(tmp_path / "one.aborted.parquet").frame
     assert np.array_equal(frame["hip_angle_rad"], [0.001 * k for k in (*range(40), *range(43, 150))])
+
+
+MEASURE = """\
+import resource, sys
+from pathlib import Path
+from pipelines.acquisition.journal import Journal, journal_of
+from pipelines.acquisition.recover import recover
+from tests.acquisition.test_recover import COLUMNS, METADATA, row
+
+output, samples = Path(sys.argv[1]), int(sys.argv[2])
+with Journal(journal_of(output), COLUMNS, METADATA) as journal:
+    for index in range(samples):
+        journal.append(row(index))
+        if index % 200 == 199:  # a fifth of a second at 1 kHz
+            journal.flush()
+written = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+assert recover(journal_of(output), output).account.samples == samples
+print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - written) / 1024)
+"""
+
+
+def memory_of_recovery(output, samples):
+    """Return by how much the most memory that was ever held grows, MiB, when a journal is made a recording."""
+    command = [sys.executable, "-c", MEASURE, str(output), str(samples)]
+    return float(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+
+
+@pytest.mark.parametrize("seconds", [300, pytest.param(3600, marks=pytest.mark.slow)])
+def test_at_1_khz_memory_does_not_grow_with_the_length_of_what_is_written_as_a_recording(tmp_path, seconds):
+    grown = memory_of_recovery(tmp_path / "long.parquet", 1000 * seconds)
+    print(f"\n{seconds} s at 1 kHz: {grown:.0f} MiB")
+    assert grown < 64.0  # an hour of these columns is 165 MiB, and as a frame twice that
