@@ -19,7 +19,8 @@ METADATA = {
 
 
 def row(index):
-    return [index / RATE, 0.001 * index, 1.0, -0.001 * index, 2.0, 7000 + index]
+    angle = 0.001 * (index % 1000)
+    return [index / RATE, angle, 1.0, -angle, 2.0, 7000 + index]
 
 
 def journal_with(output, indices, flush_every=20):
@@ -184,11 +185,14 @@ def test_the_values_survive_to_the_last_bit(killed, tmp_path):
 
 
 MEASURE = """\
-import resource, sys
+import re, sys
 from pathlib import Path
 from pipelines.acquisition.journal import Journal, journal_of
 from pipelines.acquisition.recover import recover
 from tests.acquisition.test_recover import COLUMNS, METADATA, row
+
+def most_held():  # not getrusage: a child's never is less than what its parent held
+    return int(re.search(r"VmHWM:\\s+(\\d+)", Path("/proc/self/status").read_text())[1]) / 1024
 
 output, samples = Path(sys.argv[1]), int(sys.argv[2])
 with Journal(journal_of(output), COLUMNS, METADATA) as journal:
@@ -196,9 +200,9 @@ with Journal(journal_of(output), COLUMNS, METADATA) as journal:
         journal.append(row(index))
         if index % 200 == 199:  # a fifth of a second at 1 kHz
             journal.flush()
-written = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+written = most_held()
 assert recover(journal_of(output), output).account.samples == samples
-print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - written) / 1024)
+print(most_held() - written)
 """
 
 
@@ -208,8 +212,9 @@ def memory_of_recovery(output, samples):
     return float(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs /proc to tell the most memory held")
 @pytest.mark.parametrize("seconds", [300, pytest.param(3600, marks=pytest.mark.slow)])
 def test_at_1_khz_memory_does_not_grow_with_the_length_of_what_is_written_as_a_recording(tmp_path, seconds):
     grown = memory_of_recovery(tmp_path / "long.parquet", 1000 * seconds)
     print(f"\n{seconds} s at 1 kHz: {grown:.0f} MiB")
-    assert grown < 64.0  # an hour of these columns is 165 MiB, and as a frame twice that
+    assert 1.0 < grown < 64.0  # an hour of these columns is 165 MiB, and as a frame twice that
