@@ -90,9 +90,10 @@ def served(folder: Path, run: str) -> Iterator[tuple[int, dict[int, Latched]]]:
     advance = plant.run
 
     def remembered(*arguments: object) -> Samples:
-        sample = advance(*arguments)
-        latched[int(sample.sequence[0])] = Latched(sample, time.monotonic())
-        return sample
+        samples = advance(*arguments)
+        for k, number in enumerate(samples.sequence.tolist()):
+            latched[number] = Latched(server.one(samples, k), time.monotonic())
+        return samples
 
     plant.run = remembered
     listening, ports, ends = threading.Event(), list[int](), []
@@ -104,7 +105,7 @@ def served(folder: Path, run: str) -> Iterator[tuple[int, dict[int, Latched]]]:
     async def serve() -> None:
         until = asyncio.Event()
         ends.append((asyncio.get_running_loop(), until))
-        await server.serve(rig, plant, 0, announce, until)
+        await server.serve(rig, plant, 0, announce, until, sample_rate_hz=RATE)
 
     thread = threading.Thread(target=lambda: asyncio.run(serve()))
     thread.start()
