@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
-from time import perf_counter
+from time import thread_time
 
 from rich.console import Console as RichConsole
 
@@ -20,8 +20,8 @@ from pipelines.settings.rig import load_rig
 from tests.bench.report import Row, show
 
 RIG = datasets() / "rigs" / "plain.toml"
-DURATION_S = 20.0
-PAIRS = 5
+DURATION_S = 8.0
+PAIRS = 3
 
 
 def rows() -> Iterator[Row]:
@@ -38,7 +38,7 @@ def rows() -> Iterator[Row]:
         f"lockstep, two drives and four sensors, watched: of the cycles unwatched, in turn {PAIRS} times",
         f"{share:.0f} %: {median(with_view):.0f} of {median(without):.0f} cycles/s",
     )
-    yield Row("one picture, 80 x 24, ten a second", f"{drawing:.1f} ms")
+    yield Row("one picture, 80 x 24, ten a second", f"{drawing:.1f} ms of processor time")
 
 
 @contextmanager
@@ -52,12 +52,12 @@ def on_a_terminal(view: OperatorView) -> Iterator[RichConsole]:
 
 
 def milliseconds(screen: RichConsole, view: OperatorView) -> float:
-    """Return how long one picture takes, the median of many."""
+    """Return the processor time of one picture, the median of many."""
     times = []
     for _ in range(50):
-        began = perf_counter()
+        began = thread_time()
         screen.print(view)
-        times.append(1e3 * (perf_counter() - began))
+        times.append(1e3 * (thread_time() - began))
     return median(times)
 
 
