@@ -17,7 +17,7 @@ from pipelines.errors import DeviceError, Unanswered
 Judge = Callable[[Sequence[Sequence[Reading]]], None]
 """Raises DeviceError where one of each drive's samples is reason to stop."""
 
-SECOND_LOOK = (0.3, 0.75)
+SECOND_LOOK = (0.3, 0.65)
 """Shares of a sample after an exchange between which a drive with a clock of its own is looked at again: with both
 looks none of its samples passes unseen."""
 AIM = 0.1
@@ -52,23 +52,32 @@ class Cycled:
     def __init__(self, drive: Drive, period_s: float, *, looks_again: bool) -> None:
         self._drive, self._period_s, self._looks_again = drive, period_s, looks_again
         self._dither = np.random.default_rng(0)
+        self._second: asyncio.Task[Reading | DeviceError] | None = None
 
     async def samples(self, reading: Reading) -> list[Reading]:
-        """Return what came since the last cycle, this cycle's reading among it."""
+        """Return what came since the last cycle: the second look at the last one, and this one's reading."""
         if not self._looks_again:
             return [reading]
-        await asyncio.sleep(self._until_the_second_look())
-        try:
-            return [reading, await self._drive.look(in_motion=True)]
-        except Unanswered:
-            return [reading]
+        seen = [] if self._second is None else [await self._second]
+        # Beside the cycle, which must not wait for it.
+        self._second = asyncio.create_task(self._look_again())
+        for found in seen:
+            if isinstance(found, Reading):
+                return [found, reading]
+            if not isinstance(found, Unanswered):
+                raise found
+        return [reading]
 
-    def _until_the_second_look(self) -> float:
-        """Return for how long to wait, s: until the next sample is due where that is in reach, as that tells most."""
+    async def _look_again(self) -> Reading | DeviceError:
+        """Look at the drive when its next sample is due, or as near to that as is in reach: that tells most."""
         low, high = (share * self._period_s for share in SECOND_LOOK)
         due = self._drive.bounds.ahead(time.perf_counter()) if self._drive.bounds else None
         aim = self._dither.uniform(low, high) if due is None else due + self._dither.normal(0.0, AIM) * self._period_s
-        return float(np.clip(aim, low, high))
+        await asyncio.sleep(float(np.clip(aim, low, high)))
+        try:
+            return await self._drive.look(in_motion=True)
+        except DeviceError as error:
+            return error
 
 
 class Recorded:

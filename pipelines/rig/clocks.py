@@ -1,5 +1,6 @@
 """A virtual device's own clock: it samples the machine at instants of its own, which drift against other devices'."""
 
+from collections.abc import Sequence
 from dataclasses import fields, replace
 
 import numpy as np
@@ -23,19 +24,20 @@ class OwnClock:
         self._gain = 1.0 + 1e-6 * ppm
         self._offset_s = offset_s
         self._told = 0
-        self._seen: Samples | None = None
+        self._seen: list[Samples] = []
 
     def sampled(self, chunk: Samples) -> Samples:
         """Return what the device can tell since the last time, given what the plant did since then; maybe nothing."""
-        seen = chunk if self._seen is None else _joined(_last(self._seen, KEPT), chunk)
-        self._seen = seen
-        latest = (seen.sequence[-1] + 1 - DELAY) / self._plant_rate
+        self._seen.append(chunk)
+        latest = (chunk.sequence[-1] + 1 - DELAY) / self._plant_rate
         count = int(latest * self._rate * self._gain + 0.5)
-        numbers = np.arange(self._told, max(count, self._told))
-        self._told = max(count, self._told)
+        if count <= self._told:
+            return _last(chunk, 0)
+        numbers, self._told = np.arange(self._told, count), count
+        seen = _joined(self._seen)
+        self._seen = [_last(seen, KEPT)]
         instants = (numbers + 0.5) / (self._rate * self._gain)
-        at = instants * self._plant_rate - 0.5 - seen.sequence[0]
-        told = _between(seen, np.maximum(at, 0.0))
+        told = _between(seen, np.maximum(instants * self._plant_rate - 0.5 - seen.sequence[0], 0.0))
         began = round(self._offset_s * self._rate)
         return replace(told, sequence=began + numbers, time=self._offset_s + instants * self._gain)
 
@@ -55,9 +57,9 @@ def _weighted(values: NDArray, places: NDArray, weights: NDArray) -> NDArray:
 
 
 def _last(samples: Samples, count: int) -> Samples:
-    return Samples(**{f.name: getattr(samples, f.name)[-count:] for f in fields(Samples)})
+    begin = max(len(samples.sequence) - count, 0)
+    return Samples(**{name: values[begin:] for name, values in vars(samples).items()})
 
 
-def _joined(first: Samples, second: Samples) -> Samples:
-    both = ((f.name, getattr(first, f.name), getattr(second, f.name)) for f in fields(Samples))
-    return Samples(**{name: np.concatenate([a, b]) for name, a, b in both})
+def _joined(chunks: Sequence[Samples]) -> Samples:
+    return Samples(**{f.name: np.concatenate([getattr(c, f.name) for c in chunks]) for f in fields(Samples)})

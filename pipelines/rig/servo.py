@@ -45,6 +45,7 @@ class Servo:
         self._patience = None if heartbeat_s is None else ceil(heartbeat_s * sample_rate_hz)
         self._told, self._control = rest, registers.disable
         self._last, self._step, self._unheard = rest, 0.0, 0
+        self._pace = 0.0
 
     @property
     def enabled(self) -> bool:
@@ -61,11 +62,14 @@ class Servo:
 
     def hear(self, reference: float, control: int) -> None:
         """Take a set-point (rad) and a control word."""
+        # It holds where it is told no number: arithmetic would carry that on for ever.
+        told = reference if isfinite(reference) else self._last
+        # The set-points' own speed: the way back from having gone on too far is none to go on at.
+        self._pace = (told - self._told) / max(self._unheard, self._cycle) if self.enabled else 0.0
         self._unheard = 0
         if control == self._map.fault_reset:
             self.fault = False
-        # It holds where it is told no number: arithmetic would carry that on for ever.
-        self._told, self._control = reference if isfinite(reference) else self._last, control
+        self._told, self._control = told, control
 
     def next(self, angle: float) -> tuple[float, bool]:
         """Return the set-point (rad) for the next sample and whether the motor follows it.
@@ -84,8 +88,9 @@ class Servo:
             return self._last
         if self._unheard < self._cycle:
             return self._last + (self._told - self._last) / (self._cycle - self._unheard)
-        step = self._step
+        step = self._pace
         if self._unheard >= self._cycle * (1 + EXTRAPOLATED):
+            step = self._step
             step = max(abs(step) - self._slowing, 0.0) * (1 if step > 0 else -1)
         low, high = self._limits
         return min(max(self._last + step, low), high)

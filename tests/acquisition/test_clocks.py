@@ -1,8 +1,10 @@
 """Clocks that drift: found through late and uneven replies, and taken out of the recording."""
 
 import random
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
@@ -10,6 +12,15 @@ from pipelines.acquisition.align import Alignment
 from pipelines.acquisition.clocks import BUCKET_S, Bounds, Drift
 from pipelines.acquisition.machine import Reading
 from pipelines.acquisition.sampling import AIM, SECOND_LOOK
+from pipelines.contracts.table import Table
+from pipelines.identification.two_step import identify
+from pipelines.mechanics.fourier import FourierTrajectory
+from pipelines.mechanics.kinematics import motion_table
+from pipelines.mechanics.motion import motion_from_table
+from pipelines.rig.clocks import OwnClock
+from pipelines.rig.plant import Plant
+from pipelines.settings.filter import FilterSettings
+from pipelines.settings.plant import PlantSettings
 
 
 class Clock:
@@ -22,8 +33,8 @@ class Clock:
         return int((instant - self.origin) // self.period)
 
 
-def drift_of(first, other, rate_hz, duration_s, seed=0, latency_s=0.0002, cycle_s=0.005, late=0.05):
-    """Ask both drives twice in each cycle, as acquisition does, some replies being very late; return what is found."""
+def watched(first, other, rate_hz, duration_s, seed=0, latency_s=0.0002, cycle_s=0.005, late=0.05):
+    """Ask both drives twice in each cycle, as acquisition does, some replies being very late; yield what is found."""
     draw, drift = random.Random(seed), Drift(rate_hz)
     low, high = (share / rate_hz for share in SECOND_LOOK)
 
@@ -42,7 +53,14 @@ def drift_of(first, other, rate_hz, duration_s, seed=0, latency_s=0.0002, cycle_
         if now >= ends:
             ends = now + BUCKET_S
             drift.add(first.newest(now), bounds[0].close(), bounds[1].close())
-    return drift.estimate
+        yield now, drift.estimate
+
+
+def drift_of(*arguments):
+    """Return what is found in the end."""
+    for _, found in watched(*arguments):
+        last = found
+    return last
 
 
 @pytest.mark.parametrize("ppm", [-80.0, 0.0, 40.0])
@@ -115,3 +133,83 @@ def test_rows_wait_until_the_drift_is_known():
     assert alignment.rows([samples[:5], samples[:5]]) == []
     known.append(True)
     assert len(alignment.rows([samples[5:], samples[5:]])) == 10
+
+
+RICH = FourierTrajectory(
+    omega=0.4 * np.pi,
+    theta0=np.array([0.65, -0.93]),
+    a=np.array([[0.22, -0.16, 0.10], [0.12, 0.24, -0.11]]),
+    b=np.array([[0.10, 0.12, -0.07], [-0.22, 0.08, 0.10]]),
+)
+RATE, LEAD_S, RUN_S = 200.0, 5.0, 20.0
+
+
+@pytest.fixture(scope="module")
+def moved():
+    """The plant's samples along a motion, at 1 kHz."""
+    plant = Plant(PlantSettings(), "exo_alone", seed=1, sample_rate_hz=1000.0)
+    instants = (np.arange(round((LEAD_S + RUN_S) * 1000)) + 0.5) / 1000
+    share = np.minimum(instants / 3.0, 1.0)[:, np.newaxis] ** 2
+    return plant.run(plant.reference + share * (RICH.at(instants)[0] - plant.reference), np.ones(2, bool))
+
+
+def readings_of(moved, joint, ppm, offset_s):
+    """Return what a drive with a clock of its own tells."""
+    told = OwnClock(ppm, offset_s, RATE, 1000.0).sampled(moved)
+    return [
+        Reading(int(n), float(t), float(q[joint]), float(tau[joint]), 0.0, float(v[joint]), 20.0, float(r[joint]))
+        for n, t, q, tau, v, r in zip(
+            told.sequence, told.time, told.angle, told.torque, told.velocity, told.reference, strict=True
+        )
+    ]
+
+
+def recorded(moved, ppm, offset_s):
+    """Return a recording of a hip and a knee whose clock drifts against the hip's, brought to the hip's instants."""
+    hip, knee = readings_of(moved, 0, 0.0, 0.0), readings_of(moved, 1, ppm, offset_s)
+    began = knee[0].sequence
+    # Sample n of a drive's n is taken half a period after the n-th began; the host's clock starts at 1000 s.
+    clocks = [Clock(RATE, of, 1000.0 + 0.5 / RATE / (1 + 1e-6 * of)) for of in (0.0, ppm)]
+    clocks[1].origin -= began * clocks[1].period
+    found, rows = [None], []
+    alignment = Alignment([lambda n: found[0].position(n) if found[0] else None])
+    at = [0, 0]
+    for now, estimate in watched(*clocks, RATE, LEAD_S + RUN_S - 0.1):
+        found[0], told = estimate, []
+        for k, (clock, readings) in enumerate(zip(clocks, (hip, knee), strict=True)):
+            until = max(clock.newest(now) - readings[0].sequence + 1, at[k])
+            told.append(readings[at[k] : until])
+            at[k] = until
+        rows += [row for row in alignment.rows(told) if row[0].time > LEAD_S]
+    columns = {"time_s": [row[0].time - rows[0][0].time for row in rows]}
+    for j, joint in enumerate(("hip", "knee")):
+        for name, unit in (("angle", "rad"), ("torque", "nm")):
+            columns[f"{joint}_{name}_{unit}"] = [getattr(row[j], name) for row in rows]
+    metadata = {"run": "exo_alone", "sample_rate_hz": RATE, "period_s": RICH.period_s}
+    return pd.DataFrame(columns), metadata
+
+
+def identified(frame, metadata):
+    motions = []
+    for purpose in ("train", "validate"):
+        table = Table(frame, {**metadata, "purpose": purpose}, Path(purpose))
+        motions.append(motion_from_table(motion_table(table, FilterSettings())))
+    return identify(motions).parameters
+
+
+def test_drives_whose_clocks_drift_identify_the_parameters_of_those_whose_clocks_do_not(moved):
+    drifting, (common, metadata) = recorded(moved, 40.0, 12.3456), recorded(moved, 0.0, 0.0)
+    assert len(drifting[0]) > 0.99 * RUN_S * RATE
+    with_drift, without = identified(*drifting), identified(common, metadata)
+    off = (with_drift["value"] - without["value"]) / without["std_error"]
+    assert np.abs(off).max() < 0.5
+
+
+def test_uncorrected_the_same_drift_would_spoil_them(moved):
+    """Sample by sample, as counters tell it: after 20 s the knee's is 0.16 samples off, its offset is any."""
+    common, metadata = recorded(moved, 0.0, 0.0)
+    late = common.copy()
+    for column in ("knee_angle_rad", "knee_torque_nm"):
+        late[column] = late[column].shift(2, fill_value=late[column][0])
+    off = identified(late, metadata)["value"] - identified(common, metadata)["value"]
+    assert np.abs(off / identified(common, metadata)["std_error"]).max() > 0.5

@@ -1,6 +1,7 @@
 """Speed of acquisition over Modbus TCP on this machine: rig and client in a process each."""
 
 import re
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from statistics import median
@@ -8,6 +9,7 @@ from tempfile import TemporaryDirectory
 
 from pipelines.acquisition.acquire import acquire
 from pipelines.acquisition.embedded import embedded
+from pipelines.acquisition.loop import Progress
 from pipelines.settings import datasets
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import load_rig
@@ -15,6 +17,7 @@ from tests.bench import bare_loop
 from tests.bench.report import Row, show
 
 PAIRS = 5
+RECORDER_S = 600.0
 
 
 def rows() -> Iterator[Row]:
@@ -34,6 +37,9 @@ def rows() -> Iterator[Row]:
     )
     samples, missed = real_time(60.0)
     yield Row(f"real time, 200 Hz, 60 s ({samples} samples)", f"{missed} missed", wanted="0 missed")
+    samples, missed, load = recorder(RECORDER_S)
+    what = f"recorder, 1 kHz, two drives, {RECORDER_S / 60:g} min ({samples} samples)"
+    yield Row(what, f"{missed} missed, {100 * load:.0f} % of a core", wanted="0 missed, 40 %")
 
 
 def cycles_a_second(run: str, duration_s: float) -> float:
@@ -65,12 +71,32 @@ def beside_a_bare_loop(duration_s: float) -> tuple[list[float], list[float]]:
 def real_time(duration_s: float) -> tuple[int, int]:
     """Return samples and missed samples of a run in real time."""
     with TemporaryDirectory() as folder:
-        text = (datasets() / "rigs" / "real_time.toml").read_text()
-        # A missed sample shall be counted here, not end the run for the jerk that it gives the leg.
-        path = Path(folder) / "real_time.toml"
-        path.write_text(re.sub(r"^(torque_nm|cuff_force_n) = .*$", r"\1 = 1e4", text, flags=re.MULTILINE))
+        path = _without_limits("real_time", Path(folder))
         outcome = _record(path, "exo_alone", duration_s, Path(folder), lambda progress: None)
     return outcome.samples, outcome.missed
+
+
+def _without_limits(shipped: str, folder: Path) -> Path:
+    """Write a rig file: a missed sample shall be counted here, not end the run for the jerk that it gives the leg."""
+    text = (datasets() / "rigs" / f"{shipped}.toml").read_text()
+    path = folder / f"{shipped}.toml"
+    path.write_text(re.sub(r"^(torque_nm|cuff_force_n|speed_rad_s) = .*$", r"\1 = 1e4", text, flags=re.MULTILINE))
+    return path
+
+
+def recorder(duration_s: float) -> tuple[int, int, float]:
+    """Return samples and missed samples of a run that drains rings, and the share of a core that it takes."""
+    used: list[tuple[float, float]] = []
+
+    def note(progress: Progress) -> None:
+        if progress.samples:
+            used.append((time.perf_counter(), time.process_time()))
+
+    with TemporaryDirectory() as folder:
+        path = _without_limits("recorder", Path(folder))
+        outcome = _record(path, "exo_alone", duration_s, Path(folder), note)
+    (began, before), (ended, after) = used[0], used[-1]
+    return outcome.samples, outcome.missed, (after - before) / (ended - began)
 
 
 def _record(rig: Path, run: str, duration_s: float, folder: Path, report):

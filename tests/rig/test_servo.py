@@ -1,0 +1,43 @@
+"""What a virtual drive makes of set-points that come early, late or not at all."""
+
+import numpy as np
+import pytest
+
+from pipelines.rig.servo import EXTRAPOLATED, Servo
+from pipelines.settings import datasets
+from pipelines.settings.rig import load_rig
+
+RATE = 1000.0
+
+
+@pytest.fixture
+def servo():
+    def make(samples_per_cycle):
+        registers = load_rig(datasets() / "rigs" / "recorder.toml").map.drive["servo"]
+        return Servo(registers, 0.0, (-3.0, 3.0), RATE, 8.0, None, samples_per_cycle), registers.enable
+
+    return make
+
+
+@pytest.mark.parametrize("cycle", [1, 5, 20])
+def test_a_set_point_is_reached_in_a_straight_line_within_its_cycle(servo, cycle):
+    drive, enable = servo(cycle)
+    drive.hear(0.0, enable)
+    drive.next(0.0)
+    drive.hear(0.1, enable)
+    path = [drive.next(0.0)[0] for _ in range(cycle)]
+    np.testing.assert_allclose(path, 0.1 * np.arange(1, cycle + 1) / cycle)
+
+
+@pytest.mark.parametrize("cycle", [1, 5, 20])
+def test_set_points_that_come_irregularly_do_not_swing_the_drive_up(servo, cycle):
+    drive, enable = servo(cycle)
+    draw, now, path = np.random.default_rng(0), 0, []
+    for _ in range(400):
+        drive.hear(0.02 * np.sin(2 * np.pi * now / RATE), enable)
+        late = int(draw.choice([cycle, max(cycle - 2, 1), cycle + 3, 7 * cycle, 20 * cycle]))
+        path += [drive.next(0.0)[0] for _ in range(late)]
+        now += late
+    # At most at its highest speed for as long as it goes on by itself, and until it has slowed down.
+    fastest = 0.02 * 2 * np.pi
+    assert np.abs(path).max() < 0.02 + fastest * EXTRAPOLATED * cycle / RATE + fastest**2 / 8.0
