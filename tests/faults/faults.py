@@ -29,11 +29,16 @@ class From:
 
     def __call__(self, frame: Frame, link: Link) -> Iterable[bytes | Late]:
         self.seen += frame.unit == HIP and frame.function == EXCHANGE and not frame.is_reply
-        ours = frame.unit == self.unit and frame.is_reply == self.replies and frame.function in (EXCHANGE, 3)
+        ours = frame.unit == self.unit and frame.is_reply == self.replies and _is_a_sample(frame)
         if self.seen < BEGINS or not ours or self.times <= 0:
             return [frame.raw]
         self.times -= 1
         return self.befall(frame, link)
+
+
+def _is_a_sample(frame: Frame) -> bool:
+    """Tell whether a frame asks for a device's block or brings it; a status word alone is none."""
+    return frame.function == EXCHANGE or (frame.function == 3 and (not frame.is_reply or len(frame.words) >= 8))
 
 
 ALWAYS = float("inf")
@@ -227,7 +232,7 @@ def cases() -> list[Case]:
         Case("the angle's words are swapped half way", From(swap(ANGLE), times=ALWAYS), "angle"),
         Case("the current's words are swapped half way", From(swap(CURRENT), times=ALWAYS), "torque"),
         Case("the clock steps forward by 1 s", From(add(TIME, 1_000_000), times=ALWAYS), "by its own clock"),
-        Case("the clock steps back by 1 s", From(add(TIME, -1_000_000), times=ALWAYS), "by its own clock"),
+        Case("the clock steps back by 1 s", From(add(TIME, -1_000_000), times=ALWAYS), "its clock went from"),
         Case("the knee's clock steps forward by 20 ms", From(add(TIME, 20_000), unit=KNEE, times=ALWAYS),
              "one of the two leapt"),
     ]  # fmt: skip
