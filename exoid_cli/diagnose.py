@@ -70,6 +70,8 @@ def diagnose(
 
 def _show(said: dict[str, Any], output: Path) -> None:
     console.say(said["summary"])
+    for caveat in said["caveats"]:
+        console.say(f"But {caveat}.")
     console.say("")
     joints = list(said["noise_floor_nm"])
     console.table(

@@ -103,6 +103,7 @@ def choose(bank: Bank, floor: Floor, evidence: Mapping[str, float]) -> Choice:
     standby: list[Ranked] = []
     for level in levels:
         finalists = [_rank(scorer, s, empty) for s in _finalists(level, named, scorer)]
+        finalists = [r for r in finalists if not r.fit.is_absurd(bank.baseline)]
         ranked.append({r.labels: r for r in finalists})
         if not finalists:
             break

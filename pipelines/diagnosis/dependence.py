@@ -291,8 +291,8 @@ def describe(found: Sequence[Dependence], above: Sequence[Excess], together: Seq
         return f"{100 * pair.share:.0f} % of what is left at the {joint} goes with {words}{where}."
     if own[0].share < LITTLE:
         return (
-            f"What is left at the {joint} depends on nothing that was measured: neither motion, load and time nor a "
-            f"steady tone foretells {100 * LITTLE:.0f} % of it{where}."
+            f"What is left at the {joint}{where}{',' * bool(where)} depends on nothing that was measured: neither "
+            f"motion, load and time nor a steady tone foretells {100 * LITTLE:.0f} % of it."
         )
     second = next((d for d in own[1:] if d.variable != "phase" and d.share > max(0.5 * own[0].share, LITTLE)), None)
     return own[0].sentence + where + "." + (f" Nearly as much: {second.sentence}." if second else "")

@@ -60,6 +60,8 @@ class Diagnosis:
     floor: Floor
     unsteady: bool
     """Whether something that is left hums, or does not repeat with the motion."""
+    perceived: tuple[str, ...]
+    """Labels of the named causes that were heard or felt."""
     sure: Uncertainty
     parameters: pd.DataFrame
     covariance: NDArray
@@ -159,7 +161,8 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
         baseline=baseline, bank=bank, choice=choice, status=status, before=before, after=after,
         without={label: _less(choice.named, label, bank, validate) for label in named},
         likely={label: probabilities(rivals(choice, bank, label), diluted) for label in named},
-        standing=standing, floor=floor, unsteady=examined.unsteady, sure=sure, parameters=frame, covariance=covariance,
+        standing=standing, floor=floor, unsteady=examined.unsteady,
+        perceived=examined.sure, sure=sure, parameters=frame, covariance=covariance,
         residuals=tables.residual_table(validate, {"baseline": before.residuals, "extended": after.residuals}),
         train=bank.runs, validate=validate, faults=faults,
         strayed={"baseline": _strayed(empty, validate, baseline),

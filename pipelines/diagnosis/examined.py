@@ -19,6 +19,14 @@ from pipelines.diagnosis.tone import strongest_tone
 from pipelines.diagnosis.volition import evidence_of_will
 from pipelines.effects import Backlash, Effect, VoluntaryTorque
 
+PERCEIVED = {
+    Backlash.name: "bursts are heard where the load changes sign, as of teeth that cross their play; hardly any of it "
+    "shows in the mean of the torque",
+    VoluntaryTorque.name: "what differs from period to period is felt in cuffs and drive alike: it comes through the "
+    "cuffs, and no model foretells it",
+}
+"""How causes are known besides what they do to the mean of the torque."""
+
 
 @dataclass(frozen=True)
 class Extended:

@@ -23,6 +23,8 @@ MAXIMA_APART = {"Hz": 0.01, "1/turn": 1.0}
 """How far apart the maxima of an oscillating effect are, by its parameter's unit: the scan has found the right one."""
 ONSETS_APART_S = 2.0
 """How far apart the onsets are that the scan has tried."""
+BEYOND = 5.0
+"""Times what is typical, from which no machine or person has an amplitude."""
 REACH = 1.6
 """How far a sweep looks from where a shape parameter stands, as a factor or a share of its range."""
 
@@ -44,6 +46,17 @@ class Fit:
     """The kind of each run fitted."""
     loads: NDArray | None = None
     """Values (size + ...,) whose bodies the loads in the runs are computed from, where not those the runs came with."""
+
+    def is_absurd(self, baseline: Baseline) -> bool:
+        """Tell whether some cause has an amplitude that no machine or person has: it imitates what it is not."""
+        at = baseline.size
+        for cause in self.causes:
+            shared = [p for p, apart in zip(cause.effect.linear, cause.apart, strict=True) if not apart]
+            found = self.values[at : at + len(shared)]
+            if any(abs(v) > BEYOND * max(map(abs, p.typical)) for v, p in zip(found, shared, strict=True)):
+                return True
+            at += len(shared) + cause.apart.count(True) * self.acting(cause)
+        return False
 
     def acting(self, cause: Candidate) -> int:
         """Return in how many of the runs a cause acts."""

@@ -14,6 +14,7 @@ from pipelines.mechanics.one_machine import refuse_several_machines
 
 JOINTS = ("hip", "knee")
 """Both revolute: what the rigid body of the baseline and the effects of the catalogue are written for."""
+MOST_NM = 10_000.0
 LEAST_S = 5.0
 """Of motion, all runs of a kind and purpose together; below, gravity, inertia and friction are not told apart."""
 
@@ -27,10 +28,22 @@ def refuse_unfit(motions: Sequence[Motion]) -> None:
                 f"{motion.file} has joints {', '.join(found)}, expected hip and knee in this order, both revolute: "
                 "the causes are written for a leg of these two; use `exoid identify` for other machines"
             )
+        _refuse_monsters(motion)
     refuse_several_machines(motions)
     _refuse_twins(motions)
     for purpose, run in sorted({(m.purpose, m.run) for m in motions}):
         _refuse_standstill([m for m in motions if (m.purpose, m.run) == (purpose, run)])
+
+
+def _refuse_monsters(motion: Motion) -> None:
+    """Refuse torques that no leg's drive makes."""
+    for j, joint in enumerate(JOINTS):
+        largest = float(np.nanmax(np.abs(motion.torque[:, j])))
+        if largest > MOST_NM:
+            raise InputError(
+                f"{motion.file}: the {joint} torque reaches {largest:.3g} N·m, expected at most {MOST_NM:g} N·m; "
+                "correct torque constant, gear ratio or the unit of the current in the rig file, or the recording"
+            )
 
 
 def _refuse_twins(motions: Sequence[Motion]) -> None:

@@ -40,13 +40,16 @@ def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.Data
         for p in Friction.linear:
             add("friction", p.name, p.symbol, p.unit, joint, None, "friction", _unit(size, at), values[at])
             at += 1
+    one_way = [False] * len(rows) + [p.typical[0] >= 0 for cause in fit.causes for p in cause.effect.parameters]
     _add_causes(fit, baseline, sure, add)
     frame = pd.DataFrame(rows)
     T = np.array(maps)
     covariance = T @ sure.covariance @ T.T
     error = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     frame["std_error"] = error
-    frame["ci95_low"] = frame["value"] - sure.critical * error
+    low = frame["value"] - sure.critical * error
+    # Play, a stiffness or a time constant is never negative, however little is known of it.
+    frame["ci95_low"] = np.where(one_way, np.minimum(np.maximum(low, 0.0), frame["value"]), low)
     frame["ci95_high"] = frame["value"] + sure.critical * error
     return frame, covariance
 

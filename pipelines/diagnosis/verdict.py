@@ -9,6 +9,7 @@ from pipelines.diagnosis.control import control
 from pipelines.diagnosis.dependence import Dependence, dependences
 from pipelines.diagnosis.diagnose import Diagnosis, summary_numbers
 from pipelines.diagnosis.error_budget import error_budget
+from pipelines.diagnosis.examined import PERCEIVED
 from pipelines.diagnosis.faults import Fault
 from pipelines.diagnosis.gain import gain
 from pipelines.diagnosis.label import effect_labelled, in_words
@@ -42,6 +43,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "contract": "verdict/1",
         "status": d.status,
         "summary": _summary(d, causes, left),
+        "caveats": _caveats(d),
         "scoring": {
             "bandwidth_hz": first.block.cutoff_hz(first.motion.sample_rate_hz),
             "mask": MASK,
@@ -146,6 +148,8 @@ def _tie(effect: Effect, other: str, probability: float, d: Diagnosis) -> dict[s
 def _evidence(d: Diagnosis, label: str, effect: Effect, worth: float, joint: str, alike: dict[str, float]) -> list[str]:
     before = d.without[label].errors.rms[d.baseline.joints.index(joint)]
     sentences = [f"it takes {worth:.2f} of {before:.2f} N·m of torque error at the {joint} on runs no fit has seen"]
+    if label in d.perceived:
+        sentences.append(PERCEIVED[effect.name])
     others = {k: p for k, p in d.likely[label].items() if k not in alike}
     if others:
         rival = max(others, key=lambda k: others[k])
@@ -170,6 +174,24 @@ def _summary(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -
     if not d.floor.from_periods:
         said += " No motion here repeats, so the noise floor is a guess from the band above the motion."
     return f"{said} Left out as faults of acquisition: {_first_of(d.faults)}." if d.faults else said
+
+
+def _caveats(d: Diagnosis) -> list[str]:
+    """Return what the runs at hand could not show whatever is missing."""
+    kinds = {run.motion.run for run in d.train}
+    if kinds == {"exo_alone"}:
+        return [
+            "every run is without a person: what a person adds cannot be seen, and a shifted zero cannot be told from "
+            "a mass beside the axis; record with_human runs as well"
+        ]
+    if kinds == {"with_human"}:
+        felt = any(run.motion.forces is not None for run in d.train)
+        told = "told from those in the person by the cuff forces alone" if felt else "not told from those in the person"
+        return [
+            f"every run is with a person: causes in the machine are {told}, and the machine's friction is not known "
+            "by itself; record exo_alone runs as well"
+        ]
+    return []
 
 
 def _first_of(faults: Sequence[Fault]) -> str:
@@ -202,10 +224,7 @@ def _finding(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -
 def _remains(d: Diagnosis, told: int) -> str:
     """Say how far the joint told of is from the floor, and at which other joints something stays unexplained."""
     ratio = d.standing.extended / d.standing.floor
-    left = [
-        share is not None and share > EXPLAINED and times > AT_FLOOR
-        for share, times in zip(d.standing.unexplained, ratio, strict=True)
-    ]
+    left = [share is not None and share > EXPLAINED for share in d.standing.unexplained]
     said = f"{'still ' if left[told] else ''}{ratio[told]:.2f} times the floor"
     others = [
         f"; the {d.baseline.joints[j]}'s is then {d.standing.extended[j]:.2f} N·m, {times:.2f} times its floor"

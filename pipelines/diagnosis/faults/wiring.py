@@ -132,7 +132,11 @@ def _names(motion: Motion, channels: tuple[tuple[int, str], ...]) -> tuple[str, 
 
 def _reversed(motion: Motion, channels: tuple[tuple[int, str], ...], why: str) -> Fault:
     channel, names = _names(motion, channels)
-    return Fault(motion.file, channel, f"the sign of {names} is reversed, all along: {why}; flip it in the rig file")
+    return Fault(
+        motion.file, channel,
+        f"the sign of {names} is reversed, all along: {why}; turn it round in this recording, and in the rig file if "
+        "every run has it",
+    )  # fmt: skip
 
 
 def _exchanged(motion: Motion, channels: tuple[tuple[int, str], ...], why: str) -> Fault:

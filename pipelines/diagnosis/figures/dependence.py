@@ -11,7 +11,8 @@ from pipelines.diagnosis.figures.against import against, draw, reach
 from pipelines.diagnosis.figures.palette import AFTER, BEFORE
 
 SHOWN = ("angle", "speed", "acceleration", "load", "time", "phase", "cuff_force")
-"""Always; another variable only where it comes first."""
+"""Always; another variable only where it foretells something."""
+SOMETHING = 0.05
 
 
 def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
@@ -34,7 +35,8 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
     lines = [Line2D([], [], color=colour, lw=1.8) for colour in (BEFORE, AFTER)]
     drawn.legend(lines[: len(names)], names, loc="upper right", ncols=2)
     drawn.suptitle(
-        "What the torque error goes with, most first: share of its variance that a curve foretells (band: noise floor)",
+        "What the torque error goes with, most first, the phase of the period last: share of its variance that a curve "
+        "foretells (band: noise floor)",
         x=0.01, ha="left", fontweight="bold",
     )  # fmt: skip
     drawn.tight_layout()
@@ -43,7 +45,7 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
 
 def _shown(ranking: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return what is drawn, the phase last: it can imitate whatever repeats, and says only that something does."""
-    chosen = [one for i, one in enumerate(ranking) if i == 0 or one["variable"] in SHOWN]
+    chosen = [one for one in ranking if one["share_before"] > SOMETHING or one["variable"] in SHOWN]
     return sorted(chosen, key=lambda one: one["variable"] == "phase")
 
 

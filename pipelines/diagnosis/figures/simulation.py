@@ -34,6 +34,9 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
     for name, colour, made in models:
         _angles(axes[0], axes[1], made, d, stretch, name, colour)
         _torques(axes[2], axes[3], made, d, stretch, colour)
+    for error in axes[1]:
+        low, high = error.get_ylim()
+        error.set_ylim(max(low, -FAR_MRAD), min(high, FAR_MRAD))
     for row, words in zip(axes, ("angle, rad", "angle error, mrad", "torque, N·m", "torque error, N·m"), strict=True):
         row[0].set_ylabel(words)
     lines = [axis.get_legend_handles_labels() for axis in (axes[0, 0], axes[3, 0])]
@@ -87,8 +90,6 @@ def _angles(
         recorded = np.interp(time, motion.time, motion.q[:, j])
         angle.plot(time, recorded - strayed[:, j], color=colour, lw=2, label=name)
         error.plot(time, 1e3 * strayed[:, j], color=colour, lw=1.4)
-        low, high = error.get_ylim()
-        error.set_ylim(max(low, -FAR_MRAD), min(high, FAR_MRAD))
 
 
 def _torques(
