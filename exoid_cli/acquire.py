@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from exoid_cli.confirm import confirm
 from exoid_cli.console import console
 from exoid_cli.operator_view import OperatorView, plain_line
 
@@ -24,6 +25,10 @@ def acquire(
     run: Annotated[str, typer.Option(help="Name of the [[run]] in it.")],
     trajectory: Annotated[Path, typer.Option(help="The excitation, Parquet or TOML.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="The recording to write.")],
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before a run with somebody in the machine.")] = False,
+    reset_faults: Annotated[
+        bool, typer.Option("--reset-faults", help="First clear the faults that drives report.")
+    ] = False,
 ) -> None:
     """Move the leg along an excitation and record every sample.
 
@@ -38,9 +43,12 @@ def acquire(
 
     experiment = Experiment.load(config)
     settings, rig = experiment.run_named(run), experiment.file(experiment.acquire.rig)
-    with _watching(load_rig(rig), run) as report:
+    limited, rate = load_rig(rig).in_force(settings.run), experiment.acquire.sample_rate_hz
+    if settings.run == "with_human" and not limited.embedded and not yes:
+        confirm(limited, settings, trajectory, rate)
+    with _watching(limited, run) as report:
         outcome = record(
-            rig, settings, trajectory, output, experiment.acquire.sample_rate_hz, experiment.mechanism, report
+            rig, settings, trajectory, output, rate, experiment.mechanism, report, reset_faults=reset_faults
         )
     if outcome.missed:
         console.warn(f"{outcome.path}: {outcome.missed} samples were missed; `exoid show` lists the gaps")

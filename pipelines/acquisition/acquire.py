@@ -71,7 +71,7 @@ def acquire(
     reset_faults : bool
         Clear the faults that drives report before the run, with the control word that the rig file has for it.
     """
-    rig = load_rig(rig_path)
+    rig = load_rig(rig_path).in_force(run.run)
     trajectory = read_trajectory(trajectory_path)
     with about(trajectory_path):
         check_trajectory(rig, trajectory, run.duration_s, sample_rate_hz)

@@ -89,23 +89,23 @@ class Limits:
         )
 
 
-def refuse_leap(drives: Sequence[DriveSettings], last: NDArray, reference: NDArray, elapsed_s: float) -> None:
+def refuse_leap(drives: Sequence[DriveSettings], last: NDArray, reference: NDArray, allowed_s: NDArray) -> None:
     """Stand between the plan and the wire: refuse set-points (J,) rad that no planned motion may ask for.
 
     Whatever went wrong before, each is a number, within its joint's limits, and no further from the ``last``
-    one than its speed limit allows in the time between.
+    one than its speed limit leads in the time that it is allowed, (J,) s.
     """
-    for drive, before, angle in zip(drives, last, reference, strict=True):
+    for drive, before, angle, allowed in zip(drives, last, reference, allowed_s, strict=True):
         low, high = drive.angle_rad
         if not low <= angle <= high:
             raise DeviceError(
                 f"{drive.joint}: a set-point of {angle:.3f} rad was due, outside its limits {low:g} to {high:g} rad; "
                 "it was not sent"
             )
-        if not abs(angle - before) <= drive.speed_rad_s * elapsed_s + ROUNDING_RAD:
+        if not abs(angle - before) <= drive.speed_rad_s * allowed + ROUNDING_RAD:
             raise DeviceError(
-                f"{drive.joint}: a set-point of {angle:.3f} rad was due {elapsed_s:.3f} s after {before:.3f} rad, "
-                f"faster than its limit of {drive.speed_rad_s:g} rad/s; it was not sent"
+                f"{drive.joint}: a set-point of {angle:.3f} rad was due after {before:.3f} rad with {allowed:.3f} s to "
+                f"get there, faster than its limit of {drive.speed_rad_s:g} rad/s; it was not sent"
             )
 
 

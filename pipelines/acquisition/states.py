@@ -15,12 +15,17 @@ from pipelines.acquisition.machine import Reading, Row
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.plausibility import Plausibility
 from pipelines.acquisition.safety import Limits, refuse_leap, slowing
-from pipelines.acquisition.watch import Watch
+from pipelines.acquisition.watch import RATE_TOLERANCE, Watch
 from pipelines.errors import DeviceError
 from pipelines.settings.rig import RigSettings, SensorSettings
 
 REST_RAD = 0.02
 """How far the leg may have moved between the plan and the moment at which the drives are enabled."""
+
+
+SLACK_SAMPLES = 2
+"""How far set-points may be ahead of their speed limit for a moment: they come in step with samples, which the host
+sees up to one sample late or early."""
 
 
 class State(StrEnum):
@@ -74,6 +79,8 @@ class Supervisor:
         self._plausibility = Plausibility(rig, sample_rate_hz)
         self._watch = Watch(rig, sample_rate_hz)
         self._speed = np.zeros_like(self.sent)
+        self._lead = np.zeros_like(self.sent)
+        """By how much the set-points are ahead of what the speed limits allow, s; never more than the slack."""
         self._start = self.sent
         self._index = 0
         self._first = 0
@@ -139,12 +146,9 @@ class Supervisor:
         index = min(found - self._first, len(self._plan.reference))
         while self.state is not self._due(index):
             self._go(FOLLOWING[FOLLOWING.index(self.state) + 1])
-        elapsed = (index - self._index) / self.rate
-        if self.rig.clock == "real_time":  # a counter that leaps does not make time go by
-            elapsed = min(elapsed, now - self.sent_at + 1.0 / self.rate)
         reference = self._path(index)
         step = reference - self._path(max(index - 1, 0))
-        self._send(reference, step * self.rate, elapsed, now)
+        self._send(reference, step * self.rate, (index - self._index) / self.rate, now)
         self._index = index
         return self.sent
 
@@ -209,7 +213,7 @@ class Supervisor:
         for reference in slowing(self.sent[joint], speed, deceleration, self.rate, drive.angle_rad):
             if self.pressing:
                 return
-            refuse_leap([drive], self.sent[of_joint], np.array([reference]), 1.0 / self.rate)
+            refuse_leap([drive], self.sent[of_joint], np.array([reference]), np.array([1.0 / self.rate]))
             halt, self.sent[joint] = reference == self.sent[joint], reference
             yield float(reference), halt
 
@@ -252,9 +256,19 @@ class Supervisor:
         if self.why is not None:
             raise DeviceError(self.why)
 
-    def _send(self, reference: NDArray, speed: NDArray, elapsed_s: float, now: float) -> None:
-        """Let set-points pass, and remember how they move, in case they must be slowed down."""
-        refuse_leap(self.rig.drive, self.sent, reference, elapsed_s)
+    def _send(self, reference: NDArray, speed: NDArray, samples_s: float, now: float) -> None:
+        """Let set-points pass, and remember how they move, in case they must be slowed down.
+
+        ``samples_s`` is the time between them by the device's counter, which alone goes by in lockstep. In real time
+        the host's clock rules, for a counter that leaps does not make time go by.
+        """
+        if self.rig.clock == "lockstep":
+            elapsed, slack = samples_s, 0.0
+        else:
+            elapsed, slack = (now - self.sent_at) * (1.0 + RATE_TOLERANCE), SLACK_SAMPLES / self.rate
+        refuse_leap(self.rig.drive, self.sent, reference, elapsed + slack - self._lead)
+        taken = np.abs(reference - self.sent) / [drive.speed_rad_s for drive in self.rig.drive]
+        self._lead = np.clip(self._lead + taken - elapsed, 0.0, slack)
         self.sent, self._speed, self.sent_at = reference.copy(), speed, now
 
 

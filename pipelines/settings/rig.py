@@ -275,6 +275,17 @@ def _refuse_bad_block(block: Settings, name: str) -> None:
         )
 
 
+TIGHTER = "with somebody in the machine a limit may only be tighter"
+
+
+def _refuse_looser(settings: "DriveSettings | SafetySettings", *names: str) -> None:
+    """Refuse limits of runs with_human above those of the others."""
+    for name in names:
+        found, allowed = getattr(settings.with_human, name), getattr(settings, name)
+        if found is not None and found > allowed:
+            raise ValueError(f"with_human.{name}: found {found:g}, expected at most {name} ({allowed:g}); {TIGHTER}")
+
+
 class DeviceSettings(Settings):
     """Where a device is found."""
 
@@ -294,6 +305,20 @@ class DeviceSettings(Settings):
         return self
 
 
+class HumanDriveSettings(Settings):
+    """What a joint may do with somebody in the machine; what is left out is as without."""
+
+    angle_rad: tuple[float, float] | None = Field(None, description="Lowest and highest angle.")
+    speed_rad_s: float | None = Field(None, gt=0.0, description="Highest speed, either way.")
+    torque_nm: float | None = Field(None, gt=0.0, description="Highest torque at the joint, either way.")
+
+
+class HumanSafetySettings(Settings):
+    """What stops a run with somebody in the machine; what is left out is as without."""
+
+    cuff_force_n: float | None = Field(None, gt=0.0, description="Highest force on any axis of any cuff sensor.")
+
+
 class DriveSettings(DeviceSettings):
     """A drive, its transmission, and what its joint may do."""
 
@@ -303,12 +328,24 @@ class DriveSettings(DeviceSettings):
     angle_rad: tuple[float, float] = Field(description="Lowest and highest angle.")
     speed_rad_s: float = Field(gt=0.0, description="Highest speed, either way.")
     torque_nm: float = Field(gt=0.0, description="Highest torque at the joint, either way.")
+    with_human: HumanDriveSettings = Field(HumanDriveSettings(), description="Tighter limits of runs with_human.")
 
     @model_validator(mode="after")
     def _low_is_below_high(self) -> Self:
-        low, high = self.angle_rad
-        if low >= high:
-            raise ValueError(f"angle_rad: found [{low}, {high}], expected the lowest angle first; swap them")
+        for low, high in (self.angle_rad, self.with_human.angle_rad or self.angle_rad):
+            if low >= high:
+                raise ValueError(f"angle_rad: found [{low}, {high}], expected the lowest angle first; swap them")
+        return self
+
+    @model_validator(mode="after")
+    def _limits_with_human_are_tighter(self) -> Self:
+        low, high = self.with_human.angle_rad or self.angle_rad
+        if low < self.angle_rad[0] or high > self.angle_rad[1]:
+            raise ValueError(
+                f"with_human.angle_rad: found [{low:g}, {high:g}], expected within angle_rad [{self.angle_rad[0]:g}, "
+                f"{self.angle_rad[1]:g}]; {TIGHTER}"
+            )
+        _refuse_looser(self, "speed_rad_s", "torque_nm")
         return self
 
     @property
@@ -355,6 +392,12 @@ class SafetySettings(Settings):
     deceleration_rad_s2: float = Field(8.0, gt=0.0, description="How a stop slows the set-points down.")
     ramp_s: float = Field(3.0, gt=0.0, description="Shortest time to go from rest into the motion and back.")
     settle_s: float = Field(1.0, ge=0.0, description="Motion before the recording begins, for transients to fade.")
+    with_human: HumanSafetySettings = Field(HumanSafetySettings(), description="Tighter limits of runs with_human.")
+
+    @model_validator(mode="after")
+    def _limits_with_human_are_tighter(self) -> Self:
+        _refuse_looser(self, "cuff_force_n")
+        return self
 
     @model_validator(mode="after")
     def _a_reply_is_awaited_less_long_than_the_watchdog(self) -> Self:
@@ -447,6 +490,14 @@ class RigSettings(Settings):
     def line_of(self, device: DeviceSettings) -> LineSettings:
         """Return the line that a device is on."""
         return TcpLine(host=device.host, port=device.port) if device.line is None else self.line[device.line]
+
+    def in_force(self, run: str) -> Self:
+        """Return the rig with the limits that are in force in a run (``exo_alone`` or ``with_human``)."""
+        if run != "with_human":
+            return self
+        drives = tuple(d.model_copy(update=d.with_human.model_dump(exclude_none=True)) for d in self.drive)
+        safety = self.safety.model_copy(update=self.safety.with_human.model_dump(exclude_none=True))
+        return self.model_copy(update={"drive": drives, "safety": safety})
 
     def label_of(self, device: DriveSettings | SensorSettings) -> str:
         """Return what errors call a device: what it is, and where."""

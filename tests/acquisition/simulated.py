@@ -92,6 +92,7 @@ class SimulatedDrive:
     """Counter, angle and speed of the sample that is latched."""
 
     def __post_init__(self):
+        self.seen = self.angle
         self.read, self.write = Block(registers_of(self.map.read)), Block(registers_of(self.map.write))
 
     @property
@@ -126,10 +127,10 @@ class SimulatedDrive:
 class SimulatedRig:
     """Drives and sensors behind every line that acquisition opens."""
 
-    def __init__(self, rig, events, clock, stopped_by):
+    def __init__(self, rig, events, clock, stopped_by, rest):
         self.rig, self.clock, self.stopped_by = rig, clock, stopped_by
         self.events = sorted(events, key=lambda event: event.at)
-        self.drives = [SimulatedDrive(j, d, rig.map.drive[d.map], self) for j, d in enumerate(rig.drive)]
+        self.drives = [SimulatedDrive(j, d, rig.map.drive[d.map], self, angle=rest[j]) for j, d in enumerate(rig.drive)]
         self.sensor_block = Block(registers_of(rig.map.sensor["force"].read))
         self.force = 0.0
         self.requests, self.samples = 0, 0
@@ -168,6 +169,8 @@ class SimulatedRig:
                 for task in asyncio.all_tasks():
                     task.cancel()
                 self.raised.append((self.clock.now, asyncio.CancelledError()))
+            case "interrupt":
+                asyncio.get_running_loop().call_soon(self._interrupt)
             case "counter":
                 drive.ahead += event.what
             case "freeze":
@@ -184,6 +187,11 @@ class SimulatedRig:
                 self.force = event.what
             case _:
                 raise AssertionError(event.kind)
+
+    def _interrupt(self):
+        """Raise what no coroutine sees: it ends the event loop."""
+        self.raised.append((self.clock.now, KeyboardInterrupt()))
+        raise self.raised[-1][1]
 
     async def answer(self, device, write, read):
         """Serve a request, or let what is due befall it."""
@@ -247,20 +255,22 @@ class Run:
     states: list
 
 
-def simulate(rig, settings, trajectory, path, events, *, plan=None, own=None):
+def simulate(rig, settings, trajectory, path, events, rest, *, plan=None, own=None):
     """Record one run on a simulated rig.
 
     Parameters
     ----------
     events : list of Event
+    rest : (hip, knee)
+        Where the leg stands, rad.
     plan : callable, optional
         Makes another plan of the one that was made.
     own : (place, n, error), optional
-        An error of exoid's own: ``report``, ``journal`` or ``limits`` raises it at its n-th call.
+        An error of exoid's own: ``report``, ``journal`` or ``keep`` raises it at its n-th call.
     """
     time = SimulatedTime()
     stopped_by = []
-    simulated = SimulatedRig(rig, events, time, stopped_by)
+    simulated = SimulatedRig(rig, events, time, stopped_by, rest)
     sensors = rig.sensor if settings.run == "with_human" else ()
     supervisor = Supervisor(rig, RATE, sensors)
     run = Run(simulated, supervisor, None, None, None, [supervisor.state])
@@ -340,7 +350,7 @@ def _patched(simulated, time, run, plan, own):
             stack.enter_context(patch.object(acquire, "make_plan", lambda *a: plan(made(*a))))
         for name, where, attribute in (
             ("journal", journal.Journal, "append"),
-            ("limits", Loop, "_keep"),
+            ("keep", Loop, "_keep"),
         ):
             if place == name:
                 genuine = getattr(where, attribute)

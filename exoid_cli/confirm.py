@@ -1,0 +1,41 @@
+"""The question before a leg with somebody in it is moved."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from exoid_cli.console import console
+
+if TYPE_CHECKING:
+    from pipelines.settings.acquire import RunSettings
+    from pipelines.settings.rig import RigSettings
+
+
+def confirm(rig: "RigSettings", run: "RunSettings", trajectory: Path, sample_rate_hz: float) -> None:
+    """Show what will be moved and the limits in force, and ask; raise InputError unless the answer is yes."""
+    from pipelines.acquisition.plan import check_trajectory
+    from pipelines.errors import InputError, about
+    from pipelines.mechanics.trajectory import read_trajectory
+
+    if not sys.stdin.isatty():
+        raise InputError(
+            f"run {run.name} moves somebody, which wants to be confirmed on a terminal; give --yes where a script "
+            "starts it; nothing was moved"
+        )
+    with about(trajectory):
+        path = check_trajectory(rig, read_trajectory(trajectory), run.duration_s, sample_rate_hz)
+    # On the terminal in every mode: who answers must have seen it.
+    lines = [f"Run {run.name} moves somebody on the rig {rig.name} along {trajectory} for {run.duration_s:g} s:"]
+    for j, drive in enumerate(rig.drive):
+        angle, speed = path[:, j], abs(path[1:, j] - path[:-1, j]).max(initial=0.0) * sample_rate_hz
+        low, high = drive.angle_rad
+        lines.append(
+            f"  {drive.joint:<5} {angle.min():+.3f} to {angle.max():+.3f} rad at up to {speed:.3f} rad/s; limits "
+            f"{low:+g} to {high:+g} rad, {drive.speed_rad_s:g} rad/s, {drive.torque_nm:g} N·m"
+        )
+    cuffs = f"{rig.safety.cuff_force_n:g} N on {len(rig.sensor)} cuff sensors" if rig.sensor else "none on the cuffs"
+    lines.append(f"  force {cuffs}; ramps of {rig.safety.ramp_s:g} s or longer lead in and out; Ctrl-C stops it")
+    console.err.print("\n".join(lines), markup=False, soft_wrap=True)
+    console.err.print("Is everybody ready, and the emergency stop at hand? [y/N] ", markup=False, end="")
+    if sys.stdin.readline().strip().lower() not in ("y", "yes"):
+        raise InputError(f"run {run.name} was not confirmed; nothing was moved")
