@@ -12,7 +12,7 @@ EXPERIMENT := $(MAKE) --no-print-directory -f datasets/experiments/experiment.mk
 SEEDS ?= tuning
 
 .DEFAULT_GOAL := help
-.PHONY: help all test test-slow check format bench fuzz blind blind-full blind-fixed blind-page docs lock clean install
+.PHONY: help all test test-slow invariants check format bench fuzz blind blind-full blind-fixed blind-page docs lock clean install
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | sort | expand -t 12
@@ -25,6 +25,9 @@ test: $(INSTALLED) ## the tests
 
 test-slow: $(INSTALLED) ## the statistical campaigns, minutes long
 	$(BIN)/pytest -n 2 -m slow
+
+invariants: $(INSTALLED) ## what keeps a leg safe, over 10,000 random sequences of faults; about ten minutes
+	$(BIN)/pytest -m slow tests/acquisition/test_invariants.py
 
 check: $(INSTALLED) ## lint, formatting, types, direction of imports
 	$(BIN)/ruff check

@@ -2,7 +2,7 @@
 
 import asyncio
 import time
-from collections.abc import Awaitable, Callable, Iterable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -308,6 +308,8 @@ class Machine:
         """How far each drive's counter is ahead of the first one's at the same sample."""
         self.leads_are_vague = False
         """Whether a slow line hides by how many samples."""
+        self._counted = 0
+        """At which count all drives were at the end of the last cycle."""
         self._last: Row | None = None
         self._answered = 0.0
 
@@ -335,6 +337,7 @@ class Machine:
         self.leads = np.median(ahead, axis=0).astype(int).tolist()
         if self.rig.sampling == "recorder" and self.rig.clock == "real_time" and self.rig.clocks == "common":
             await self._find_leads()
+        self._counted = looks[-1][0].sequence
         return Row(tuple(looks[-1]), await self.felt(0), self.samples_per_cycle)
 
     async def _find_leads(self) -> None:
@@ -420,16 +423,27 @@ class Machine:
             counts = [reading.sequence - ahead for reading, ahead in zip(readings, self.leads, strict=True)]
             late = [j for j, count in enumerate(counts) if count < max(counts)]
             if not late or not self._latches:
+                self._counted = max(counts)
                 return tuple(readings)
             if time.monotonic() > until:
                 break
             await asyncio.sleep(LAG_PAUSE_S)
             for j in late:
                 readings[j] = await self.drives[j].exchange(reference[j])
-        raise DeviceError(
-            f"{self.drives[late[0]].device.label}: its sample counter lags behind the others' for "
-            f'{self.rig.safety.watchdog_s:g} s; check the drives\' synchronisation, or set clocks = "own" in the rig '
-            "file if each has a clock of its own"
+        raise DeviceError(self._out_of_step(readings, counts))
+
+    def _out_of_step(self, readings: Sequence[Reading], counts: Sequence[int]) -> str:
+        """Return in words which drive's counter has parted from the others', and how."""
+        slow, fast = int(np.argmin(counts)), int(np.argmax(counts))
+        gained = [count - self._counted for count in counts]
+        # Whichever goes on as before is right.
+        j, other = (fast, slow) if gained[slow] > 0 else (slow, fast)
+        what = "leapt" if gained[slow] > 0 else "went back" if gained[slow] < 0 else "stands still"
+        return (
+            f"{self.drives[j].device.label}: its sample counter {what} ({readings[j].sequence - gained[j]}, then "
+            f"{readings[j].sequence}) while that of drive {self.rig.drive[other].joint} went on by {gained[other]} in "
+            f'{self.rig.safety.watchdog_s:g} s; was it restarted? Or set clocks = "own" in the rig file, if each drive '
+            "has a clock of its own"
         )
 
 

@@ -9,10 +9,12 @@ import time
 
 import numpy as np
 import pytest
+from pymodbus.client import ModbusTcpClient
 
 from pipelines.acquisition.journal import journal_of
 from pipelines.contracts import RECORDING
 from pipelines.settings import datasets
+from tests.acquisition.conftest import free_port
 from tests.acquisition.journals import read_journal
 
 
@@ -151,3 +153,49 @@ def test_a_rig_file_with_a_fault_in_its_plant_is_the_users_to_mend(start, experi
     _, err = process.communicate(timeout=60)
     assert "plant.exo_inertial: no real leg has these" in err
     assert (process.returncode, len(err.strip().splitlines())) == (2, 1)
+
+
+def status_of(client, unit):
+    """Return set-point and status word of a shipped rig's drive."""
+    words = client.read_holding_registers(110, count=4, device_id=unit).registers
+    reference = client.convert_from_registers(words[:2], client.DATATYPE.INT32)
+    return reference * 1e-6, words[3]
+
+
+def test_when_the_host_is_killed_the_drives_stop_the_leg_and_disable_themselves(start, rig_file, excitation, tmp_path):
+    port, heartbeat_s = free_port(), 1.5
+    rig = rig_file(
+        shipped="real_time", port=port, heartbeat_s=heartbeat_s, watchdog_s=2.0, torque_nm=1000.0, speed_rad_s=50.0
+    )
+    config = tmp_path / "exoid.toml"
+    config.write_text(
+        f'[acquire]\nrig = "{rig.name}"\n[[run]]\nname = "one"\nrun = "exo_alone"\npurpose = "train"\n'
+        "duration_s = 300.0\nseed = 3\n"
+    )
+    serving = start(["rig", "serve", rig, "--run", "exo_alone"])
+    assert str(port) in serving.stdout.readline() + serving.stdout.readline()
+    output = tmp_path / "one.parquet"
+    arguments = ["acquire", "--config", config, "--run", "one", "--trajectory", excitation, "-o", output]
+    acquiring = start(arguments)
+    wait_for_rows(acquiring, output, 100)
+    with ModbusTcpClient("127.0.0.1", port=port) as client:
+        assert [status_of(client, unit)[1] for unit in (1, 2)] == [0x0001] * 2
+        acquiring.kill()
+        killed, seen = time.monotonic(), []
+        while time.monotonic() - killed < heartbeat_s + 1.0:
+            seen.append((time.monotonic() - killed, *status_of(client, 1), status_of(client, 2)[1]))
+            time.sleep(0.01)
+    at, reference, hip, knee = np.transpose(seen)
+    # As docs/safety.md states it, and some time for a busy computer: at rest after five samples and the slowing down.
+    before = (at > 0.5 + 5 / 200 + 1.3 / 8.0) & (hip == 0x0001)
+    assert before.any() and np.ptp(reference[before]) < 1e-5
+    for status in (hip, knee):
+        assert (status[at > heartbeat_s + 0.5] == 0x0008).all()
+    again = start([*arguments[:-1], tmp_path / "two.parquet"])
+    _, err = again.communicate(timeout=60)
+    assert again.returncode == 3
+    assert "reports a fault (status bits 0x0008)" in err and "--reset-faults" in err
+    config.write_text(config.read_text().replace("300.0", "1.0"))
+    again = start([*arguments[:-1], tmp_path / "two.parquet", "--reset-faults"])
+    _, err = again.communicate(timeout=60)
+    assert (again.returncode, err) == (0, "")

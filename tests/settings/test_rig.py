@@ -60,6 +60,17 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
          "certificate and key belong together; give both or neither"),
         ("[map.drive.servo]\n", "[map.drive.servo]\nfaults = { 5 = 'hot' }\n", "map.drive.servo: faults: bit 5 is not "
          "one of fault_mask 0x0008; add 0x0020 to the mask, or leave the name out"),
+        ("speed_rad_s = 2.2", "speed_rad_s = 3.2", "drive[0]: with_human.speed_rad_s: found 3.2, expected at most "
+         "speed_rad_s (3); with somebody in the machine a limit may only be tighter"),
+        ("[drive.with_human]", "[drive.with_human]\nangle_rad = [-0.4, 1.0]", "drive[0]: with_human.angle_rad: found "
+         "[-0.4, 1], expected within angle_rad [-0.35, 1.75]; with somebody in the machine a limit may only be "
+         "tighter"),
+        ("cuff_force_n = 250.0", "cuff_force_n = 500.0", "safety: with_human.cuff_force_n: found 500, expected at most "
+         "cuff_force_n (400); with somebody in the machine a limit may only be tighter"),
+        ("enabled_value = 0x0001", "enabled_value = 0x0003", "map.drive.servo: enabled_value: found 0x0003, expected "
+         "bits of enabled_mask 0x0001 only; correct one of them"),
+        ("halt = 0x010F", "halt = 0x000F", "map.drive.servo: enable and halt: both are 0x000F, expected different "
+         "control words; correct one"),
         ('joint = "knee"', 'joint = "hip"', "drive: found hip, hip, expected one for the hip, then one for the knee"),
     ],
 )  # fmt: skip
@@ -92,3 +103,13 @@ def test_a_recording_does_not_tell_where_keys_lie(tmp_path):
     assert rig.line["leg"].ca == tmp_path / "secret" / "ca.pem"
     assert rig.public()["line"]["leg"]["transport"] == "tls"
     assert "secret" not in str(rig.public())
+
+
+def test_with_somebody_in_the_machine_the_tighter_limits_are_in_force():
+    rig = load_rig(RIGS / "plain.toml")
+    assert rig.in_force("exo_alone") == rig
+    human = rig.in_force("with_human")
+    assert [drive.speed_rad_s for drive in human.drive] == [2.2, 2.2]
+    assert [drive.torque_nm for drive in human.drive] == [100.0, 60.0]
+    assert [drive.angle_rad for drive in human.drive] == [drive.angle_rad for drive in rig.drive]
+    assert human.safety.cuff_force_n == 250.0

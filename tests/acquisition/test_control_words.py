@@ -1,0 +1,128 @@
+"""What a drive is told beside set-points, and how it is made sure that it took it."""
+
+import pytest
+
+from pipelines.acquisition.acquire import acquire
+from pipelines.acquisition.device import Device
+from pipelines.errors import DeviceError, SettingsError
+from pipelines.rig.server import Drive
+from pipelines.rig.servo import Servo
+from pipelines.settings.acquire import RunSettings
+from tests.acquisition.conftest import free_port
+
+ENABLE, DISABLE, HALT, RESET = 0x000F, 0x0000, 0x010F, 0x0080
+
+
+@pytest.fixture
+def heard(monkeypatch):
+    """Control words that drives heard, each once in a row, by drive."""
+    words, hear = {}, Servo.hear
+
+    def remember(servo, reference, control):
+        mine = words.setdefault(id(servo), [])
+        if mine[-1:] != [control]:
+            mine.append(control)
+        hear(servo, reference, control)
+
+    monkeypatch.setattr(Servo, "hear", remember)
+    return lambda: list(words.values())
+
+
+def test_a_run_enables_halts_and_disables_and_nothing_else(record, heard):
+    record()
+    assert heard() == [[ENABLE, HALT, DISABLE]] * 2
+
+
+def test_a_drive_that_knows_no_halt_is_held_by_its_set_point(record, heard):
+    record(drop=("halt = ",))
+    assert heard() == [[ENABLE, DISABLE]] * 2
+
+
+def test_a_drive_that_does_not_say_that_it_is_enabled_is_not_moved(record, monkeypatch):
+    moved, served, hear = [], [], Servo.hear
+
+    def remember(servo, reference, control):
+        moved.append(reference)
+        hear(servo, reference, control)
+
+    monkeypatch.setattr(Servo, "status", 0)
+    monkeypatch.setattr(Servo, "hear", remember)
+    with pytest.raises(DeviceError) as caught:
+        record(served_as=served, watchdog_s=0.5)
+    assert str(caught.value).startswith(
+        "drive hip: was told to enable, but its status word does not say that it is after 0.5 s; see the drive's manual"
+    )
+    assert set(moved) == {0.0}
+    assert served[0].enabled == [False, False]
+
+
+def test_a_drive_that_says_it_is_no_longer_enabled_ends_the_run(record):
+    def press(device, function, written):
+        if isinstance(device, Drive) and device.rig.sample.sequence[0] > 300:
+            device.servo.hear(0.0, DISABLE)
+            device.servo.hear = lambda reference, control: None
+
+    with pytest.raises(DeviceError, match="is no longer enabled; was the emergency stop pressed"):
+        record(fault=press)
+
+
+def test_a_drive_that_still_says_enabled_is_told_again_and_then_reported(record, monkeypatch):
+    told, write = [], Device.write
+
+    async def count(device, block, words):
+        told.append(device.label.split()[1])
+        await write(device, block, words)
+
+    monkeypatch.setattr(Device, "write", count)
+    status = Servo.status.fget
+    monkeypatch.setattr(Servo, "status", property(lambda servo: status(servo) | (servo._limits[0] > -1.0)))
+    with pytest.raises(DeviceError) as caught:
+        record(watchdog_s=0.3)
+    assert str(caught.value).startswith("the run is complete; and could not be disabled: drive hip (127.0.0.1:")
+    assert "was told to disable, but its status word is still 0x0001 after 0.3 s" in str(caught.value)
+    assert "USE THE EMERGENCY STOP" in str(caught.value)
+    assert (told.count("hip"), told.count("knee")) == (3, 1)
+
+
+def faulty(rig, reset_faults, tmp_path, excitation, serve, port):
+    settings = RunSettings(name="test", run="exo_alone", purpose="train", duration_s=1.0)
+    with serve(rig, port) as served:
+        served.rig.drives[1].servo.fault = True
+        acquire(rig, settings, excitation, tmp_path / "test.parquet", reset_faults=reset_faults)
+
+
+def test_a_fault_is_cleared_where_the_operator_asks_for_it_and_nowhere_else(
+    heard, tmp_path, excitation, rig_file, serve
+):
+    port = free_port()
+    with pytest.raises(DeviceError) as caught:
+        faulty(rig_file(port=port), False, tmp_path, excitation, serve, port)
+    assert "clear the fault and start again, with --reset-faults where the drive is to clear it" in str(caught.value)
+    assert heard() == []
+    port = free_port()
+    faulty(rig_file(port=port), True, tmp_path, excitation, serve, port)
+    assert sorted(heard()) == sorted([[ENABLE, HALT, DISABLE], [RESET, DISABLE, ENABLE, HALT, DISABLE]])
+
+
+def test_a_fault_that_the_rig_file_knows_no_word_for_is_not_cleared(tmp_path, excitation, rig_file, serve):
+    port = free_port()
+    rig = rig_file(port=port, drop=("fault_reset",))
+    with pytest.raises(SettingsError, match=r"map.drive.servo.fault_reset: missing, but drive knee .* reports a fault"):
+        faulty(rig, True, tmp_path, excitation, serve, port)
+
+
+def test_a_drive_is_told_with_every_write_that_the_host_lives(record, monkeypatch):
+    beats, hear = [], Drive.hear
+
+    def remember(drive):
+        if drive.written and drive.joint == 0:
+            start = drive.write.address - drive.first
+            told = drive.write.decode(drive.registers[start : start + drive.write.count])
+            beats.append(int(told["heartbeat"]))
+        hear(drive)
+
+    monkeypatch.setattr(Drive, "hear", remember)
+    control = 'control = { address = 202, type = "uint16" }'
+    record(duration_s=1.0, replace={control: f'{control}\nheartbeat = {{ address = 203, type = "uint16" }}'})
+    assert beats == list(range(1, len(beats) + 1))
+    assert len(beats) > 300

@@ -1,0 +1,108 @@
+"""A leg with somebody in it is moved only after somebody has said yes."""
+
+import io
+
+import pytest
+
+from pipelines.settings import datasets
+
+
+@pytest.fixture
+def experiment(tmp_path):
+    """Write an experiment with one run on a rig that is not there; returns the arguments that record it."""
+
+    def write(run="with_human", embedded="false"):
+        text = (datasets() / "rigs" / "real_time.toml").read_text()
+        text = text.replace("embedded = true", f"embedded = {embedded}").replace(
+            'map = "servo"', 'map = "servo"\nport = 1'
+        )
+        (tmp_path / "rig.toml").write_text(text)
+        config = tmp_path / "exoid.toml"
+        config.write_text(
+            f'[acquire]\nrig = "rig.toml"\n[[run]]\nname = "one"\nrun = "{run}"\npurpose = "train"\nduration_s = 10.0\n'
+        )
+        trajectory = datasets() / "paper" / "trajectory.toml"
+        return [
+            "acquire",
+            "--config",
+            config,
+            "--run",
+            "one",
+            "--trajectory",
+            trajectory,
+            "-o",
+            tmp_path / "one.parquet",
+        ]
+
+    return write
+
+
+@pytest.fixture
+def answer(monkeypatch):
+    """Let somebody sit at the terminal who answers."""
+
+    class Terminal(io.StringIO):
+        def isatty(self):
+            return True
+
+    return lambda text: monkeypatch.setattr("sys.stdin", Terminal(text))
+
+
+WENT_ON = "drive hip (127.0.0.1:1, unit 1): refuses the connection"
+
+
+def test_without_a_terminal_a_run_with_somebody_is_refused_in_one_line(exoid, experiment, monkeypatch):
+    monkeypatch.setattr("sys.stdin", io.StringIO("y\n"))
+    outcome = exoid(*experiment())
+    assert (outcome.code, outcome.out) == (2, "")
+    assert outcome.err == (
+        "exoid: run one moves somebody, which wants to be confirmed on a terminal; give --yes where a script starts "
+        "it; nothing was moved\n"
+    )
+
+
+@pytest.mark.parametrize("text", ["", "\n", "n\n", "yess\n"])
+def test_whatever_is_no_yes_is_a_no(exoid, experiment, answer, text):
+    answer(text)
+    outcome = exoid(*experiment())
+    assert outcome.code == 2
+    assert outcome.err.endswith("exoid: run one was not confirmed; nothing was moved\n")
+
+
+def test_what_will_be_moved_and_the_limits_in_force_are_shown_before_the_question(exoid, experiment, answer):
+    answer("yes\n")
+    outcome = exoid(*experiment(), "--quiet")
+    assert outcome.code == 3 and WENT_ON in outcome.err
+    shown = outcome.err.partition(" [y/N] ")[0]
+    for words in (
+        "Run one moves somebody on the rig real_time along", "trajectory.toml for 10 s",
+        "limits -0.35 to +1.75 rad, 2.2 rad/s, 100 N·m", "limits -2.1 to +0.35 rad, 2.2 rad/s, 60 N·m",
+        "force 250 N on 4 cuff sensors", "Ctrl-C stops it", "the emergency stop at hand?",
+    ):  # fmt: skip
+        assert words in shown
+
+
+def test_a_motion_beyond_the_limits_with_somebody_is_refused_before_the_question(exoid, experiment, answer, tmp_path):
+    answer("y\n")
+    arguments = experiment()
+    rig = tmp_path / "rig.toml"
+    rig.write_text(rig.read_text().replace("speed_rad_s = 2.2", "speed_rad_s = 0.5"))
+    outcome = exoid(*arguments)
+    assert outcome.code == 2
+    assert "but the rig allows 0.5 rad/s" in outcome.err
+    assert "[y/N]" not in outcome.err
+
+
+@pytest.mark.parametrize(("run", "more"), [("with_human", ["--yes"]), ("exo_alone", [])])
+def test_scripts_and_runs_with_nobody_are_not_asked(exoid, experiment, run, more):
+    outcome = exoid(*experiment(run), *more)
+    assert outcome.code == 3
+    assert outcome.err.startswith(f"exoid: {WENT_ON}")
+
+
+def test_nobody_is_strapped_into_an_embedded_rig(exoid, experiment, monkeypatch):
+    recorded = []
+    monkeypatch.setattr("pipelines.acquisition.acquire.acquire", lambda *a, **k: recorded.append(a) or 1 / 0)
+    outcome = exoid(*experiment(embedded="true"))
+    assert len(recorded) == 1
+    assert "[y/N]" not in outcome.err
