@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 def confirm(rig: "RigSettings", run: "RunSettings", trajectory: Path, sample_rate_hz: float) -> None:
     """Show what will be moved and the limits in force, and ask; raise InputError unless the answer is yes."""
+    import numpy as np
+
     from pipelines.acquisition.plan import check_trajectory
     from pipelines.errors import InputError, about
     from pipelines.mechanics.trajectory import read_trajectory
@@ -22,12 +24,15 @@ def confirm(rig: "RigSettings", run: "RunSettings", trajectory: Path, sample_rat
             f"run {run.name} moves somebody, which wants to be confirmed on a terminal; give --yes where a script "
             "starts it; nothing was moved"
         )
+    motion = read_trajectory(trajectory)
     with about(trajectory):
-        path = check_trajectory(rig, read_trajectory(trajectory), run.duration_s, sample_rate_hz)
+        check_trajectory(rig, motion, run.duration_s, sample_rate_hz)
+    seconds = min(run.duration_s, motion.period_s or run.duration_s)
+    angles, speeds = motion.at(np.arange(0.0, seconds, 1.0 / sample_rate_hz))[:2]
     # On the terminal in every mode: who answers must have seen it.
     lines = [f"Run {run.name} moves somebody on the rig {rig.name} along {trajectory} for {run.duration_s:g} s:"]
     for j, drive in enumerate(rig.drive):
-        angle, speed = path[:, j], abs(path[1:, j] - path[:-1, j]).max(initial=0.0) * sample_rate_hz
+        angle, speed = angles[:, j], abs(speeds[:, j]).max()
         low, high = drive.angle_rad
         lines.append(
             f"  {drive.joint:<5} {angle.min():+.3f} to {angle.max():+.3f} rad at up to {speed:.3f} rad/s; limits "

@@ -40,7 +40,7 @@ def test_before_the_recording_the_motion_itself_runs_for_the_settling_time(rig_f
 
 
 def test_a_ramp_too_fast_for_a_joint_is_made_longer(rig_file, motion):
-    slow = {"speed_rad_s = 3.0": "speed_rad_s = 0.55"}
+    slow = {"speed_rad_s = 3.0": "speed_rad_s = 0.55", "speed_rad_s = 2.2": "speed_rad_s = 0.5"}
     quiet = FourierTrajectory(motion.theta0, 0.1 * motion.a, 0.1 * motion.b, motion.omega)
     plan = make_plan(load_rig(rig_file(replace=slow)), quiet, REST, 5.0, RATE)
     assert np.abs(np.diff(np.asarray(plan.reference)[:, 0])).max() * RATE <= 0.55
