@@ -97,8 +97,6 @@ def add(place: slice, counts: int) -> Fault:
 
     def stepped(frame: Frame, link: Link) -> list[bytes]:
         words = frame.words
-        if len(words) < place.stop:  # not the block that holds it, but a status word that is read back
-            return [frame.raw]
         value = ((words[place][0] << 16 | words[place][1]) + counts) % 2**32
         words[place] = [value >> 16, value & 0xFFFF]
         return [frame.with_words(words)]
@@ -111,8 +109,6 @@ def swap(place: slice) -> Fault:
 
     def swapped(frame: Frame, link: Link) -> list[bytes]:
         words = frame.words
-        if len(words) < place.stop:
-            return [frame.raw]
         pairs = [words[place][k : k + 2][::-1] for k in range(0, place.stop - place.start, 2)]
         words[place] = [word for pair in pairs for word in pair]
         return [frame.with_words(words)]
@@ -139,8 +135,6 @@ class Freeze:
 
     def __call__(self, frame: Frame, link: Link) -> list[bytes]:
         words = frame.words
-        if len(words) < self.place.stop:
-            return [frame.raw]
         self.held = self.held or words[self.place]
         words[self.place] = self.held
         return [frame.with_words(words)]
@@ -171,8 +165,6 @@ class Restart:
             link.drop()
             return []
         words = frame.words
-        if len(words) < 4:
-            return [frame.raw]
         words[:4] = [0, 7, 0, 7]
         return [frame.with_words(words)]
 
