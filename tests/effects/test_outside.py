@@ -1,27 +1,17 @@
 """Another package can bring an effect, and a broken one is told apart from exoid."""
 
+import re
 import subprocess
 import sys
+from pathlib import Path
 from textwrap import dedent
 
 import pytest
 
-GOOD = '''
-from pipelines.effects import Effect, Parameter, Parity, Side
-from pipelines.effects.kernel import reaction
-
-class TendonSlack(Effect):
-    """A cable that pulls beyond an angle."""
-    name, title, side = "tendon_slack", "Tendon slack", Side.STRUCTURE
-    equation, source = "tau = k max(0, q - q0)", "its own paper"
-    looks_like, confirm = "a kink", "look at the cable"
-    linear = (Parameter("stiffness", "N·m/rad", "of the cable", "k", (1.0, 9.0)),)
-    shape = (Parameter("slack", "rad", "angle at which it is taut", "q0", (-1.0, 1.0)),)
-
-    @reaction
-    def reaction(at, state, values, geometry, joint, out):
-        out[joint] += values[0] * max(0.0, at.q[joint] - values[1])
-'''
+PAGE = (Path(__file__).parents[2] / "docs" / "own-effect.md").read_text(encoding="utf-8")
+"""A reader copies what it shows."""
+(GOOD,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+(ENTRY,) = re.findall(r"^tendon_slack = .*$", PAGE, re.MULTILINE)
 LISTED = "from pipelines.model import BY_NAME; print(list(BY_NAME)[-1], len(BY_NAME))"
 
 
@@ -35,7 +25,7 @@ def python_with(tmp_path):
         installed = tmp_path / "cables-1.0.dist-info"
         installed.mkdir()
         (installed / "METADATA").write_text("Metadata-Version: 2.1\nName: cables\nVersion: 1.0\n", encoding="utf-8")
-        entry = "[exoid.effects]\ntendon_slack = cables.tendon_slack:TendonSlack\n"
+        entry = "[exoid.effects]\n" + ENTRY.replace('"', "") + "\n"
         (installed / "entry_points.txt").write_text(entry, encoding="utf-8")
         path = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); "
         command = [sys.executable, "-c", path + dedent(arguments[0])]
@@ -54,8 +44,8 @@ def test_an_effect_of_another_package_is_one_of_exoids(python_with):
     [
         ("import no_such_module", "loading it failed: ModuleNotFoundError: No module named 'no_such_module'; mend it"),
         ("TendonSlack = 3", "it is 3, expected a subclass of pipelines.effects.Effect; mend it"),
-        (GOOD.replace("equation, source =", "unstated ="), "does not state equation, source"),
-        (GOOD.replace('"tendon_slack", "Ten', '"cogging", "Ten'), "its name cogging is already that of pipelines"),
+        (GOOD.replace("    equation =", "    unstated ="), "does not state equation"),
+        (GOOD.replace('"tendon_slack"', '"cogging"'), "its name cogging is already that of pipelines"),
     ],
     ids=["does not load", "no effect", "incomplete", "name taken"],
 )  # fmt: skip
