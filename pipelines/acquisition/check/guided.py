@@ -17,7 +17,7 @@ from pipelines.acquisition.loop import Progress
 from pipelines.contracts import RECORDING
 from pipelines.errors import DeviceError, SettingsError
 from pipelines.settings.acquire import RunSettings
-from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig import HumanDriveSettings, HumanSafetySettings, RigSettings
 
 AMPLITUDE_RAD = 0.05
 PERIOD_S = 4.0
@@ -98,20 +98,22 @@ def guided(rig: RigSettings, start: Sequence[float], rate_hz: float, run: str) -
 
 
 def _tight(rig: RigSettings, start: Sequence[float]) -> dict[str, Any]:
-    """Return the rig's settings with limits about where the leg stands."""
-    room = AMPLITUDE_RAD + ROOM_RAD
+    """Return the rig's settings with limits about where the leg stands, within those with somebody in the machine."""
+    room, careful = AMPLITUDE_RAD + ROOM_RAD, rig.in_force("with_human")
     drives = tuple(
         drive.model_copy(
             update={
                 "angle_rad": (max(drive.angle_rad[0], angle - room), min(drive.angle_rad[1], angle + room)),
                 "speed_rad_s": min(drive.speed_rad_s, SPEED_RAD_S),
+                "with_human": HumanDriveSettings(),
             }
         )
-        for drive, angle in zip(rig.drive, start, strict=True)
+        for drive, angle in zip(careful.drive, start, strict=True)
     )
+    safety = careful.safety.model_copy(update={"with_human": HumanSafetySettings()})
     # The narrower file lies elsewhere, and what files it names would be looked for there.
     lines = {name: line.with_files_in(Path.cwd()) for name, line in rig.line.items()}
-    tight = rig.model_copy(update={"drive": drives, "line": lines, "embedded": False})
+    tight = rig.model_copy(update={"drive": drives, "safety": safety, "line": lines, "embedded": False})
     return tight.model_dump(mode="json", exclude_none=True)
 
 
