@@ -82,7 +82,6 @@ class Supervisor:
         self._lead = np.zeros_like(self.sent)
         """By how much the set-points are ahead of what the speed limits allow, s; never more than the slack."""
         self._start = self.sent
-        self._index = 0
         self._first = 0
 
     def check(self) -> None:
@@ -110,7 +109,7 @@ class Supervisor:
     def rest(self, now: float) -> NDArray:
         """Return the set-points (J,) rad with which the drives are enabled: where the leg stands."""
         self._refuse_after_abort()
-        self._send(self._start, np.zeros_like(self.sent), 0.0, now)
+        self._send(self._start, np.zeros_like(self.sent), now)
         return self.sent
 
     def enabled(self, row: Row, waited_s: float) -> bool:
@@ -148,8 +147,7 @@ class Supervisor:
             self._go(FOLLOWING[FOLLOWING.index(self.state) + 1])
         reference = self._path(index)
         step = reference - self._path(max(index - 1, 0))
-        self._send(reference, step * self.rate, (index - self._index) / self.rate, now)
-        self._index = index
+        self._send(reference, step * self.rate, now)
         return self.sent
 
     def judge(self, row: Row, now: float) -> bool:
@@ -256,16 +254,13 @@ class Supervisor:
         if self.why is not None:
             raise DeviceError(self.why)
 
-    def _send(self, reference: NDArray, speed: NDArray, samples_s: float, now: float) -> None:
-        """Let set-points pass, and remember how they move, in case they must be slowed down.
-
-        ``samples_s`` is the time between them by the device's counter, which alone goes by in lockstep. In real time
-        the host's clock rules, for a counter that leaps does not make time go by.
-        """
+    def _send(self, reference: NDArray, speed: NDArray, now: float) -> None:
+        """Let set-points pass, and remember how they move, in case they must be slowed down."""
+        # By the host's clock, or by cycles in lockstep: a counter that leaps does not make time go by.
+        elapsed = (now - self.sent_at) * (1.0 + RATE_TOLERANCE)
         if self.rig.clock == "lockstep":
-            elapsed, slack = samples_s, 0.0
-        else:
-            elapsed, slack = (now - self.sent_at) * (1.0 + RATE_TOLERANCE), SLACK_SAMPLES / self.rate
+            elapsed = 1.0 / self.rate
+        slack = SLACK_SAMPLES / self.rate
         refuse_leap(self.rig.drive, self.sent, reference, elapsed + slack - self._lead)
         taken = np.abs(reference - self.sent) / [drive.speed_rad_s for drive in self.rig.drive]
         self._lead = np.clip(self._lead + taken - elapsed, 0.0, slack)

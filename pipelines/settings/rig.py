@@ -492,11 +492,17 @@ class RigSettings(Settings):
         return TcpLine(host=device.host, port=device.port) if device.line is None else self.line[device.line]
 
     def in_force(self, run: str) -> Self:
-        """Return the rig with the limits that are in force in a run (``exo_alone`` or ``with_human``)."""
-        if run != "with_human":
-            return self
-        drives = tuple(d.model_copy(update=d.with_human.model_dump(exclude_none=True)) for d in self.drive)
-        safety = self.safety.model_copy(update=self.safety.with_human.model_dump(exclude_none=True))
+        """Return the rig with the limits in force in a run (``exo_alone`` or ``with_human``), and no others."""
+        human = run == "with_human"
+        drives = tuple(
+            drive.model_copy(
+                update={"with_human": HumanDriveSettings()}
+                | (drive.with_human.model_dump(exclude_none=True) if human else {})
+            )
+            for drive in self.drive
+        )
+        tighter = self.safety.with_human.model_dump(exclude_none=True) if human else {}
+        safety = self.safety.model_copy(update={"with_human": HumanSafetySettings()} | tighter)
         return self.model_copy(update={"drive": drives, "safety": safety})
 
     def label_of(self, device: DriveSettings | SensorSettings) -> str:

@@ -107,9 +107,11 @@ def test_a_recording_does_not_tell_where_keys_lie(tmp_path):
 
 def test_with_somebody_in_the_machine_the_tighter_limits_are_in_force():
     rig = load_rig(RIGS / "plain.toml")
-    assert rig.in_force("exo_alone") == rig
-    human = rig.in_force("with_human")
+    alone, human = rig.in_force("exo_alone"), rig.in_force("with_human")
+    assert [drive.speed_rad_s for drive in alone.drive] == [3.0, 3.5]
+    assert alone.safety.cuff_force_n == 400.0
     assert [drive.speed_rad_s for drive in human.drive] == [2.2, 2.2]
     assert [drive.torque_nm for drive in human.drive] == [100.0, 60.0]
     assert [drive.angle_rad for drive in human.drive] == [drive.angle_rad for drive in rig.drive]
     assert human.safety.cuff_force_n == 250.0
+    assert human.in_force("exo_alone") == human  # no others are left

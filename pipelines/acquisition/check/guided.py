@@ -75,7 +75,7 @@ def guided(rig: RigSettings, start: Sequence[float], rate_hz: float, run: str) -
     """
     folder = Path(tempfile.mkdtemp(prefix="exoid-check-"))
     rig_file, excitation, output = folder / "rig.toml", folder / "excitation.toml", folder / "guided.parquet"
-    rig_file.write_text(_toml_file(_tight(rig, start)))
+    rig_file.write_text(_toml_file(_tight(rig.in_force(run), start)))
     excitation.write_text(_toml_file(_motion(start)))
     settings = RunSettings(name="guided", run=run, purpose="train", duration_s=2 * PERIOD_S)
     seen: list[Progress] = []
