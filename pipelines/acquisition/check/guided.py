@@ -17,7 +17,7 @@ from pipelines.acquisition.loop import Progress
 from pipelines.contracts import RECORDING
 from pipelines.errors import DeviceError, SettingsError
 from pipelines.settings.acquire import RunSettings
-from pipelines.settings.rig import HumanDriveSettings, HumanSafetySettings, RigSettings
+from pipelines.settings.rig import RigSettings
 
 AMPLITUDE_RAD = 0.05
 PERIOD_S = 4.0
@@ -75,7 +75,7 @@ def guided(rig: RigSettings, start: Sequence[float], rate_hz: float, run: str) -
     """
     folder = Path(tempfile.mkdtemp(prefix="exoid-check-"))
     rig_file, excitation, output = folder / "rig.toml", folder / "excitation.toml", folder / "guided.parquet"
-    rig_file.write_text(_toml_file(_tight(rig.in_force(run), start)))
+    rig_file.write_text(_toml_file(_tight(rig, start)))
     excitation.write_text(_toml_file(_motion(start)))
     settings = RunSettings(name="guided", run=run, purpose="train", duration_s=2 * PERIOD_S)
     seen: list[Progress] = []
@@ -105,15 +105,13 @@ def _tight(rig: RigSettings, start: Sequence[float]) -> dict[str, Any]:
             update={
                 "angle_rad": (max(drive.angle_rad[0], angle - room), min(drive.angle_rad[1], angle + room)),
                 "speed_rad_s": min(drive.speed_rad_s, SPEED_RAD_S),
-                "with_human": HumanDriveSettings(),
             }
         )
         for drive, angle in zip(careful.drive, start, strict=True)
     )
-    safety = careful.safety.model_copy(update={"with_human": HumanSafetySettings()})
     # The narrower file lies elsewhere, and what files it names would be looked for there.
     lines = {name: line.with_files_in(Path.cwd()) for name, line in rig.line.items()}
-    tight = rig.model_copy(update={"drive": drives, "safety": safety, "line": lines, "embedded": False})
+    tight = careful.model_copy(update={"drive": drives, "line": lines, "embedded": False})
     return tight.model_dump(mode="json", exclude_none=True)
 
 
