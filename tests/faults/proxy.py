@@ -106,29 +106,44 @@ class Proxy:
         self._listening.set()
         await self._until.wait()
         server.close()
+        await asyncio.sleep(0)  # whoever was let in last begins, so that it can be ended
         for task in self._links:
             task.cancel()
         await asyncio.gather(*self._links, return_exceptions=True)
+        await asyncio.sleep(0.01)  # what was aborted is closed by then
 
     async def _connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         task = asyncio.current_task()
         assert task
         self._links.add(task)
         task.add_done_callback(self._links.discard)
-        with suppress(OSError, asyncio.CancelledError):
-            device_reader, device = await asyncio.open_connection("127.0.0.1", self._device_port)
-            link = Link(writer, device)
-            pumps = [
-                asyncio.ensure_future(self._pump(reader, device, link, is_reply=False)),
-                asyncio.ensure_future(self._pump(device_reader, writer, link, is_reply=True)),
-            ]
-            try:
-                await asyncio.wait(pumps, return_when=asyncio.FIRST_COMPLETED)
-            finally:
-                for pump in pumps:
-                    pump.cancel()
-                await asyncio.gather(*pumps, return_exceptions=True)
-                link.drop()
+        try:
+            with suppress(OSError, asyncio.CancelledError):
+                device_reader, device = await asyncio.open_connection("127.0.0.1", self._device_port)
+                await self._pass_on(Link(writer, device), reader, device_reader, writer, device)
+        finally:
+            writer.transport.abort()
+
+    async def _pass_on(
+        self,
+        link: Link,
+        reader: asyncio.StreamReader,
+        device_reader: asyncio.StreamReader,
+        writer: asyncio.StreamWriter,
+        device: asyncio.StreamWriter,
+    ) -> None:
+        """Pump both ways until one of them ends."""
+        pumps = [
+            asyncio.ensure_future(self._pump(reader, device, link, is_reply=False)),
+            asyncio.ensure_future(self._pump(device_reader, writer, link, is_reply=True)),
+        ]
+        try:
+            await asyncio.wait(pumps, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            link.drop()
+            for pump in pumps:
+                pump.cancel()
+            await asyncio.gather(*pumps, return_exceptions=True)
 
     async def _pump(
         self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, link: Link, *, is_reply: bool
