@@ -387,7 +387,7 @@ class SafetySettings(Settings):
     cuff_force_n: float = Field(400.0, gt=0.0, description="Highest force on any axis of any cuff sensor.")
     watchdog_s: float = Field(0.1, gt=0.0, description="Longest a cycle or a device's next sample may take.")
     reply_s: float | None = Field(
-        None, gt=0.0, description="Longest wait for one reply in motion, then it is a gap; else a third of watchdog_s."
+        None, gt=0.0, description="Longest wait for one reply in motion, then it is a gap; else 0.3 of watchdog_s."
     )
     deceleration_rad_s2: float = Field(8.0, gt=0.0, description="How a stop slows the set-points down.")
     ramp_s: float = Field(3.0, gt=0.0, description="Shortest time to go from rest into the motion and back.")
@@ -411,7 +411,8 @@ class SafetySettings(Settings):
     @property
     def longest_reply_s(self) -> float:
         """Longest wait for one reply while the leg moves, s."""
-        return self.watchdog_s / 3 if self.reply_s is None else self.reply_s
+        # Not a third: three lost replies are borne, and the fourth, not the watchdog, says who is silent.
+        return 0.3 * self.watchdog_s if self.reply_s is None else self.reply_s
 
 
 class Maps(Settings):

@@ -12,7 +12,7 @@ SEQUENCE, TIME, ANGLE, VELOCITY, CURRENT = (slice(2 * k, 2 * k + 2) for k in ran
 """Where the drive's block has its registers, in words."""
 FORCES = slice(2, 8)
 
-REPLY_S, WATCHDOG_S = 0.25, 1.0
+REPLY_S, WATCHDOG_S = 0.25, 0.9
 BEGINS = 70
 """The exchange of the hip with which a fault begins."""
 
