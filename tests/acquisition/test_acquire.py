@@ -82,9 +82,9 @@ def test_real_time_samples_come_on_the_devices_clock(record):
     frame, gaps = table.frame, table.metadata["gaps"]
     missed = sum(count for _, count in gaps)
     assert len(frame) + missed == 100
-    assert missed <= 5  # a computer that is busy with something else may miss some, and then says so
+    assert missed <= 10  # a computer that is busy with something else may miss some, and then says so
     assert_allclose(np.diff(frame["time_s"]), np.diff(frame["sequence"]) / 50, atol=2e-6)
     # A sensor that is asked late finds the next sample, and has nothing new a cycle later.
     is_force = frame.columns.str.contains("_force_")
     assert frame.loc[:, ~is_force].notna().all(axis=None)
-    assert frame.loc[:, is_force].isna().any(axis=1).sum() <= 5
+    assert frame.loc[:, is_force].isna().any(axis=1).sum() <= 10

@@ -300,7 +300,7 @@ def test_a_counter_that_leaps_either_way_ends_the_run_before_a_set_point_follows
 
     why = stopped(
         shipped=shipped, served_as=served, fault=After(150, leap), rate_hz=50.0, duration_s=4.0, torque_nm=1000.0,
-        replace={"seed = 1 ": "sample_rate_hz = 50.0\nseed = 1 "},
+        speed_rad_s=50.0, replace={"seed = 1 ": "sample_rate_hz = 50.0\nseed = 1 "},
     )  # fmt: skip
     assert words in why
     assert np.abs(np.diff(sent)).max() < 3.0 * 3 / 50  # what the speed limit allows, and some missed samples
