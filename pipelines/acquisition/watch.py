@@ -43,7 +43,7 @@ class Watch:
         if waited > self._longest_s:
             raise DeviceError(
                 f"watchdog: no new sample from {self._label} for {waited:.3f} s, allowed are {self._longest_s:g} s; "
-                "its counter stands still, or this computer is too busy"
+                "its counter stands still, its answers are lost, or this computer is too busy"
             )
         if found < last:
             raise DeviceError(f"{self._label}: its sample counter went back from {last} to {found}; was it restarted?")

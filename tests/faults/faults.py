@@ -219,7 +219,7 @@ def cases() -> list[Case]:
         Case("a high bit of the angle is flipped", From(flip(4, 12)), "is outside its limits"),
         Case("a bit of the speed is flipped", From(flip(6, 2)), "speed"),
         Case("a high bit of the current is flipped", From(flip(8, 5)), "torque"),
-        Case("the connection is half open", From(half_open), "did not answer"),
+        Case("the connection is half open", From(half_open), "drive hip"),
         Case("the connection is dropped", From(drop), "hip"),
         Case("the device restarts", From(Restart(), times=ALWAYS), "hip"),
         Case("the counter is stuck", From(Freeze(SEQUENCE), times=ALWAYS), "stands still"),
