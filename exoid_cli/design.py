@@ -31,7 +31,7 @@ def design(
       exoid design --evaluate trajectory.toml
     """
     from pipelines.errors import InputError
-    from pipelines.mechanics.leg import Geometry
+    from pipelines.mechanics.geometry import Geometry
     from pipelines.settings import Experiment
 
     experiment = Experiment.load(config) if config else Experiment()

@@ -11,6 +11,7 @@ from pipelines.effects import EFFECTS, RUNS, Effect, Parameter, Side
 from pipelines.effects.friction import Friction
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
+from pipelines.mechanics.machine import THE_LEG, Machine
 from pipelines.mechanics.motion import Motion
 from pipelines.validation import suggestion
 
@@ -129,13 +130,14 @@ def effect_named(name: str) -> type[Effect]:
     return BY_NAME[name]
 
 
-def baseline(joints: Iterable[str], runs: Iterable[str]) -> tuple[Effect, ...]:
+def baseline(machine: Machine, runs: Iterable[str]) -> tuple[Effect, ...]:
     """Return the model every lab starts with: a rigid body for each kind of run, friction shared by all."""
-    return (*(RigidBody(run=run) for run in runs), *(Friction(joint=joint) for joint in joints))
+    bodies = (RigidBody(run=run, on=machine) for run in runs)
+    return (*bodies, *(Friction(joint=joint, on=machine) for joint in machine.names))
 
 
-def model_from_parameters(frame: pd.DataFrame, run: str) -> Model:
-    """Rebuild the model of one kind of run from a ``parameters/1`` table.
+def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_LEG) -> Model:
+    """Rebuild the model of one kind of run of a machine from a ``parameters/1`` table.
 
     ``run`` is a kind of run, or ``human`` for the wearer's own rigid body.
     """
@@ -145,15 +147,17 @@ def model_from_parameters(frame: pd.DataFrame, run: str) -> Model:
         raise InputError(f"the parameters hold no rigid body for run {run!r}, only for {known}")
     others = frame[~is_body & (frame["run"].isna() | (frame["run"] == run))]
     terms = [
-        _term_from_rows(effect_named(str(name))(joint=joint if isinstance(joint, str) else None), rows)
+        _term_from_rows(effect_named(str(name))(joint=joint if isinstance(joint, str) else None, on=machine), rows)
         for (name, joint), rows in others.groupby(["effect", "joint"], sort=False, dropna=False)
     ]
     bodies = {str(kind): rows for kind, rows in frame[is_body].groupby("run")}
     if any(term.effect.at_cuff for term in terms) and {"exo_alone", "human"} <= set(bodies):
         # Machine and limb move apart: each needs its own.
-        parts = [(RigidBody(), bodies["exo_alone"]), (RigidBody(run="with_human"), bodies["human"])]
+        parts = [
+            (RigidBody(on=machine), bodies["exo_alone"]), (RigidBody(run="with_human", on=machine), bodies["human"]),
+        ]  # fmt: skip
     else:
-        parts = [(RigidBody(run=run if run in RUNS else None), bodies[run])]
+        parts = [(RigidBody(run=run if run in RUNS else None, on=machine), bodies[run])]
     return Model((*(_term_from_rows(effect, rows) for effect, rows in parts), *terms))
 
 

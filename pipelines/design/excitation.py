@@ -9,7 +9,7 @@ import pandas as pd
 from pipelines.design.quality import Quality, quality
 from pipelines.design.search import Report, search
 from pipelines.mechanics.fourier import FourierTrajectory
-from pipelines.mechanics.leg import Geometry
+from pipelines.mechanics.geometry import Geometry
 from pipelines.settings.design import DesignSettings
 
 

@@ -9,8 +9,10 @@ from scipy.signal import lfilter
 
 from pipelines.errors import InputError
 from pipelines.estimation.regression import away_from_reversals
-from pipelines.mechanics.leg import INERTIAL, Geometry
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.leg import INERTIAL
 from pipelines.mechanics.limits import Margin, margins
+from pipelines.mechanics.machine import THE_LEG
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.trajectory import Trajectory
 from pipelines.model import Model, Term, baseline
@@ -115,7 +117,7 @@ def standard_errors(trajectory: Trajectory, noise: NoiseSettings, geometry: Geom
 
 def paper_model() -> Model:
     """Return the model an excitation is for: the rigid body, Coulomb and viscous friction of both joints."""
-    effects = baseline(JOINTS, ("exo_alone",))
+    effects = baseline(THE_LEG, ("exo_alone",))
     return Model(tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects))
 
 

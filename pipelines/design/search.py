@@ -13,7 +13,7 @@ from pipelines.design.fitness import Problem, costs, expand, problem
 from pipelines.design.swarm import Swarm, assess, fly
 from pipelines.errors import NotIdentifiable
 from pipelines.mechanics.fourier import FourierTrajectory
-from pipelines.mechanics.leg import Geometry
+from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.limits import bounds_array
 from pipelines.settings.design import DesignSettings
 

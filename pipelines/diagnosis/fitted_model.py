@@ -17,7 +17,7 @@ def fitted_model(made: Fit, baseline: Baseline, kind: str) -> Model:
     # Nobody asks how sure the values are.
     size = len(made.values)
     frame, _ = tables.parameters(made, baseline, Uncertainty(np.zeros((size, size)), 1.0, ()))
-    return model_from_parameters(frame, kind)
+    return model_from_parameters(frame, kind, baseline.machine)
 
 
 def model_of_run(made: Fit, baseline: Baseline, run: Run) -> Model:

@@ -4,7 +4,7 @@ An *output* is one measured torque: each drive's and, where there are cuff force
 joint that they exert on the person. The second pair is a second measurement of the human's share, and
 what separates causes in the drive or the structure from causes in the person.
 
-Baseline parameters, in the order of the columns: X1..X4 of the empty exoskeleton, X1..X4 of the person,
+Baseline parameters, in the order of the columns: the rigid body (a leg's X1..X4) of the machine, that of the person,
 Coulomb and viscous friction of each joint, the force sensors' zeros. With one kind of run and no cuff
 forces one rigid body takes the place of the two.
 """
@@ -17,15 +17,14 @@ from numpy.typing import NDArray
 
 from pipelines.effects.friction import Friction
 from pipelines.estimation.regression import away_from_reversals, away_from_turns, block_average
-from pipelines.mechanics.leg import cuff_torque, regressor
+from pipelines.mechanics.leg import LEG, cuff_torque
+from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.motion import CUFFS, Motion
 from pipelines.signals.blocks import BlockAverage
 
 FOLD_S = 10.0
 """Length of a fold where the excitation does not repeat."""
 FOLDS = 4
-BODY = 4
-"""Parameters of a rigid body."""
 ZEROS = 3
 """Force zeros that show in the cuffs' torque: shank along, shank across, thigh across."""
 
@@ -74,7 +73,7 @@ class Run:
 def cuff_torque_of(motion: Motion, q: NDArray) -> NDArray | None:
     """Torque that the cuffs exert on a limb at angles ``q``, (n, 2) N·m; None where it was not measured."""
     g = motion.geometry
-    if motion.forces is None or motion.run != "with_human":
+    if motion.forces is None or motion.run != "with_human" or motion.machine.mechanism is not LEG:
         return None
     if g.thigh_cuff_distance_m is None or g.shank_cuff_distance_m is None:
         return None
@@ -124,8 +123,18 @@ class Baseline:
     """Names and sizes of the baseline's columns for the kinds of run at hand."""
 
     kinds: tuple[str, ...]
-    joints: tuple[str, ...]
+    machine: Machine
     cuffs: bool
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the machine's joints."""
+        return self.machine.names
+
+    @property
+    def body(self) -> int:
+        """Number of a rigid body's parameters."""
+        return len(self.machine.mechanism.parameters)
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -135,7 +144,7 @@ class Baseline:
     @property
     def size(self) -> int:
         """Number of columns."""
-        return BODY * len(self.bodies) + 2 * len(self.joints) + ZEROS * self.cuffs
+        return self.body * len(self.bodies) + 2 * len(self.joints) + ZEROS * self.cuffs
 
     def columns(self, motor: Motion, link: Motion, human: Motion | None = None) -> NDArray:
         """Baseline columns at full rate, (n, O, size).
@@ -149,19 +158,18 @@ class Baseline:
         human : Motion, optional
             As the person's limbs move, where not with the links.
         """
-        n, J = motor.q.shape
+        (n, J), p = motor.q.shape, self.body
         out = np.zeros((n, 2 * J, self.size))
-        g = link.geometry
-        body = regressor(link.q, link.dq, link.ddq, g.thigh_length_m, g.gravity_m_s2)
-        out[:, :J, :BODY] = body
+        g, mechanism = link.geometry, self.machine.mechanism
+        out[:, :J, :p] = mechanism.regressor(link.q, link.dq, link.ddq, g)
         if len(self.bodies) == 2 and motor.run == "with_human":
             limb = human or link
-            person = regressor(limb.q, limb.dq, limb.ddq, g.thigh_length_m, g.gravity_m_s2)
-            out[:, :J, BODY : 2 * BODY] = person
-            out[:, J:, BODY : 2 * BODY] = person
-        at = BODY * len(self.bodies)
+            person = mechanism.regressor(limb.q, limb.dq, limb.ddq, g)
+            out[:, :J, p : 2 * p] = person
+            out[:, J:, p : 2 * p] = person
+        at = p * len(self.bodies)
         for joint in self.joints:
-            out[:, :J, at : at + 2] = Friction(joint).columns(motor)
+            out[:, :J, at : at + 2] = Friction(joint, on=self.machine).columns(motor)
             at += 2
         if self.cuffs and motor.run == "with_human":
             L1, cos_knee, sin_knee = g.thigh_length_m, np.cos(link.q[:, 1]), np.sin(link.q[:, 1])
@@ -176,7 +184,7 @@ class Baseline:
 def baseline_of(runs: Sequence[Run]) -> Baseline:
     """Return the baseline that the kinds of run at hand allow."""
     kinds = tuple(k for k in ("exo_alone", "with_human") if any(run.motion.run == k for run in runs))
-    return Baseline(kinds, runs[0].motion.joints, any(run.has_cuffs for run in runs))
+    return Baseline(kinds, runs[0].motion.machine, any(run.has_cuffs for run in runs))
 
 
 def like_trained(run: Run, baseline: Baseline) -> Run:
@@ -193,10 +201,10 @@ def with_load(run: Run, baseline: Baseline, values: NDArray) -> Run:
 
     The measured torques would not do: their noise would stand on both sides of the regression.
     """
-    bodies = values[: BODY * len(baseline.bodies)].reshape(-1, BODY)
+    bodies = values[: baseline.body * len(baseline.bodies)].reshape(-1, baseline.body)
     # The first body is the machine's, which alone is there in runs without a wearer.
     body = bodies.sum(axis=0) if run.motion.run == "with_human" else bodies[0]
-    m, g = run.motion, run.motion.geometry
-    columns = regressor(m.q, m.dq, m.ddq, g.thigh_length_m, g.gravity_m_s2)
+    m = run.motion
+    columns = baseline.machine.mechanism.regressor(m.q, m.dq, m.ddq, m.geometry)
     limb = bodies[-1]
     return replace(run, motion=replace(m, load=columns @ body, limb_load=columns @ limb, body=body, limb_body=limb))

@@ -5,7 +5,8 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.floor import Floor
 from pipelines.effects.friction import Friction
-from pipelines.mechanics.leg import Geometry, regressor
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.leg import LEG
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.trajectory import Trajectory
 from pipelines.settings.design import NoiseSettings
@@ -19,9 +20,9 @@ def planned_motions(
     """Return one motion of each kind of run, its torque that of rigid body and friction, without cuff forces."""
     count = round(min(noise.duration_s, trajectory.duration_s) * rate_hz)
     time = np.arange(count) / rate_hz
-    q, dq, ddq = (np.ascontiguousarray(x) for x in trajectory.at(time))
+    q, dq, ddq = trajectory.at(time)
     geometry = Geometry(thigh_length_m=plant.thigh_length_m, gravity_m_s2=plant.gravity_m_s2)
-    Y = regressor(q, dq, ddq, geometry.thigh_length_m, geometry.gravity_m_s2)
+    Y = LEG.regressor(q, dq, ddq, geometry)
     made = []
     for kind in kinds:
         X = np.array(plant.exo_inertial) + (np.array(plant.human_inertial) if kind == "with_human" else 0.0)

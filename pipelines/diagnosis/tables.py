@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipelines.contracts.joints import joints_of
 from pipelines.diagnosis.fit import Fit
 from pipelines.diagnosis.gain import scored
-from pipelines.diagnosis.observations import BODY, Baseline, Run
+from pipelines.diagnosis.observations import Baseline, Run
 from pipelines.diagnosis.uncertainty import Uncertainty
 from pipelines.effects.friction import Friction
 from pipelines.effects.rigid_body import RigidBody
@@ -31,13 +31,13 @@ def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.Data
         maps.append(slope)
 
     for run, bodies in _bodies(baseline).items():
-        for i, p in enumerate(RigidBody.linear):
+        for i, p in enumerate(RigidBody(on=baseline.machine).linear):
             slope = np.zeros(size)
-            slope[[b * BODY + i for b in bodies]] = 1.0
+            slope[[b * baseline.body + i for b in bodies]] = 1.0
             add("rigid_body", p.name, p.symbol, p.unit, None, run, "inertia", slope, float(slope @ values))
-    at = BODY * len(baseline.bodies)
+    at = baseline.body * len(baseline.bodies)
     for joint in baseline.joints:
-        for p in Friction.linear:
+        for p in Friction(joint, on=baseline.machine).linear:
             add("friction", p.name, p.symbol, p.unit, joint, None, "friction", _unit(size, at), values[at])
             at += 1
     one_way = [False] * len(rows) + [p.typical[0] >= 0 for cause in fit.causes for p in cause.effect.parameters]

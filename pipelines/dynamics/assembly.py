@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pipelines.effects import Effect, Side
 from pipelines.effects.kernel import address, derivative, reaction, reading, spring, torque_reading
 from pipelines.errors import InputError
-from pipelines.mechanics.leg import Geometry
+from pipelines.mechanics.geometry import Geometry
 from pipelines.model import Model, Term
 
 

@@ -11,7 +11,8 @@ from pipelines.dynamics.assembly import Assembly, assemble
 from pipelines.dynamics.mobility import masses
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
-from pipelines.mechanics.leg import Geometry, unrealizable
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.machine import machine_of
 from pipelines.mechanics.motion import geometry_of
 from pipelines.model import Model, model_from_parameters
 
@@ -48,7 +49,9 @@ def make_plant(model: Model, geometry: Geometry, joints: tuple[Joint, ...], run:
     lightest = np.linalg.eigvalsh(masses(assembly)[0]).min()
     if lightest <= 0:
         X = sum(term.values for term in model if isinstance(term.effect, RigidBody))
-        reasons = unrealizable(X, geometry) or [f"the mass matrix has the eigenvalue {lightest:.3g} kg·m²"]
+        reasons = machine_of(joints, geometry).mechanism.unrealizable(X, geometry) or [
+            f"the mass matrix has the eigenvalue {lightest:.3g} kg·m²"
+        ]
         raise InputError(
             f"the {run} parameters are no real leg: {'; '.join(reasons)}. A simulation of it would run away; "
             "identify again from motions that separate X1, X2 and X3 better, or choose another --run"
@@ -62,11 +65,9 @@ def plant_from_table(table: Table, run: str, default_geometry: Geometry | None =
     if not (bodies.isna() | (bodies == run)).any():
         known = ", ".join(sorted(set(bodies) - {"human"})) or "none"
         raise InputError(f"{table.path}: holds no model of the run {run}, only of: {known}; choose one with --run")
-    joints = joints_of(table.metadata)
-    if len(joints) != 2:
-        raise InputError(f"{table.path}: describes {len(joints)} joints, expected the leg's two")
-    geometry = geometry_of(table.metadata, default_geometry)
-    return make_plant(model_from_parameters(table.frame, run), geometry, joints, run)
+    joints, geometry = joints_of(table.metadata), geometry_of(table.metadata, default_geometry)
+    machine = machine_of(joints, geometry, table.path)
+    return make_plant(model_from_parameters(table.frame, run, machine), geometry, joints, run)
 
 
 def read_plant(path: Path | str, run: str, default_geometry: Geometry | None = None) -> Plant:

@@ -17,7 +17,7 @@ the compiled hooks. ``columns`` and ``observed`` evaluate the same kernels, so t
 
 from abc import ABC
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum, StrEnum
 from typing import Any, ClassVar
 
@@ -25,7 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.effects.kernel import columns_along, columns_along_with_memory, read_along
+from pipelines.mechanics.machine import THE_LEG, Machine
 from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.units import unit_at
 
 RUNS = ("exo_alone", "with_human")
 
@@ -65,6 +67,12 @@ class Parameter:
     """What it is where nobody says; a shape parameter that has one may be held in a fit."""
     forms: tuple[float, ...] = ()
     """Values that stand for the known members of a family of shapes; empty where the range is all there is."""
+    of_joint: bool = True
+    """False where its unit is not the joint's: the phase of a rhythm is an angle at a prismatic joint too."""
+
+    def at(self, machine: Machine, joint: str) -> "Parameter":
+        """Return the parameter as it is at a joint of a machine."""
+        return replace(self, unit=unit_at(machine.joint(joint).kind, self.unit)) if self.of_joint else self
 
 
 @dataclass(frozen=True)
@@ -75,6 +83,8 @@ class Effect(ABC):
     """The joint it acts at; None for an effect of the whole leg."""
     run: str | None = None
     """The only kind of run whose torque it explains; None for all it acts in."""
+    on: Machine = THE_LEG
+    """The machine that has it."""
 
     name: ClassVar[str]
     title: ClassVar[str]
@@ -86,9 +96,9 @@ class Effect(ABC):
     confirm: ClassVar[str]
     """How to make sure of it on the rig."""
     joints: ClassVar[tuple[str, ...] | None] = None
-    """The only joints that can have it; None for any."""
+    """The only joints that can have it, by their place in the mechanism; None for any."""
     absorbed: ClassVar[Mapping[str, str]] = {}
-    """Joints at which another parameter takes it up whole, and which."""
+    """Places of joints at which another parameter takes it up whole, and which."""
     whole_leg: ClassVar[bool] = False
     acts_in: ClassVar[tuple[str, ...]] = RUNS
     linear: ClassVar[tuple[Parameter, ...]] = ()
@@ -119,6 +129,18 @@ class Effect(ABC):
     spring: ClassVar[Callable[..., Any] | None] = None
     reading: ClassVar[Callable[..., Any] | None] = None
     torque_reading: ClassVar[Callable[..., Any] | None] = None
+
+    def __post_init__(self) -> None:
+        """Say in the machine's own units and equations what the class says of a leg."""
+        if self.on == THE_LEG:
+            return
+        if self.joint:
+            for role in ("linear", "shape", "reported"):
+                declared = getattr(type(self), role)
+                made = declared and tuple(p.at(self.on, self.joint) for p in declared)
+                object.__setattr__(self, role, made)
+        if self.name in THE_LEG.mechanism.reactions:
+            object.__setattr__(self, "reaction", self.on.mechanism.reactions.get(self.name))
 
     @property
     def fitted(self) -> tuple[Parameter, ...]:

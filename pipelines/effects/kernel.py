@@ -6,7 +6,7 @@ signature, so that the dynamics can hold a tuple of them without being compiled 
 """
 
 import warnings
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import njit, types
@@ -15,54 +15,28 @@ from numba.core.errors import NumbaExperimentalFeatureWarning
 from numba.core.types import float64, int64, void
 from numba.extending import intrinsic
 
+from pipelines.mechanics.instant import INSTANT, REACTION, Instant, vector
+from pipelines.mechanics.instant import reaction as reaction
+
 # Kernels as arguments are numba's "first-class functions", which it calls experimental; the
 # alternative, code generated for each model, costs seconds of compilation whenever a model changes.
 warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 
-_vector = float64[::1]
-
-
-class Instant(NamedTuple):
-    """The machine at one instant, every array (J,) and in SI units.
-
-    ``direction`` is the sign of the velocity where a joint moves; where it sticks, the forward
-    dynamics puts the value in [-1, 1] that holds it. Equations use it wherever theirs says sgn v.
-    ``load`` is the torque that the drive train transmits to the link, N·m.
-    """
-
-    t: float
-    q: np.ndarray
-    dq: np.ndarray
-    ddq: np.ndarray
-    direction: np.ndarray
-    load: np.ndarray
-
-
-INSTANT = types.NamedTuple([float64, _vector, _vector, _vector, _vector, _vector], Instant)
-
-REACTION = void(INSTANT, _vector, _vector, _vector, int64, _vector)
-"""reaction(at, state, values, geometry, joint, out): add the torque the drives must supply to ``out``."""
-
-DERIVATIVE = void(INSTANT, _vector, _vector, _vector, int64, _vector)
+DERIVATIVE = void(INSTANT, vector, vector, vector, int64, vector)
 """derivative(at, state, values, geometry, joint, out): write the rate of the effect's memory to ``out``.
 
 It may depend on the shape values, never on the linear ones: torque would then not be linear in them."""
 
-SPRING = float64(float64, float64, _vector)
+SPRING = float64(float64, float64, vector)
 """spring(twist, twist_rate, values): torque that a transmission passes from motor to link, N·m."""
 
-READING = void(_vector, _vector, int64)
+READING = void(vector, vector, int64)
 """reading(angle, values, joint): turn true angles into what the encoders say, in place."""
 
-TORQUE_READING = void(float64, _vector, _vector, int64, _vector)
+TORQUE_READING = void(float64, vector, vector, int64, vector)
 """torque_reading(t, torque, values, joint, state): turn what the drives deliver into what their sensors say, in place.
 
 Called once a sample, in order; ``state`` is the sensor's memory, all zero before the first."""
-
-
-def reaction(function):
-    """Compile a torque equation."""
-    return staticmethod(njit(REACTION, cache=True)(function))
 
 
 def derivative(function):
@@ -119,18 +93,18 @@ torque_reading_at = _kernel_at(TORQUE_READING)
 
 _table = float64[:, ::1]
 _columns = float64[:, :, ::1]
-_MOTION = (_vector, _table, _table, _table, _table, _vector)  # time, q, dq, ddq, load, geometry
+_MOTION = (vector, _table, _table, _table, _table, vector)  # time, q, dq, ddq, load, geometry
 # Signatures are spelt out so that one compilation serves every effect: the kernel is an argument.
-_ALONG = void(types.FunctionType(REACTION), _vector, int64, *_MOTION, _vector, _columns)
+_ALONG = void(types.FunctionType(REACTION), vector, int64, *_MOTION, vector, _columns)
 _ALONG_WITH_MEMORY = void(
-    types.FunctionType(REACTION), types.FunctionType(DERIVATIVE), _vector, int64, *_MOTION, _table, _table, _columns
+    types.FunctionType(REACTION), types.FunctionType(DERIVATIVE), vector, int64, *_MOTION, _table, _table, _columns
 )
 _READ_ALONG = void(
-    types.FunctionType(TORQUE_READING), _vector, int64, _vector, types.Array(float64, 3, "A"), _vector, _vector,
+    types.FunctionType(TORQUE_READING), vector, int64, vector, types.Array(float64, 3, "A"), vector, vector,
     types.Array(float64, 3, "A"),
 )  # fmt: skip
 
-_SWING_ALONG = void(types.FunctionType(SPRING), _vector, float64, float64, *(_vector,) * 4, _vector)
+_SWING_ALONG = void(types.FunctionType(SPRING), vector, float64, float64, *(vector,) * 4, vector)
 
 MEMORY_SUBSTEPS = 8
 """Steps per sample along a measured motion: a presliding state turns over within a few milliseconds."""

@@ -1,10 +1,7 @@
 """A segment whose centre of mass lies beside its axis."""
 
-from math import cos, sin
-
 from pipelines.effects.effect import Effect, Parameter, Parity, Side
-from pipelines.effects.kernel import reaction
-from pipelines.mechanics.leg import regressor_rows
+from pipelines.mechanics.leg import LEG
 
 
 class MassOffAxis(Effect):
@@ -25,13 +22,4 @@ class MassOffAxis(Effect):
     linear = (Parameter("mass_moment", "kg·m", "mass times distance forward of the axis", "Y", (-0.6, 0.6)),)
     inertial = True
     parity = Parity.EVEN
-
-    @reaction
-    def reaction(at, state, values, geometry, joint, out):
-        """Add the column of X4 (hip) or X3 (knee) a right angle ahead."""
-        q, leg = at.q, at.q[0] + at.q[1]
-        # sin and cos of an angle a right angle ahead are the cos and -sin of the angle.
-        hip, knee = regressor_rows(cos(q[0]), cos(leg), cos(q[1]), -sin(q[1]), at.dq, at.ddq, geometry[0], geometry[1])
-        column = 3 - joint
-        out[0] += values[0] * hip[column]
-        out[1] += values[0] * knee[column]
+    reaction = staticmethod(LEG.reactions["mass_off_axis"])

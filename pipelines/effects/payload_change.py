@@ -1,8 +1,7 @@
 """A mass that comes or goes during a run."""
 
 from pipelines.effects.effect import Effect, Parameter, Parity, Side
-from pipelines.effects.kernel import reaction
-from pipelines.mechanics.leg import regressor_at
+from pipelines.mechanics.leg import LEG
 
 
 class PayloadChange(Effect):
@@ -22,16 +21,4 @@ class PayloadChange(Effect):
     )
     inertial = True
     parity = Parity.EVEN
-
-    @reaction
-    def reaction(at, state, values, geometry, joint, out):
-        """Add what a point mass adds to X1..X4, once it is there."""
-        if at.t < values[1]:
-            return
-        moment, r, length = values[0], values[2], geometry[0]
-        hip, knee = regressor_at(at.q, at.dq, at.ddq, geometry[0], geometry[1])
-        if joint == 0:
-            out[0] += moment * (hip[3] + r * hip[0])
-        else:
-            out[0] += moment * (hip[2] + r * hip[1] + (r + length * length / r) * hip[0] + length / r * hip[3])
-            out[1] += moment * (knee[2] + r * knee[1])
+    reaction = staticmethod(LEG.reactions["payload_change"])

@@ -1,12 +1,16 @@
-"""The two rigid links of leg and exoskeleton together."""
+"""The rigid links of the machine, with all that moves along with them."""
 
 from pipelines.effects.effect import Effect, Parameter, Parity, Side
-from pipelines.effects.kernel import reaction
-from pipelines.mechanics.leg import regressor_at
+from pipelines.mechanics.leg import LEG
+from pipelines.mechanics.mechanism import Mechanism
+
+
+def _parameters(mechanism: Mechanism) -> tuple[Parameter, ...]:
+    return tuple(Parameter(p.name, p.unit, p.meaning, p.name, p.typical) for p in mechanism.parameters)
 
 
 class RigidBody(Effect):
-    """Inertia, Coriolis, centrifugal and gravity torque of the leg."""
+    """Inertia, Coriolis, centrifugal and gravity torque of the links; what is said here is the leg's."""
 
     name = "rigid_body"
     title = "Rigid body"
@@ -18,17 +22,10 @@ class RigidBody(Effect):
     whole_leg = True
     inertial = True
     parity = Parity.EVEN
-    linear = (
-        Parameter("X1", "kg·m²", "inertia about the hip with the knee at a right angle", "X1", (1.0, 12.0)),
-        Parameter("X2", "kg·m²", "inertia of the shank about the knee", "X2", (0.2, 4.0)),
-        Parameter("X3", "kg·m", "first moment of the shank about the knee", "X3", (0.5, 3.0)),
-        Parameter("X4", "kg·m", "first moment of the thigh, shank's mass at the knee, about the hip", "X4", (1.0, 8.0)),
-    )
+    linear = _parameters(LEG)
+    reaction = staticmethod(LEG.reactions["rigid_body"])
 
-    @reaction
-    def reaction(at, state, values, geometry, joint, out):
-        """Add A(q, dq, ddq) X."""
-        hip, knee = regressor_at(at.q, at.dq, at.ddq, geometry[0], geometry[1])
-        for i in range(4):
-            out[0] += hip[i] * values[i]
-            out[1] += knee[i] * values[i]
+    def __post_init__(self) -> None:
+        """Take the machine's own parameters."""
+        super().__post_init__()
+        object.__setattr__(self, "linear", _parameters(self.on.mechanism))

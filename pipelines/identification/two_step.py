@@ -30,7 +30,6 @@ from pipelines.estimation.long_run import Scores
 from pipelines.estimation.regression import regressions
 from pipelines.identification.runs import Runs, checked
 from pipelines.identification.validation import Validation, validate
-from pipelines.mechanics.leg import unrealizable
 from pipelines.mechanics.run import Run
 from pipelines.model import Model, Term, baseline
 
@@ -112,7 +111,7 @@ def identify(motions: Sequence[Run]) -> Identified:
 
 
 def _model(runs: Runs, kinds: Sequence[str]) -> Model:
-    effects = baseline(runs.motions[0].joints, kinds)
+    effects = baseline(runs.motions[0].machine, kinds)
     return Model(tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects))
 
 
@@ -155,7 +154,7 @@ def _collinear(rows: Compressed, fit: Fit, model: Model) -> list[str]:
 class _Second:
     estimate: Estimate
     carry: NDArray
-    """(4, friction) how the rigid body answers to the friction that was held."""
+    """(body, friction) how the rigid body answers to the friction that was held."""
     collinear: list[str]
 
 
@@ -241,8 +240,9 @@ def _one_step(runs: Runs, train: Mapping[str, Compressed], models: Mapping[str, 
 
 def _unrealizable(table: pd.DataFrame, runs: Runs) -> list[str]:
     bodies = table[table["effect"] == "rigid_body"]
+    mechanism, geometry = runs.motions[0].machine.mechanism, runs.motions[0].geometry
     sentences = []
     for run in bodies["run"].unique():
         X = bodies.loc[bodies["run"] == run, "value"].to_numpy(float)
-        sentences += [f"{run}: {reason}" for reason in unrealizable(X, runs.motions[0].geometry)]
+        sentences += [f"{run}: {reason}" for reason in mechanism.unrealizable(X, geometry)]
     return sentences

@@ -1,39 +1,21 @@
-"""The leg: hip and knee, two rigid links, and the paper's four inertial parameters.
+"""The leg: two revolute joints in series, two rigid links, and the paper's four inertial parameters.
 
-The regressor is the only place where the equations of motion stand; mass matrix, Coriolis
-matrix and gravity are read off it. Angles: hip from the downward vertical, knee relative to
-the thigh, flexion negative. The paper prints several of these formulas with slips; the mended
-forms and a test for each are in ``docs/errata.md``.
+The regressor is the only place where the equations of motion stand. Angles: the first (hip) from the downward
+vertical, the second (knee) relative to the first link, flexion negative: any double pendulum is a leg. The paper
+prints several of these formulas with slips; the mended forms and a test for each are in ``docs/errata.md``.
 """
 
-from dataclasses import asdict, dataclass
 from math import cos, sin
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.instant import REACTION
+from pipelines.mechanics.mechanism import Inertial, Mechanism
+
 INERTIAL = ("X1", "X2", "X3", "X4")
-
-
-@dataclass(frozen=True)
-class Geometry:
-    """Lengths and gravity that are measured, not identified. SI units."""
-
-    thigh_length_m: float = 0.38952
-    gravity_m_s2: float = 9.8
-    thigh_cuff_distance_m: float | None = None
-    """Hip axis to thigh cuff; None where there are no cuff forces."""
-    shank_cuff_distance_m: float | None = None
-    """Knee axis to shank cuff; None where there are no cuff forces."""
-
-    def metadata(self) -> dict[str, float]:
-        """Return what a file says of it; lengths that are not known are left out."""
-        return {key: value for key, value in asdict(self).items() if value is not None}
-
-    def array(self) -> NDArray:
-        """Return what compiled kernels receive as ``geometry``: thigh length (m), gravity (m/s²)."""
-        return np.array([self.thigh_length_m, self.gravity_m_s2])
 
 
 @njit(cache=True)
@@ -63,59 +45,49 @@ def regressor_at(q, dq, ddq, thigh_length, gravity):
 
 
 @njit(cache=True)
-def regressor(q, dq, ddq, thigh_length, gravity):
-    """Rigid-body regressor of a whole motion.
-
-    Parameters
-    ----------
-    q, dq, ddq : (n, 2) C-contiguous arrays
-        Angle (rad), velocity (rad/s), acceleration (rad/s²) of hip and knee.
-    thigh_length, gravity : float
-        m and m/s².
-
-    Returns
-    -------
-    (n, 2, 4) array
-        Torque in N·m per unit of X1, X2 (kg·m²), X3, X4 (kg·m).
-    """
+def _along(q, dq, ddq, geometry):
+    """Rigid-body regressor of a whole motion, (n, 2, 4)."""
     Y = np.empty((q.shape[0], 2, 4))
     for k in range(q.shape[0]):
-        rows = regressor_at(q[k], dq[k], ddq[k], thigh_length, gravity)
+        rows = regressor_at(q[k], dq[k], ddq[k], geometry[0], geometry[1])
         for j in range(2):
             for i in range(4):
                 Y[k, j, i] = rows[j][i]
     return Y
 
 
-def _torque(q, dq, ddq, X, geometry: Geometry, gravity: float) -> NDArray:
-    q, dq, ddq = (np.array(v, dtype=float)[np.newaxis] for v in (q, dq, ddq))
-    return regressor(q, dq, ddq, geometry.thigh_length_m, gravity)[0] @ np.asarray(X, dtype=float)
+@njit(REACTION, cache=True)
+def _rigid_body(at, state, values, geometry, joint, out):
+    """Add A(q, dq, ddq) X."""
+    hip, knee = regressor_at(at.q, at.dq, at.ddq, geometry[0], geometry[1])
+    for i in range(4):
+        out[0] += hip[i] * values[i]
+        out[1] += knee[i] * values[i]
 
 
-def mass_matrix(q, X, geometry: Geometry) -> NDArray:
-    """M(q), (2, 2) kg·m²: the torque at unit acceleration of each joint (Walker and Orin, 1982)."""
-    still = np.zeros(2)
-    return np.column_stack([_torque(q, still, unit, X, geometry, 0.0) for unit in np.eye(2)])
+@njit(REACTION, cache=True)
+def _mass_off_axis(at, state, values, geometry, joint, out):
+    """Add the column of X4 (hip) or X3 (knee) a right angle ahead."""
+    q, leg = at.q, at.q[0] + at.q[1]
+    # sin and cos of an angle a right angle ahead are the cos and -sin of the angle.
+    hip, knee = regressor_rows(cos(q[0]), cos(leg), cos(q[1]), -sin(q[1]), at.dq, at.ddq, geometry[0], geometry[1])
+    column = 3 - joint
+    out[0] += values[0] * hip[column]
+    out[1] += values[0] * knee[column]
 
 
-def coriolis_matrix(q, dq, X, geometry: Geometry) -> NDArray:
-    """C(q, dq), (2, 2) N·m·s/rad, in Christoffel form, so that dM/dt - 2 C is skew.
-
-    The velocity torque is a quadratic form in dq; its polarisation is the Christoffel matrix.
-    """
-    still = np.zeros(2)
-    dq = np.asarray(dq, dtype=float)
-
-    def quadratic(velocity):
-        return _torque(q, velocity, still, X, geometry, 0.0)
-
-    return np.column_stack([0.5 * (quadratic(dq + unit) - quadratic(dq) - quadratic(unit)) for unit in np.eye(2)])
-
-
-def gravity_torque(q, X, geometry: Geometry) -> NDArray:
-    """G(q), (2,) N·m: the torque that holds the leg still."""
-    still = np.zeros(2)
-    return _torque(q, still, still, X, geometry, geometry.gravity_m_s2)
+@njit(REACTION, cache=True)
+def _payload_change(at, state, values, geometry, joint, out):
+    """Add what a point mass adds to X1..X4, once it is there."""
+    if at.t < values[1]:
+        return
+    moment, r, length = values[0], values[2], geometry[0]
+    hip, knee = regressor_at(at.q, at.dq, at.ddq, geometry[0], geometry[1])
+    if joint == 0:
+        out[0] += moment * (hip[3] + r * hip[0])
+    else:
+        out[0] += moment * (hip[2] + r * hip[1] + (r + length * length / r) * hip[0] + length / r * hip[3])
+        out[1] += moment * (knee[2] + r * knee[1])
 
 
 def potential_energy(q, X, geometry: Geometry) -> float:
@@ -124,11 +96,8 @@ def potential_energy(q, X, geometry: Geometry) -> float:
     return -geometry.gravity_m_s2 * float(X[3] * cos(q1) + X[2] * cos(q1 + q2))
 
 
-def unrealizable(X, geometry: Geometry) -> list[str]:
-    """Say which conditions of a real leg the parameters break; empty when none.
-
-    M(q) > 0 for every knee angle if and only if X2 > 0 and X2 (X1 - X2) > (L1 X3)².
-    """
+def _broken(X: NDArray, geometry: Geometry) -> list[str]:
+    """M(q) > 0 for every knee angle if and only if X2 > 0 and X2 (X1 - X2) > (L1 X3)²."""
     X1, X2, X3, _ = X
     broken = []
     if X2 <= 0:
@@ -139,6 +108,24 @@ def unrealizable(X, geometry: Geometry) -> list[str]:
             f"{(geometry.thigh_length_m * X3) ** 2:.4g} kg²·m⁴: the mass matrix is not positive definite"
         )
     return broken
+
+
+LEG = Mechanism(
+    name="leg",
+    title="two revolute joints in series, whose axes are parallel: a leg, any double pendulum",
+    kinds=("revolute", "revolute"),
+    places=("hip", "knee"),
+    has_gravity=None,
+    parameters=(
+        Inertial("X1", "kg·m²", "inertia about the hip with the knee at a right angle", (1.0, 12.0)),
+        Inertial("X2", "kg·m²", "inertia of the shank about the knee", (0.2, 4.0)),
+        Inertial("X3", "kg·m", "first moment of the shank about the knee", (0.5, 3.0)),
+        Inertial("X4", "kg·m", "first moment of the thigh, shank's mass at the knee, about the hip", (1.0, 8.0)),
+    ),
+    along=_along,
+    reactions={"rigid_body": _rigid_body, "mass_off_axis": _mass_off_axis, "payload_change": _payload_change},
+    broken=_broken,
+)
 
 
 def cuff_torque(thigh, shank, q, geometry: Geometry) -> NDArray:

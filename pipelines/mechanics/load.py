@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.mechanics.leg import Geometry, regressor
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.mechanism import Mechanism
 
 STEP = 1e-4
 """rad and rad/s of the difference quotients: the torque bends over tenths of a radian."""
@@ -33,14 +34,13 @@ class Load(NamedTuple):
         return Load(np.sum(direction * self.torque, axis=1), *slopes)
 
 
-def load_along(q: NDArray, dq: NDArray, ddq: NDArray, X: NDArray, geometry: Geometry) -> Load:
-    """Return the load of a body with inertial parameters ``X`` (4,) along a motion (n, J)."""
+def load_along(mechanism: Mechanism, q: NDArray, dq: NDArray, ddq: NDArray, X: NDArray, geometry: Geometry) -> Load:
+    """Return the load of a body with inertial parameters ``X`` (p,) along a motion (n, J)."""
     n, J = q.shape
     slopes = np.empty((3, n, J, J))
 
     def torque(q: NDArray, dq: NDArray, ddq: NDArray) -> NDArray:
-        q, dq, ddq = (np.ascontiguousarray(state) for state in (q, dq, ddq))
-        return regressor(q, dq, ddq, geometry.thigh_length_m, geometry.gravity_m_s2) @ X
+        return mechanism.regressor(q, dq, ddq, geometry) @ X
 
     here = torque(q, dq, ddq)
     for j, unit in enumerate(np.eye(J)):

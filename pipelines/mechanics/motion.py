@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from pipelines.contracts.joints import joints_of
 from pipelines.contracts.table import Table
-from pipelines.mechanics.leg import Geometry, cuff_torque
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.leg import cuff_torque
 from pipelines.mechanics.load import Load, load_along
+from pipelines.mechanics.machine import Machine, machine_of
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 
 LOAD_CUTOFF_HZ = 5.0
@@ -61,15 +63,20 @@ class Motion:
     limb_load: NDArray | None = None
     """(n, J) N·m of the machine on the wearer's limb, where a fit has estimated it."""
     body: NDArray | None = None
-    """(4,) inertial parameters of all that hangs behind the drive trains, where a fit has estimated them."""
+    """(p,) inertial parameters of all that hangs behind the drive trains, where a fit has estimated them."""
     limb_body: NDArray | None = None
-    """(4,) the same of the wearer's limb alone."""
+    """(p,) the same of the wearer's limb alone."""
     file: str = ""
     metadata: dict[str, Any] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """Return the number of samples."""
         return len(self.time)
+
+    @cached_property
+    def machine(self) -> Machine:
+        """The machine that moved: its joints tell."""
+        return machine_of(joints_of(self.metadata), self.geometry, self.file)
 
     @property
     def joint_metadata(self) -> list[dict[str, str]]:
@@ -114,12 +121,15 @@ class Motion:
     @cached_property
     def link_swing(self) -> Load | None:
         """What hangs behind the drive trains as a load that can swing; None where no fit has estimated it."""
-        return None if self.body is None else load_along(self.q, self.dq, self.ddq, self.body, self.geometry)
+        return None if self.body is None else self._load_of(self.body)
 
     @cached_property
     def limb_swing(self) -> Load | None:
         """The wearer's limb as a load that can swing; None where no fit has estimated it."""
-        return None if self.limb_body is None else load_along(self.q, self.dq, self.ddq, self.limb_body, self.geometry)
+        return None if self.limb_body is None else self._load_of(self.limb_body)
+
+    def _load_of(self, body: NDArray) -> Load:
+        return load_along(self.machine.mechanism, self.q, self.dq, self.ddq, body, self.geometry)
 
     @property
     def _load_cutoff_hz(self) -> float:
@@ -156,9 +166,13 @@ class Piece(NamedTuple):
 
 
 def geometry_of(metadata: dict[str, Any], default: Geometry | None = None) -> Geometry:
-    """Return the recording's geometry; what it does not say comes from ``default``."""
+    """Return the recording's geometry; what it does not say comes from ``default``.
+
+    Without one, gravity acts on revolute joints, and a prismatic joint is level.
+    """
     known = {k: v for k, v in metadata.get("geometry", {}).items() if k in Geometry.__dataclass_fields__}
-    return replace(default or Geometry(), **known)
+    slides = all(joint.kind == "prismatic" for joint in joints_of(metadata))
+    return replace(default or (Geometry(gravity_m_s2=0.0) if slides else Geometry()), **known)
 
 
 def motion_from_table(table: Table, default_geometry: Geometry | None = None) -> Motion:

@@ -8,8 +8,8 @@ from pipelines.contracts import MOTION, RECORDING, contract_of
 from pipelines.contracts.provenance import sha256
 from pipelines.contracts.table import Rows
 from pipelines.errors import InputError
+from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.kinematics import filtered, motion_table
-from pipelines.mechanics.leg import Geometry
 from pipelines.mechanics.motion import Motion, motion_from_table
 from pipelines.mechanics.run import StoredRun
 from pipelines.settings.filter import FilterSettings

@@ -10,7 +10,8 @@ import numpy as np
 
 from pipelines.contracts.table import Rows, Table
 from pipelines.contracts.windows import windows
-from pipelines.mechanics.leg import Geometry
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.motion import Motion, Piece, motion_from_table
 
 WINDOW = 2**16
@@ -29,6 +30,8 @@ class Run(Protocol):
     def sample_rate_hz(self) -> float: ...  # noqa: D102
     @property
     def joints(self) -> tuple[str, ...]: ...  # noqa: D102
+    @property
+    def machine(self) -> Machine: ...  # noqa: D102
     @property
     def geometry(self) -> Geometry: ...  # noqa: D102
     @property
@@ -77,6 +80,11 @@ class StoredRun:
     def joints(self) -> tuple[str, ...]:
         """Their names."""
         return self._facts.joints
+
+    @property
+    def machine(self) -> Machine:
+        """The machine that moved."""
+        return self._facts.machine
 
     @property
     def geometry(self) -> Geometry:

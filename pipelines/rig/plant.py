@@ -14,7 +14,8 @@ from pipelines.effects.friction import Friction
 from pipelines.effects.kernel import Instant, reaction_at
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError, SettingsError
-from pipelines.mechanics.leg import Geometry, unrealizable
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.leg import LEG
 from pipelines.model import Model, Term, effect_named, term_from
 from pipelines.rig.cuffs import cuff_forces
 from pipelines.settings.plant import PlantEffect, PlantSettings
@@ -174,7 +175,7 @@ def _model(settings: PlantSettings, geometry: Geometry, effects: Iterable[Term])
     """Return the whole machine's model, the person a rigid body of their own."""
     exo, human = np.array(settings.exo_inertial), np.array(settings.human_inertial)
     for name, X in (("exo_inertial", exo), ("exo_inertial + human_inertial", exo + human)):
-        if broken := unrealizable(X, geometry):
+        if broken := LEG.unrealizable(X, geometry):
             raise SettingsError(f"plant.{name}: no real leg has these: {broken[0]}; correct them")
     frictions = zip(JOINTS, settings.coulomb_nm, settings.viscous_nm_s_rad, strict=True)
     return Model(

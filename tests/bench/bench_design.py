@@ -16,7 +16,7 @@ from pipelines.design.fitness import cost, costs, expand, problem, workspace
 from pipelines.design.search import basis_of, spread_of
 from pipelines.design.swarm import Swarm, assess, fly
 from pipelines.mechanics.fourier import FourierTrajectory
-from pipelines.mechanics.leg import Geometry
+from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.limits import bounds_array
 from pipelines.settings.design import DesignSettings, JointBounds
 from tests.bench.report import Row, show

@@ -21,7 +21,7 @@ from pipelines.dynamics.tracking import track
 from pipelines.effects.friction import Friction
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.mechanics.gait import gait
-from pipelines.mechanics.leg import Geometry
+from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.motion import Motion
 from pipelines.model import Model, Term
 from pipelines.settings.simulate import SimulateSettings

@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 
-from pipelines.mechanics.leg import Geometry, cuff_torque, mass_matrix, potential_energy
-from pipelines.mechanics.leg import regressor as exoid_regressor
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.leg import LEG, cuff_torque, potential_energy
 from tests.blind import loop
 from tests.blind.body import PAYLOAD_INERTIA, Body, Payload, Segment
 from tests.blind.excitation import FASTEST, HIGHEST, LOWEST, STEEPEST, random_excitation
@@ -53,7 +53,8 @@ def test_free_swing_keeps_its_energy():
     X = PERSON.leg.inertial()
     q, dq = free_swing([0.8, -1.2], 2000)
     energy = [
-        0.5 * v @ mass_matrix(x, X, geometry) @ v + potential_energy(x, X, geometry) for x, v in zip(q, dq, strict=True)
+        0.5 * v @ LEG.mass_matrix(x, X, geometry) @ v + potential_energy(x, X, geometry)
+        for x, v in zip(q, dq, strict=True)
     ]
     swing = potential_energy([0.8, -1.2], X, geometry) - potential_energy([0.0, 0.0], X, geometry)
     assert np.ptp(energy) < 5e-3 * swing
@@ -61,7 +62,7 @@ def test_free_swing_keeps_its_energy():
 
 def test_small_swings_have_the_period_of_the_linear_modes():
     X, length, g = PERSON.leg.inertial(), PERSON.thigh_length, PERSON.leg.gravity
-    M = mass_matrix([0.0, 0.0], X, Geometry(length, g))
+    M = LEG.mass_matrix([0.0, 0.0], X, Geometry(length, g))
     K = g * np.array([[X[3] + X[2], X[2]], [X[2], X[2]]])
     squares, shapes = eigh(K, M)
     for square, shape in zip(squares, shapes.T, strict=True):
@@ -75,7 +76,7 @@ def test_small_swings_have_the_period_of_the_linear_modes():
 def test_mujoco_and_exoid_have_the_same_equations_of_motion(rig, excitation):
     q, dq, ddq = excitation.at(np.linspace(0.0, 10.0, 500))
     leg = rig.leg(run_of("with_human"))
-    Y = exoid_regressor(q, dq, ddq, leg.length, leg.gravity)
+    Y = LEG.regressor(q, dq, ddq, Geometry(leg.length, leg.gravity))
     assert_allclose(Body(leg).inverse(q, dq, ddq), Y @ leg.inertial(), atol=1e-9)
 
 

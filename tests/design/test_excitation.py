@@ -12,7 +12,7 @@ from pipelines.design.excitation import design
 from pipelines.design.quality import paper_model, quality, regressor, standard_errors
 from pipelines.errors import InputError
 from pipelines.mechanics.fourier import FourierTrajectory
-from pipelines.mechanics.leg import Geometry
+from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.limits import margins
 from pipelines.mechanics.trajectory import read_trajectory
 from pipelines.settings import datasets

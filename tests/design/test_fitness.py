@@ -9,7 +9,7 @@ from pipelines.design.quality import quality, regressor
 from pipelines.design.search import basis_of, spread_of
 from pipelines.design.sines import sines
 from pipelines.mechanics.fourier import FourierTrajectory
-from pipelines.mechanics.leg import Geometry
+from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.limits import bounds_array
 from pipelines.settings.design import DesignSettings, JointBounds
 

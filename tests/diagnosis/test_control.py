@@ -15,7 +15,7 @@ from pipelines.effects.friction import Friction
 from pipelines.effects.parallel_spring import ParallelSpring
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.mechanics.gait import gait
-from pipelines.mechanics.leg import Geometry
+from pipelines.mechanics.geometry import Geometry
 from pipelines.model import Model, Term
 from pipelines.settings.plant import PlantSettings
 from tests.diagnosis.sessions import session

@@ -7,13 +7,13 @@ from pipelines.dynamics.assembly import assemble
 from pipelines.dynamics.pd_loop import follow, loop_at_rest, make_drives
 from pipelines.effects.friction import Friction
 from pipelines.effects.rigid_body import RigidBody
-from pipelines.mechanics.leg import Geometry
+from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.motion import Motion
 from pipelines.model import Model, Term
 from pipelines.signals.low_pass import derivative, low_pass
 
 RATE_HZ, CUTOFF_HZ = 200.0, 15.0
-LEG = Geometry()
+GEOMETRY = Geometry()
 
 
 @pytest.fixture(scope="session")
@@ -31,7 +31,7 @@ def record(model: Model, seconds: float = 12.0) -> Motion:
             -0.9 + 0.4 * np.sin(1.9 * time + 1.0) + 0.1 * np.cos(3.8 * time),
         ]
     )
-    a = assemble(model, LEG)
+    a = assemble(model, GEOMETRY)
     drives = make_drives(
         np.array([1500.0, 600.0]), np.array([120.0, 40.0]), np.array([200.0] * 2), np.zeros(2), 1000.0, RATE_HZ
     )

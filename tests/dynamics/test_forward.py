@@ -11,11 +11,12 @@ from pipelines.effects.joint_elasticity import JointElasticity
 from pipelines.effects.presliding_hysteresis import PreslidingHysteresis
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
-from pipelines.mechanics.leg import Geometry, gravity_torque, mass_matrix, potential_energy
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.leg import LEG, potential_energy
 from pipelines.model import Model, Term
 
 X = np.array([2.6, 0.63, 1.78, 5.7])
-LEG = Geometry()
+GEOMETRY = Geometry()
 BODY = Term(RigidBody(), X)
 
 
@@ -27,7 +28,7 @@ class Swing:
     """A leg let go at angles ``q`` under constant drive torque."""
 
     def __init__(self, *terms, q, torque=(0.0, 0.0), h=2e-4):
-        self.a = assemble(Model(terms), LEG)
+        self.a = assemble(Model(terms), GEOMETRY)
         self.state = resting_state(np.array(q))
         self.memory = np.zeros(memory_size(self.a))
         self.load = np.zeros(2)
@@ -43,7 +44,9 @@ class Swing:
 
 
 def energy(state):
-    return 0.5 * state[DQ] @ mass_matrix(state[Q], X, LEG) @ state[DQ] + potential_energy(state[Q], X, LEG)
+    return 0.5 * state[DQ] @ LEG.mass_matrix(state[Q], X, GEOMETRY) @ state[DQ] + potential_energy(
+        state[Q], X, GEOMETRY
+    )
 
 
 def test_a_free_swing_keeps_its_energy():
@@ -63,7 +66,7 @@ def test_viscous_friction_only_takes_energy_until_the_leg_hangs():
 
 def test_a_joint_sticks_while_gravity_stays_below_its_dry_friction():
     q = np.array([0.05, -0.05])
-    assert np.all(np.abs(gravity_torque(q, X, LEG)) < 4.0)
+    assert np.all(np.abs(LEG.gravity_torque(q, X, GEOMETRY)) < 4.0)
     swing = Swing(BODY, *friction(4.0, 1.0), q=q).go(2.0)
     assert_allclose(swing.state[Q], q, atol=1e-9)
     assert_allclose(swing.state[DQ], 0.0, atol=1e-9)
@@ -104,7 +107,7 @@ def test_a_spring_at_rest_twists_by_the_load_over_its_stiffness():
     swing = Swing(BODY, *friction(40.0, 1.0), spring, q=(0.3, -0.8)).go(8.0)
     twist = swing.state[THETA, 1] - swing.state[Q, 1]
     assert_allclose(swing.state[DTHETA], 0.0, atol=1e-6)
-    assert twist == pytest.approx(gravity_torque(swing.state[Q], X, LEG)[1] / 500.0, rel=1e-3)
+    assert twist == pytest.approx(LEG.gravity_torque(swing.state[Q], X, GEOMETRY)[1] / 500.0, rel=1e-3)
 
 
 def test_presliding_holds_like_a_spring_before_it_slides():
@@ -116,11 +119,11 @@ def test_presliding_holds_like_a_spring_before_it_slides():
     knee = Term(Friction("knee"), np.array([0.0, 40.0]))
     swing = Swing(BODY, hip_locked, knee, dahl, q=(0.0, 0.0), torque=(0, push)).go(6.0)
     # Gravity of the shank adds its own stiffness beside the contact's.
-    stiffness = level / travel + LEG.gravity_m_s2 * X[2]
+    stiffness = level / travel + GEOMETRY.gravity_m_s2 * X[2]
     assert swing.state[Q, 1] == pytest.approx(push / stiffness, rel=0.06)
 
 
 def test_two_transmissions_at_one_joint_are_refused():
     spring = Term(JointElasticity("knee"), np.array([500.0]))
     with pytest.raises(InputError, match="knee: joint_elasticity is a second transmission; a joint has one at most"):
-        assemble(Model((BODY, spring, spring)), LEG)
+        assemble(Model((BODY, spring, spring)), GEOMETRY)

@@ -12,11 +12,12 @@ from pipelines.effects.encoder_offset import EncoderOffset
 from pipelines.effects.friction import Friction
 from pipelines.effects.joint_elasticity import JointElasticity
 from pipelines.effects.rigid_body import RigidBody
-from pipelines.mechanics.leg import Geometry, coriolis_matrix, gravity_torque, mass_matrix
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.leg import LEG
 from pipelines.model import Model, Term
 
 X = np.array([10.3016, 3.0157, 2.2664, 5.5354])
-LEG = Geometry()
+GEOMETRY = Geometry()
 IDEAL = Encoder(np.zeros((0, 2)), 0.0, 1.0)
 PERIOD = 1e-3
 
@@ -40,7 +41,7 @@ def follow(model: Model, c: RbfController, seconds=2.0, encoder=IDEAL, substeps=
     half_steps = np.arange(2 * round(seconds / PERIOD) * substeps + 1) * PERIOD / (2 * substeps)
     reference = np.array([wave(t) for t in half_steps])
     push = np.outer(push_nm * np.sin(2 * half_steps), [1, 1])
-    return follow_with_rbf(assemble(model, LEG), c, encoder, reference, push, PERIOD, np.zeros(2), substeps)
+    return follow_with_rbf(assemble(model, GEOMETRY), c, encoder, reference, push, PERIOD, np.zeros(2), substeps)
 
 
 def by_scipy(c: RbfController, seconds: float):
@@ -57,8 +58,8 @@ def by_scipy(c: RbfController, seconds: float):
 
     def rates(t, state):
         q, dq, r, H, torque = parts(t, state)
-        rest = coriolis_matrix(q, dq, X, LEG) @ dq + gravity_torque(q, X, LEG) + 5.0 * dq
-        ddq = np.linalg.solve(mass_matrix(q, X, LEG), torque - 2 * np.sin(2 * t) - rest)
+        rest = LEG.coriolis_matrix(q, dq, X, GEOMETRY) @ dq + LEG.gravity_torque(q, X, GEOMETRY) + 5.0 * dq
+        ddq = np.linalg.solve(LEG.mass_matrix(q, X, GEOMETRY), torque - 2 * np.sin(2 * t) - rest)
         return np.concatenate([dq, ddq, (c.adaptation_gain * H * r[:, np.newaxis]).ravel()])
 
     at = np.arange(round(seconds / PERIOD) + 1) * PERIOD
@@ -106,7 +107,7 @@ def test_encoder_counts_cost_torque_ripple_and_hardly_any_accuracy():
 
 def test_an_elastic_knee_is_followed_where_the_step_is_as_short_as_its_motor_needs():
     model = body(Term(JointElasticity("knee"), np.array([2000.0])))
-    needed = substeps_for(assemble(model, LEG), 200.0, PERIOD)
+    needed = substeps_for(assemble(model, GEOMETRY), 200.0, PERIOD)
     assert needed > 1
     run = follow(model, controller(), substeps=needed)
     wanted = np.array([wave(k * PERIOD)[0] for k in range(len(run.angle))])
@@ -114,9 +115,9 @@ def test_an_elastic_knee_is_followed_where_the_step_is_as_short_as_its_motor_nee
 
 
 def test_mobility_is_the_inverse_of_the_mass_where_joints_are_rigid():
-    mass, mobility = masses(assemble(body(), LEG))
+    mass, mobility = masses(assemble(body(), GEOMETRY))
     assert_allclose(mass @ mobility, np.broadcast_to(np.eye(2), mass.shape), atol=1e-12)
-    assert_allclose(mass[0], mass_matrix(np.zeros(2), X, LEG))
+    assert_allclose(mass[0], LEG.mass_matrix(np.zeros(2), X, GEOMETRY))
 
 
 @pytest.mark.parametrize("substeps", [2, 4])

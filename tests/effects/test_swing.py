@@ -13,7 +13,7 @@ from pipelines.effects.joint_elasticity import JointElasticity
 from pipelines.effects.kernel import swing_along
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.effects.swing import behind_spring
-from pipelines.mechanics.leg import Geometry
+from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.motion import Motion
 from pipelines.model import Model, Term
 

@@ -46,7 +46,7 @@ def left(regressor, torque, noise, rows):
 def test_only_one_filter_for_both_sides_away_from_reversals_leaves_the_noise_itself(noiseless_motions, method):
     motion = noiseless_motions[0]
     noise = coloured(len(motion), motion.sample_rate_hz)
-    effects = baseline(motion.joints, ("exo_alone",))
+    effects = baseline(motion.machine, ("exo_alone",))
     regressor = Model(tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects)).regressor(motion)
     smooth, kept, whole = method(motion)
     valid = whole(np.column_stack([motion.valid, motion.valid]))

@@ -11,7 +11,7 @@ from pipelines.contracts import RECORDING, parquet
 from pipelines.identification import figures, identify
 from pipelines.identification.validation import residuals
 from pipelines.mechanics import kinematics, run
-from pipelines.mechanics.leg import Geometry
+from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.read import read_motions, read_runs
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record

@@ -75,9 +75,10 @@ def test_the_formula_for_independent_samples_covers_far_less(noiseless_motions, 
 def covers_as_if_independent(motions, truth):
     from pipelines.estimation.least_squares import compress, solve
     from pipelines.estimation.regression import regressions
+    from pipelines.mechanics.machine import THE_LEG
     from pipelines.model import Model, Term, baseline
 
-    effects = baseline(("hip", "knee"), ("exo_alone",))
+    effects = baseline(THE_LEG, ("exo_alone",))
     model = Model(tuple(Term(e, np.zeros(len(e.linear))) for e in effects))
     estimate = solve(compress(regressions(motions[0], model)), ["?"] * 8)
     return np.abs(estimate.values - truth) < 1.96 * np.sqrt(np.diag(estimate.sensitivity))

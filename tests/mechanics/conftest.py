@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from pipelines.mechanics.leg import Geometry
+from pipelines.mechanics.geometry import Geometry
 
 GEOMETRY = Geometry()
 STEP = 1e-5

@@ -8,14 +8,8 @@ from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 
 from pipelines.mechanics.fourier import FourierTrajectory
-from pipelines.mechanics.leg import (
-    Geometry,
-    coriolis_matrix,
-    gravity_torque,
-    mass_matrix,
-    potential_energy,
-    regressor_at,
-)
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.leg import LEG, potential_energy, regressor_at
 from pipelines.mechanics.trajectory import read_trajectory
 from pipelines.settings import datasets
 
@@ -49,12 +43,12 @@ def energy_drift(gravity):
     def rates(_, state):
         q, dq = state[:2], state[2:]
         ddq = np.linalg.solve(
-            mass_matrix(q, TABLE3, GEOMETRY), -coriolis_matrix(q, dq, TABLE3, GEOMETRY) @ dq - gravity(q)
+            LEG.mass_matrix(q, TABLE3, GEOMETRY), -LEG.coriolis_matrix(q, dq, TABLE3, GEOMETRY) @ dq - gravity(q)
         )
         return np.concatenate([dq, ddq])
 
     states = solve_ivp(rates, (0, 3), [1.2, -0.8, 0, 0], rtol=1e-9, atol=1e-9, max_step=0.02).y.T
-    kinetic = np.array([0.5 * s[2:] @ mass_matrix(s[:2], TABLE3, GEOMETRY) @ s[2:] for s in states])
+    kinetic = np.array([0.5 * s[2:] @ LEG.mass_matrix(s[:2], TABLE3, GEOMETRY) @ s[2:] for s in states])
     energy = kinetic + [potential_energy(s[:2], TABLE3, GEOMETRY) for s in states]
     return np.ptp(energy), potential_energy(states[0, :2], TABLE3, GEOMETRY) - potential_energy(
         [0, 0], TABLE3, GEOMETRY
@@ -62,7 +56,7 @@ def energy_drift(gravity):
 
 
 def test_a_free_swing_keeps_its_energy_with_the_thighs_gravity_at_the_hip_angle_only():
-    drift, swing = energy_drift(lambda q: gravity_torque(q, TABLE3, GEOMETRY))
+    drift, swing = energy_drift(lambda q: LEG.gravity_torque(q, TABLE3, GEOMETRY))
     assert drift < 1e-4 * swing
     drift, swing = energy_drift(printed_gravity)
     assert drift > swing
@@ -80,9 +74,9 @@ def test_the_hips_inertia_holds_the_shanks_centre_at_the_shanks_mass(segments):
 def test_the_printed_coriolis_matrix_is_not_the_one_that_takes_no_energy(states):
     worst = 0.0
     for q, dq, _ in states:
-        mended = coriolis_matrix(q, dq, TABLE3, GEOMETRY)
+        mended = LEG.coriolis_matrix(q, dq, TABLE3, GEOMETRY)
         assert_allclose(printed_coriolis(q, dq) @ dq, mended @ dq, atol=1e-12)
-        ahead, behind = (mass_matrix(q + sign * 1e-6 * dq, TABLE3, GEOMETRY) for sign in (1, -1))
+        ahead, behind = (LEG.mass_matrix(q + sign * 1e-6 * dq, TABLE3, GEOMETRY) for sign in (1, -1))
         rate = (ahead - behind) / 2e-6
         symmetric = [rate - 2 * C + (rate - 2 * C).T for C in (mended, printed_coriolis(q, dq))]
         assert np.abs(symmetric[0]).max() < 1e-8
@@ -128,8 +122,8 @@ def test_row_two_of_the_regressor_has_eight_columns_of_which_the_last_is_the_kne
         A25 = A26 = 0.0
         A27, A28 = np.sign(dq[1]), dq[1]
         parameters = np.append(TABLE3, FRICTION)
-        torque = mass_matrix(q, TABLE3, GEOMETRY) @ ddq + coriolis_matrix(q, dq, TABLE3, GEOMETRY) @ dq
-        torque = torque + gravity_torque(q, TABLE3, GEOMETRY)
+        torque = LEG.mass_matrix(q, TABLE3, GEOMETRY) @ ddq + LEG.coriolis_matrix(q, dq, TABLE3, GEOMETRY) @ dq
+        torque = torque + LEG.gravity_torque(q, TABLE3, GEOMETRY)
         knee_torque = torque[1] + FRICTION[2] * np.sign(dq[1]) + FRICTION[3] * dq[1]
         mended = np.array([A21, A22, A23, A24, A25, A26, A27, A28])
         printed = np.array([A21, A21, A22, A23, A24, A25, A26, A27])

@@ -4,7 +4,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from pipelines.contracts import RECORDING
 from pipelines.errors import SettingsError
-from pipelines.mechanics.leg import cuff_torque, regressor
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.leg import LEG, cuff_torque
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
 from pipelines.settings.plant import PlantEffect, PlantSettings
@@ -28,7 +29,7 @@ def test_the_drives_deliver_what_the_true_parameters_ask_for(silent, excitation,
     measured = move(Plant(silent, run), excitation)
     X = np.array(silent.exo_inertial) + (run == "with_human") * np.array(silent.human_inertial)
     q, dq, ddq = (np.ascontiguousarray(measured.truth[:, i]) for i in range(3))
-    needed = regressor(q, dq, ddq, silent.thigh_length_m, silent.gravity_m_s2) @ X + friction(silent, dq)
+    needed = LEG.regressor(q, dq, ddq, Geometry(silent.thigh_length_m, silent.gravity_m_s2)) @ X + friction(silent, dq)
     moving = (np.abs(dq) > 0.1).all(axis=1)
     assert np.std((measured.torque - needed)[moving]) < 0.1
     assert np.std(measured.torque) > 5.0
@@ -46,7 +47,9 @@ def test_cuff_forces_tell_the_torque_on_the_persons_own_leg(silent, excitation):
     plant = Plant(silent, "with_human")
     measured = move(plant, excitation)
     q, dq, ddq = (np.ascontiguousarray(measured.truth[:, i]) for i in range(3))
-    own = regressor(q, dq, ddq, silent.thigh_length_m, silent.gravity_m_s2) @ np.array(silent.human_inertial)
+    own = LEG.regressor(q, dq, ddq, Geometry(silent.thigh_length_m, silent.gravity_m_s2)) @ np.array(
+        silent.human_inertial
+    )
     thigh, shank = measured.forces[:, :2].sum(axis=1), measured.forces[:, 2:].sum(axis=1)
     assert_allclose(cuff_torque(thigh, shank, q, plant.geometry), own, atol=1e-9)
 

@@ -13,7 +13,7 @@ from pipelines.dynamics.pd_loop import follow, loop_at_rest, make_drives
 from pipelines.dynamics.plant import Plant, make_plant
 from pipelines.effects.friction import Friction
 from pipelines.effects.rigid_body import RigidBody
-from pipelines.mechanics.leg import Geometry
+from pipelines.mechanics.geometry import Geometry
 from pipelines.model import Model, Term
 
 TABLE3 = ((10.3016, 3.0157, 2.2664, 5.5354), (2.6596, 4.14895), (4.7197, 7.3602))

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from pipelines.dynamics.tracking import track
 from pipelines.mechanics.gait import gait
-from pipelines.mechanics.leg import coriolis_matrix, gravity_torque, mass_matrix
+from pipelines.mechanics.leg import LEG
 from pipelines.settings.simulate import SimulateSettings
 from pipelines.simulation.sweep import sweep
 
@@ -23,9 +23,9 @@ class Tracking:
         self.qd, self.dqd, self.ddqd = (x[0] for x in gait().at(self.t))
         self.q, self.dq = draw.uniform(-1, 1, (2, 2))
         self.torque, self.disturbance, self.friction = draw.uniform(-20, 20, (3, 2))
-        self.M = mass_matrix(self.q, X, geometry)
-        self.C = coriolis_matrix(self.q, self.dq, X, geometry)
-        self.G = gravity_torque(self.q, X, geometry)
+        self.M = LEG.mass_matrix(self.q, X, geometry)
+        self.C = LEG.coriolis_matrix(self.q, self.dq, X, geometry)
+        self.G = LEG.gravity_torque(self.q, X, geometry)
         push = self.torque - self.disturbance - self.friction
         self.ddq = np.linalg.solve(self.M, push - self.C @ self.dq - self.G)
         self.e, self.de, self.dde = self.qd - self.q, self.dqd - self.dq, self.ddqd - self.ddq
@@ -117,7 +117,9 @@ def test_the_loop_depends_on_time_so_that_lasalles_theorem_says_nothing_of_it(ta
         """M dr where e, de and all weights are zero: the same state of the loop, at different times."""
         qd, dqd, ddqd = (x[0] for x in gait().at(t))
         g = table3.geometry
-        return mass_matrix(qd, X, g) @ ddqd + coriolis_matrix(qd, dqd, X, g) @ dqd + gravity_torque(qd, X, g)
+        return (
+            LEG.mass_matrix(qd, X, g) @ ddqd + LEG.coriolis_matrix(qd, dqd, X, g) @ dqd + LEG.gravity_torque(qd, X, g)
+        )
 
     assert np.abs(rate_at_rest_on_the_reference(0.0) - rate_at_rest_on_the_reference(0.7)).max() > 1.0
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from pipelines.mechanics.leg import cuff_torque, regressor
+from pipelines.mechanics.leg import LEG, cuff_torque
 from pipelines.mechanics.motion import Motion
 from pipelines.signals.blocks import BlockAverage
 
@@ -42,9 +42,8 @@ class Averages:
     def body(self, reading: Reading = AS_RECORDED) -> NDArray:
         """Torque per unit of (X1 - X2, X2, X3, X4) with the angles read otherwise, (m, 2, 4)."""
         order, sign = reading
-        q, dq, ddq = (np.ascontiguousarray(x[:, list(order)] * sign) for x in (self.q, self.dq, self.ddq))
-        g = self.motion.geometry
-        return regressor(q, dq, ddq, g.thigh_length_m, g.gravity_m_s2) @ FROM_POSITIVE
+        q, dq, ddq = (x[:, list(order)] * sign for x in (self.q, self.dq, self.ddq))
+        return LEG.regressor(q, dq, ddq, self.motion.geometry) @ FROM_POSITIVE
 
     def joint_columns(self, joint: int, reading: Reading = AS_RECORDED) -> NDArray:
         """Columns of one joint: its share of the rigid body, Coulomb, viscous, and an offset of either sign."""

@@ -1,0 +1,140 @@
+"""One joint: a pendulum, a turntable, a slide or a lift.
+
+===========  =========  =======  ==========================================================================
+mechanism    joint      gravity  torque or force of the drive
+===========  =========  =======  ==========================================================================
+pendulum     revolute   yes      X1 ddq + X2 g sin q, with q from the downward vertical
+turntable    revolute   no       X1 ddq
+lift         prismatic  yes      X1 ddq + X2
+slide        prismatic  no       X1 ddq
+===========  =========  =======  ==========================================================================
+
+Gravity pulls a prismatic joint with the same force wherever it stands. Counterweights and springs of constant force
+do so too, and mostly are there where it matters; so X2 of a lift is that force, and not X1 times gravity.
+"""
+
+from math import cos, sin
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.instant import REACTION
+from pipelines.mechanics.mechanism import Inertial, Mechanism
+
+
+@njit(cache=True)
+def _inertia_along(q, dq, ddq, geometry):
+    Y = np.empty((q.shape[0], 1, 1))
+    Y[:, :, 0] = ddq
+    return Y
+
+
+@njit(REACTION, cache=True)
+def _inertia(at, state, values, geometry, joint, out):
+    """Add X1 ddq."""
+    out[0] += values[0] * at.ddq[0]
+
+
+@njit(cache=True)
+def _pendulum_along(q, dq, ddq, geometry):
+    Y = np.empty((q.shape[0], 1, 2))
+    Y[:, :, 0] = ddq
+    Y[:, :, 1] = geometry[1] * np.sin(q)
+    return Y
+
+
+@njit(REACTION, cache=True)
+def _pendulum(at, state, values, geometry, joint, out):
+    """Add X1 ddq + X2 g sin q."""
+    out[0] += values[0] * at.ddq[0] + values[1] * geometry[1] * sin(at.q[0])
+
+
+@njit(REACTION, cache=True)
+def _mass_off_axis(at, state, values, geometry, joint, out):
+    """Add Y g cos q: a mass across the link is one along it, a right angle ahead."""
+    out[0] += values[0] * geometry[1] * cos(at.q[0])
+
+
+@njit(REACTION, cache=True)
+def _payload_change(at, state, values, geometry, joint, out):
+    """Add the point mass p / r at r, once it is there: p (r ddq + g sin q)."""
+    if at.t >= values[1]:
+        out[0] += values[0] * (values[2] * at.ddq[0] + geometry[1] * sin(at.q[0]))
+
+
+@njit(cache=True)
+def _lift_along(q, dq, ddq, geometry):
+    Y = np.ones((q.shape[0], 1, 2))
+    Y[:, :, 0] = ddq
+    return Y
+
+
+@njit(REACTION, cache=True)
+def _lift(at, state, values, geometry, joint, out):
+    """Add X1 ddq + X2."""
+    out[0] += values[0] * at.ddq[0] + values[1]
+
+
+def _broken_inertia(X: NDArray, geometry: Geometry) -> list[str]:
+    return [f"X1 = {X[0]:.4g} kg·m² is not positive: what turns would have no inertia"] if X[0] <= 0 else []
+
+
+def _broken_mass(X: NDArray, geometry: Geometry) -> list[str]:
+    return [f"X1 = {X[0]:.4g} kg is not positive: what slides would have no mass"] if X[0] <= 0 else []
+
+
+_INERTIA = Inertial("X1", "kg·m²", "inertia about the joint's axis, the drive's rotor included", (0.001, 10.0))
+_MASS = Inertial("X1", "kg", "mass along the axis, the drive's rotor included", (0.1, 200.0))
+
+PENDULUM = Mechanism(
+    name="single",
+    title="one revolute joint under gravity: a pendulum, one joint of a leg",
+    kinds=("revolute",),
+    places=("joint",),
+    has_gravity=True,
+    parameters=(_INERTIA, Inertial("X2", "kg·m", "first moment of mass about the joint's axis", (0.01, 10.0))),
+    along=_pendulum_along,
+    reactions={"rigid_body": _pendulum, "mass_off_axis": _mass_off_axis, "payload_change": _payload_change},
+    broken=_broken_inertia,
+)
+
+TURNTABLE = Mechanism(
+    name="single",
+    title="one revolute joint that gravity does not turn: its axis is vertical, or its load balanced",
+    kinds=("revolute",),
+    places=("joint",),
+    has_gravity=False,
+    parameters=(_INERTIA,),
+    along=_inertia_along,
+    reactions={"rigid_body": _inertia},
+    broken=_broken_inertia,
+)
+
+LIFT = Mechanism(
+    name="single",
+    title="one prismatic joint that gravity pulls along",
+    kinds=("prismatic",),
+    places=("joint",),
+    has_gravity=True,
+    parameters=(
+        _MASS,
+        Inertial("X2", "N", "force that holds it still: its weight less a counterweight's", (-500.0, 500.0)),
+    ),
+    along=_lift_along,
+    reactions={"rigid_body": _lift},
+    broken=_broken_mass,
+)
+
+SLIDE = Mechanism(
+    name="single",
+    title="one level prismatic joint",
+    kinds=("prismatic",),
+    places=("joint",),
+    has_gravity=False,
+    parameters=(_MASS,),
+    along=_inertia_along,
+    reactions={"rigid_body": _inertia},
+    broken=_broken_mass,
+)

@@ -1,0 +1,37 @@
+"""Units at a joint: what an effect says in radians and newton metres is metres and newtons at a prismatic joint."""
+
+from typing import NamedTuple
+
+from pipelines.contracts.joints import Kind
+
+
+class Unit(NamedTuple):
+    """A unit of a parameter, as written for revolute joints."""
+
+    prismatic: str
+    """The same at a prismatic joint."""
+    torque: int
+    displacement: int
+    speed: int
+    """Powers of the joint's torque, displacement and speed that a quantity of this unit grows with."""
+
+
+UNITS = {
+    "N·m": Unit("N", 1, 0, 0),
+    "N·m/s": Unit("N/s", 1, 0, 0),
+    "N·m·s/rad": Unit("N·s/m", 1, 0, -1),
+    "N·m·s²/rad²": Unit("N·s²/m²", 1, 0, -2),
+    "N·m/rad": Unit("N/m", 1, -1, 0),
+    "kg·m²": Unit("kg", 1, 1, -2),
+    "kg·m": Unit("kg", 1, 0, 0),
+    "rad": Unit("m", 0, 1, 0),
+    "rad/s": Unit("m/s", 0, 0, 1),
+    "1/rad²": Unit("1/m²", 0, -2, 0),
+    "1/turn": Unit("rad/m", 0, -1, 0),
+}
+"""Others are the same at every joint: s, Hz, 1, °C."""
+
+
+def unit_at(kind: Kind, unit: str) -> str:
+    """Return the unit that a quantity in ``unit`` at a revolute joint has at a joint of this kind."""
+    return UNITS[unit].prismatic if kind == "prismatic" and unit in UNITS else unit

@@ -1,0 +1,84 @@
+"""One joint: its equations against Newton's, and which mechanism a file's joints ask for."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+
+from pipelines.contracts.joints import Joint
+from pipelines.errors import InputError
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.leg import LEG
+from pipelines.mechanics.machine import MECHANISMS, machine_of
+from pipelines.mechanics.single import LIFT, PENDULUM, SLIDE, TURNTABLE
+from pipelines.mechanics.units import UNITS, unit_at
+
+EARTH, LEVEL = Geometry(gravity_m_s2=9.81), Geometry(gravity_m_s2=0.0)
+every = pytest.mark.parametrize("mechanism", MECHANISMS, ids=lambda m: m.title.split(":")[0])
+
+
+def test_a_pendulum_that_swings_freely_needs_no_torque():
+    mass, length = 0.7, 0.4
+    time = np.linspace(0, 3, 400)
+    swing = solve_ivp(
+        lambda _, s: [s[1], -9.81 / length * np.sin(s[0])], (0, 3), [1.2, 0.3], t_eval=time, rtol=1e-11, atol=1e-11
+    )
+    q, dq = swing.y[:, :, np.newaxis]
+    torque = PENDULUM.regressor(q, dq, -9.81 / length * np.sin(q), EARTH) @ [mass * length**2, mass * length]
+    assert_allclose(torque, 0, atol=1e-9)
+    assert np.abs(PENDULUM.gravity_torque([0.5], [0.0, mass * length], EARTH)) == pytest.approx(
+        mass * 9.81 * length * np.sin(0.5)
+    )
+
+
+@every
+def test_the_parts_of_a_mechanism_add_up_to_its_regressor(mechanism):
+    joints, p = len(mechanism.kinds), len(mechanism.parameters)
+    draw = np.random.default_rng(4)
+    X = draw.uniform(0.5, 3.0, p)
+    for q, dq, ddq in draw.uniform(-2, 2, (20, 3, joints)):
+        whole = mechanism.regressor(q[None], dq[None], ddq[None], EARTH)[0] @ X
+        parts = mechanism.mass_matrix(q, X, EARTH) @ ddq + mechanism.coriolis_matrix(q, dq, X, EARTH) @ dq
+        assert_allclose(parts + mechanism.gravity_torque(q, X, EARTH), whole, atol=1e-12)
+
+
+def test_a_slide_and_a_turntable_are_inertia_alone_and_a_lift_has_weight():
+    q, dq, ddq = np.random.default_rng(5).normal(size=(3, 7, 1))
+    for mechanism in (SLIDE, TURNTABLE):
+        assert_allclose(mechanism.regressor(q, dq, ddq, LEVEL)[:, 0, 0], ddq[:, 0])
+    assert_allclose(LIFT.regressor(q, dq, ddq, EARTH) @ [2.0, 30.0], 2.0 * ddq + 30.0)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "geometry", "expected"),
+    [
+        (("revolute", "revolute"), EARTH, LEG),
+        (("revolute",), EARTH, PENDULUM),
+        (("revolute",), LEVEL, TURNTABLE),
+        (("prismatic",), EARTH, LIFT),
+        (("prismatic",), LEVEL, SLIDE),
+    ],
+)
+def test_joints_and_gravity_decide_the_mechanism(kinds, geometry, expected):
+    joints = [Joint(f"joint_{i}", kind) for i, kind in enumerate(kinds)]
+    assert machine_of(joints, geometry).mechanism is expected
+
+
+def test_a_mechanism_that_is_not_known_is_refused_with_what_there_is():
+    with pytest.raises(
+        InputError, match=r"a\.parquet has joints x \(prismatic\), y \(revolute\), expected two revolute"
+    ):
+        machine_of([Joint("x", "prismatic"), Joint("y")], EARTH, "a.parquet")
+
+
+@every
+def test_what_cannot_exist_is_told_and_what_can_is_not(mechanism):
+    X = np.array([2.0, 0.5, 0.1, 1.0])[: len(mechanism.parameters)]
+    assert mechanism.unrealizable(X, EARTH) == []
+    assert "is not positive" in mechanism.unrealizable(-X, EARTH)[0]
+
+
+def test_units_at_a_prismatic_joint_are_metres_and_newtons():
+    assert unit_at("prismatic", "N·m·s/rad") == "N·s/m"
+    assert unit_at("prismatic", "Hz") == "Hz"
+    assert all(unit_at("revolute", unit) == unit and "rad/s" not in UNITS[unit].prismatic for unit in UNITS)
