@@ -62,6 +62,7 @@ blind-page: $(INSTALLED) ## write docs/blind.md from the examinations that were 
 
 docs: $(INSTALLED) ## bring the generated pages up to date
 	$(BIN)/python -m pipelines.settings.reference > docs/settings.md
+	$(BIN)/python -m pipelines.settings.map_reference > docs/import-map.md
 	$(BIN)/python -m pipelines.effects.reference docs/effects
 
 lock: ## pin the newest versions that fit pyproject.toml, in requirements.lock

@@ -25,6 +25,7 @@ from exoid_cli.diagnose import diagnose
 from exoid_cli.effects import effects
 from exoid_cli.filter import filter_
 from exoid_cli.identify import identify
+from exoid_cli.import_ import import_
 from exoid_cli.init import init
 from exoid_cli.recover import recover
 from exoid_cli.rig_group import rig
@@ -48,6 +49,7 @@ app.command("init", short_help="Start a new experiment.")(init)
 app.command("design", short_help="Search an excitation, or judge a given one.")(design)
 app.command("acquire", short_help="Move the leg along an excitation; record every sample.")(acquire)
 app.command("recover", short_help="Make a recording of what a killed run left.")(recover)
+app.command("import", short_help="Make recordings of logs from elsewhere.")(import_)
 app.command("filter", short_help="Filter a recording's angles and differentiate them.")(filter_)
 app.command("identify", short_help="Fit the leg's parameters; judge them on other runs.")(identify)
 app.command("diagnose", short_help="Name what the model gets wrong, and measure the gain.")(diagnose)

@@ -5,6 +5,7 @@
 
 import json
 from collections.abc import Iterator
+from typing import get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -26,7 +27,7 @@ def reference() -> str:
     sections = [
         f"## {heading}\n\n{model.__doc__}\n\n{head}" + "\n".join(rows)
         for heading, model in sections_of(Experiment)
-        if (rows := list(_rows(model)))
+        if (rows := list(rows_of(model)))
     ]
     return "\n\n".join([INTRODUCTION.rstrip(), *sections]) + "\n"
 
@@ -36,11 +37,12 @@ def sections_of(model: type[BaseModel], path: str = "") -> Iterator[tuple[str, t
     for name, field in model.model_fields.items():
         for inner in models_in(field.annotation):
             heading = f"[{path}{name}]"
-            yield f"[{heading}]" if inner is not field.annotation else heading, inner
+            yield f"[{heading}]" if get_origin(field.annotation) is tuple else heading, inner
             yield from sections_of(inner, f"{path}{name}.")
 
 
-def _rows(model: type[BaseModel]) -> Iterator[str]:
+def rows_of(model: type[BaseModel]) -> Iterator[str]:
+    """Yield a row of Markdown for each key of a table that is no table itself."""
     for name, field in model.model_fields.items():
         if not any(models_in(field.annotation)):
             yield f"| `{name}` | {_default(field)} | {field.description} |"

@@ -1,0 +1,69 @@
+"""``exoid import``: recordings out of logs from elsewhere."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from exoid_cli.console import console
+from pipelines.errors import InputError
+
+if TYPE_CHECKING:
+    from pipelines.importing.recordings import Imported
+
+
+def import_(
+    files: Annotated[list[Path], typer.Argument(help="Logs: CSV, .mat, Parquet, JSON, HDF5, MCAP, ROS 2 bags.")],
+    map_: Annotated[Path, typer.Option("--map", help="The map: what each column is, and in which unit.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the recordings.")] = Path("recordings"),
+) -> None:
+    """Make recordings of logs from elsewhere; a map says what their columns are.
+
+    \b
+    Example:
+      exoid import run1.csv run2.csv --map machine.toml -o recordings/
+    """
+    from pipelines.contracts.atomic import open_folder
+    from pipelines.importing.recordings import recordings
+    from pipelines.settings.import_map import load_map
+
+    settings = load_map(map_)
+    open_folder(output)
+    written: dict[Path, Path] = {}
+    told: list[dict[str, Any]] = []
+    for file in files:
+        made = []
+        for recording in recordings(file, settings, map_):
+            path = output / f"{recording.name}.parquet"
+            if path in written:
+                raise InputError(
+                    f"{file}: its recording {path} would replace that of {written[path]}; "
+                    "give [[recording]] in the map names that differ, with {file} in them"
+                )
+            made.append((recording.write(output), recording))
+            written[path] = file
+        _say(file, made)
+        told.append(_as_json(file, made))
+    console.emit(told)
+
+
+def _say(file: Path, made: list[tuple[Path, "Imported"]]) -> None:
+    for path, recording in made:
+        count = len(recording)
+        time, purpose = recording.columns["time_s"], recording.metadata["purpose"]
+        span = f"{time[0]:.3f} to {time[-1]:.3f} s of {file.name}"
+        console.say(f"{path}: {purpose}, {count} samples, {span}, {recording.sampling.rate_hz:.6g} Hz")
+    for finding in dict.fromkeys(finding for _, recording in made for finding in recording.findings):
+        console.say(f"  {finding}")
+
+
+def _as_json(file: Path, made: list[tuple[Path, "Imported"]]) -> dict[str, Any]:
+    return {
+        "file": file,
+        "recordings": [
+            {"path": path, "samples": len(recording), "sample_rate_hz": recording.sampling.rate_hz,
+             "purpose": recording.metadata["purpose"], "gaps": recording.metadata["gaps"],
+             "findings": recording.metadata["imported"]["findings"]}
+            for path, recording in made
+        ],
+    }  # fmt: skip

@@ -1,0 +1,1 @@
+"""``exoid import``: recordings out of logs from elsewhere."""

@@ -1,0 +1,71 @@
+"""Arithmetic with columns, as a map may write it: ``gtau * vir``, ```pos 2` - `pos 1```."""
+
+import ast
+import operator
+import re
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.errors import SettingsError
+
+OPERATORS: dict[type, Callable] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.UAdd: operator.pos, ast.USub: operator.neg,
+}  # fmt: skip
+QUOTED = re.compile(r"`([^`]*)`")
+
+
+class Expression:
+    """Numbers and columns with + - * / and parentheses; a name that is no word stands in backquotes."""
+
+    def __init__(self, text: str, where: str) -> None:
+        self._text, self._where = text, where
+        self._quoted: list[str] = []
+        try:
+            self._tree = ast.parse(QUOTED.sub(self._placeholder, text).strip(), mode="eval").body
+        except SyntaxError as error:
+            raise SettingsError(f"{where}: found {text!r}, {_EXPECTED}") from error
+        self._refuse_what_is_more(self._tree)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The columns that it is made of."""
+        found = (self._name(node) for node in ast.walk(self._tree) if isinstance(node, ast.Name))
+        return tuple(dict.fromkeys(found))
+
+    def __call__(self, columns: Mapping[str, NDArray]) -> NDArray:
+        """Return the value, (n,) float64; a column of one row counts as a constant."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(self._value(self._tree, columns), dtype=float)
+
+    def _placeholder(self, match: re.Match) -> str:
+        self._quoted.append(match[1])
+        return f"_quoted_{len(self._quoted) - 1}"
+
+    def _name(self, node: ast.Name) -> str:
+        quoted = re.fullmatch(r"_quoted_(\d+)", node.id)
+        return self._quoted[int(quoted[1])] if quoted else node.id
+
+    def _value(self, node: Any, columns: Mapping[str, NDArray]) -> Any:
+        match node:
+            case ast.BinOp():
+                return OPERATORS[type(node.op)](self._value(node.left, columns), self._value(node.right, columns))
+            case ast.UnaryOp():
+                return OPERATORS[type(node.op)](self._value(node.operand, columns))
+            case ast.Name():
+                return columns[self._name(node)]
+            case _:
+                return float(node.value)
+
+    def _refuse_what_is_more(self, tree: ast.expr) -> None:
+        for node in ast.walk(tree):
+            number = isinstance(node, ast.Constant) and type(node.value) in (int, float)
+            known = isinstance(node, ast.BinOp | ast.UnaryOp | ast.Name | ast.Load) or type(node) in OPERATORS
+            if not (number or known) or (hasattr(node, "op") and type(node.op) not in OPERATORS):
+                raise SettingsError(f"{self._where}: found {self._text!r}, {_EXPECTED}")
+
+
+_EXPECTED = "expected numbers and columns with + - * / ( ), names with blanks or signs in `backquotes`"

@@ -1,0 +1,148 @@
+"""A log whose columns have been read: its clock's runs, and the quantities that a map makes of it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.errors import InputError, SettingsError
+from pipelines.importing import clock
+from pipelines.importing.clock import Run
+from pipelines.importing.finding import Finding
+from pipelines.importing.numbers import numbers
+from pipelines.importing.reading import columns_of, quantity
+from pipelines.importing.sources.source import Columns, Source
+from pipelines.settings import transmission
+from pipelines.settings.import_map import ImportMap, ReadingSettings, TimeSettings
+from pipelines.validation import suggestion
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One column of the recording, and the reading that it comes from."""
+
+    target: str
+    where: str
+    """Its place in the map."""
+    reading: ReadingSettings
+    gain: float
+    required: bool
+
+
+@dataclass(frozen=True)
+class Log:
+    """The columns of a log, in memory, and its clock."""
+
+    source: Source
+    settings: TimeSettings
+    channels: tuple[Channel, ...]
+    columns: Columns
+    origin: float
+    """The first stamp of the clock."""
+    rows: int
+    runs: tuple[Run, ...]
+    findings: list[Finding]
+
+    @property
+    def required(self) -> list[str]:
+        """The recording's columns that must have a value in every row."""
+        return [channel.target for channel in self.channels if channel.required]
+
+    def quantities(self, run: Run, findings: list[Finding]) -> Columns:
+        """Return every channel in SI at the instants of a run, each (n,), NaN where the log has no value."""
+        return {channel.target: self._quantity(channel, run, findings) for channel in self.channels}
+
+    def _quantity(self, channel: Channel, run: Run, findings: list[Finding]) -> NDArray:
+        names = columns_of(channel.reading, channel.where)
+        if channel.reading.time is not None:
+            return self._interpolated(channel, run, findings)
+        picked = {}
+        for name in names:
+            values = self.columns[name]
+            if len(values) not in (1, self.rows) or (len(values) == 1 and channel.reading.column):
+                raise InputError(
+                    f"{name!r} has {len(values)} rows where the clock has {self.rows}; if it was sampled by a clock of "
+                    f"its own, name that in the map: {channel.where}.time"
+                )
+            picked[name] = values if len(values) == 1 else values[run.rows]
+        return quantity(channel.reading, channel.gain, picked, channel.target, findings)
+
+    def _interpolated(self, channel: Channel, run: Run, findings: list[Finding]) -> NDArray:
+        """Return a channel with a clock of its own at a run's instants, on straight lines between its own samples."""
+        reading = channel.reading
+        stamps = clock.stamps(self.columns[str(reading.time)], self.settings, findings)
+        columns = {name: self.columns[name] for name in columns_of(reading, channel.where)}
+        if {len(values) for values in columns.values()} - {1, len(stamps)}:
+            raise InputError(
+                f"{channel.where} and its clock {reading.time!r} differ in length; name the one that it was sampled by"
+            )
+        values = quantity(reading, channel.gain, columns, channel.target, findings)
+        known = np.isfinite(values)
+        own = clock.runs(clock.seconds(stamps[known], self.origin, self.settings, findings), stamps[known], findings)
+        if len(own) != 1:
+            raise InputError(f"{channel.where}.time: {reading.time!r} has {len(own)} runs, expected one; cut the file")
+        time, samples = own[0].time_s + own[0].began_s, values[known][own[0].rows]
+        at = run.began_s + run.time_s
+        found = np.interp(at, time, samples, left=np.nan, right=np.nan)
+        steps = np.diff(time)
+        gap = steps > 1.5 * np.quantile(steps, 0.95)
+        behind = np.clip(np.searchsorted(time, at, "right") - 1, 0, len(steps) - 1)
+        on_sample = time[behind] == at
+        found[gap[behind] & ~on_sample] = np.nan
+        rate_hz = 1.0 / np.median(steps)
+        seen = f"sampled at {rate_hz:.4g} Hz by a clock of its own ({reading.time})"
+        findings.append(Finding(channel.target, seen, "interpolated on straight lines, not across its gaps"))
+        return found
+
+
+def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
+    """Read the columns that a map names, and look at their clock."""
+    channels = tuple(_channels(settings))
+    needed = _needed(channels, settings.time)
+    for name, where in needed.items():
+        if name not in source.names:
+            raise SettingsError(
+                f"has no column {name!r}, which {where} in {map_path} names; {suggestion(name, list(source.names))}"
+            )
+    columns = source.load(list(needed))
+    findings: list[Finding] = []
+    if settings.time.column is None:
+        rows = max(map(len, columns.values()))
+        run = clock.uniform(rows, float(settings.time.rate_hz or 0.0), findings)
+        columns = _as_numbers(columns, set(), findings)
+        return Log(source, settings.time, channels, columns, 0.0, rows, (run,), findings)
+    clocks = {channel.reading.time for channel in channels} | {settings.time.column}
+    columns = _as_numbers(columns, clocks, findings)
+    stamps = clock.stamps(columns[settings.time.column], settings.time, findings)
+    origin = clock.first_stamp(stamps)
+    time_s = clock.seconds(stamps, origin, settings.time, findings)
+    runs = tuple(clock.runs(time_s, stamps, findings))
+    return Log(source, settings.time, channels, columns, origin, len(stamps), runs, findings)
+
+
+def _channels(settings: ImportMap) -> Iterator[Channel]:
+    for i, joint in enumerate(settings.joint):
+        for name, reading in joint.readings():
+            gain = reading.gain(transmission.TARGETS[name][joint.kind])
+            required = name in ("angle", "torque")
+            yield Channel(joint.joint.column(name), f"joint[{i}].{name}", reading, gain, required)
+    for i, force in enumerate(settings.force):
+        yield Channel(force.target, f"force[{i}]", force, 1.0, required=False)
+
+
+def _needed(channels: tuple[Channel, ...], time: TimeSettings) -> dict[str, str]:
+    """Return every column that the map names, and where it first does."""
+    needed = {time.column: "time.column"} if time.column is not None else {}
+    for channel in channels:
+        for name in columns_of(channel.reading, channel.where):
+            needed.setdefault(name, channel.where)
+        if channel.reading.time is not None:
+            needed.setdefault(channel.reading.time, f"{channel.where}.time")
+    return needed
+
+
+def _as_numbers(columns: Columns, clocks: set[str | None], findings: list[Finding]) -> Columns:
+    """Return the columns as float64; those of clocks are left, for they may be dates or need all their digits."""
+    return {name: values if name in clocks else numbers(values, name, findings) for name, values in columns.items()}

@@ -1,0 +1,30 @@
+"""What a file holds, as numbers: text that is none is told of, and counts as missing."""
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipelines.importing.finding import Finding, counted
+
+
+def numbers(values: NDArray, where: str, findings: list[Finding]) -> NDArray:
+    """Return the values (n,) as float64, NaN where there is no number."""
+    if values.dtype.kind in "biuf":
+        return values.astype(float, copy=False)
+    text = pd.Series(values)
+    found = pd.to_numeric(text, errors="coerce").to_numpy(dtype=float, na_value=np.nan)
+    words = np.isnan(found) & text.notna().to_numpy()
+    if words.any():
+        row = int(np.argmax(words))
+        seen = f"{counted(int(words.sum()), 'row')} with text, the first {values[row]!r} in row {row}"
+        findings.append(Finding(where, seen, "taken for missing"))
+    return found
+
+
+def whole_nanoseconds(values: NDArray) -> NDArray:
+    """Return dates written out, ``2026-01-31 12:00:00.125``, as nanoseconds (n,) int64; NaN where there is none."""
+    if values.dtype.kind in "iuf":
+        return values
+    dates = pd.to_datetime(pd.Series(values), errors="coerce", format="ISO8601", utc=True)
+    stamps = dates.astype("datetime64[ns, UTC]").astype("int64")
+    return stamps.to_numpy() if dates.notna().all() else stamps.where(dates.notna()).to_numpy(dtype=float)

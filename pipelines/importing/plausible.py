@@ -1,0 +1,52 @@
+"""What an imported recording says of itself that cannot be right: told, never mended."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.importing.consistency import integral_agreement, mean_power
+from pipelines.importing.finding import Finding
+from pipelines.settings.import_map import ImportMap, JointSettings
+
+ALIKE = 0.5
+"""Share of the variance that velocity and angle must have in common before their slope is judged."""
+OFF = 0.15
+"""By so much the slope between both may be off 1: a filter in the drive, a late sample."""
+GIVES_BACK = 0.2
+"""Share of the mean magnitude of power that a drive may take out of a motion, on the whole."""
+
+
+def look_at(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Finding]:
+    """Yield what is not plausible about a recording's columns."""
+    for joint in settings.joint:
+        yield from _still(columns, joint)
+        yield from _velocity(columns, joint)
+    yield from _power(columns, settings.joint)
+
+
+def _still(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
+    for quantity in ("angle", "torque"):
+        name = joint.joint.column(quantity)
+        if np.ptp(columns[name]) == 0.0:
+            yield Finding(name, f"is {columns[name][0]:.6g} in every row", "nothing can be learnt from it")
+
+
+def _velocity(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
+    name, angle = joint.joint.column("velocity"), joint.joint.column("angle")
+    found = integral_agreement(columns["time_s"], columns[angle], columns[name]) if name in columns else None
+    if found is not None and found.explained > ALIKE and abs(found.slope - 1.0) > OFF:
+        seen = f"integrates to {found.slope:.3g} times the way that {angle} goes"
+        yield Finding(name, seen, "kept; check unit, sign and gear_ratio of both, and the unit of time")
+
+
+def _power(columns: Mapping[str, NDArray], joints: Sequence[JointSettings]) -> Iterator[Finding]:
+    """Tell of drives that together brake: one alone may, where another moves what it carries."""
+    powers = [
+        mean_power(columns["time_s"], columns[joint.joint.column("angle")], columns[joint.joint.column("torque")])
+        for joint in joints
+    ]
+    mean, size = (sum(values) for values in zip(*powers, strict=True))
+    if mean < -GIVES_BACK * size:
+        seen = f"the drives take {-mean:.3g} W out of the motion on the whole, as friction leaves them nothing to take"
+        yield Finding("torque", seen, "kept; check the signs of angles and torques")

@@ -1,0 +1,215 @@
+"""From a log and its map to recordings: which rows, which columns, which span."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from pipelines.contracts import RECORDING, describe, parquet
+from pipelines.contracts.checks import LARGEST_ANGLE_RAD
+from pipelines.errors import ContractError, InputError, SettingsError, about
+from pipelines.importing.clock import Run, Sampling
+from pipelines.importing.finding import Finding, counted
+from pipelines.importing.log import Log, read_log
+from pipelines.importing.plausible import look_at
+from pipelines.importing.sources.open import open_source
+from pipelines.settings.import_map import ImportMap, RecordingSettings
+
+FEWEST = 10
+"""Rows that a recording must have at least."""
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A recording made of a log, not yet written."""
+
+    name: str
+    columns: dict[str, NDArray]
+    metadata: dict[str, Any]
+    sampling: Sampling
+    findings: tuple[Finding, ...]
+
+    def __len__(self) -> int:
+        return len(self.columns["time_s"])
+
+    def pieces(self) -> Iterator[pa.Table]:
+        """Yield the rows in their order, some at a time."""
+        for first in range(0, len(self), parquet.ROWS):
+            yield pa.table({name: values[first : first + parquet.ROWS] for name, values in self.columns.items()})
+
+    def write(self, folder: Path) -> Path:
+        """Write the recording into a folder; one that was not imported is never overwritten."""
+        path = folder / f"{self.name}.parquet"
+        _refuse_to_overwrite_what_was_measured(path)
+        RECORDING.write_pieces(path, self.pieces(), self.metadata)
+        return path
+
+
+def recordings(path: Path, settings: ImportMap, map_path: Path) -> Iterator[Imported]:
+    """Yield the recordings that a map makes of a log."""
+    wanted = [recording for recording in settings.recording if recording.is_of(path.name)]
+    if not wanted:
+        patterns = ", ".join(recording.files for recording in settings.recording)
+        raise SettingsError(f"{map_path}: no [[recording]] is of {path.name}, only of {patterns}; add one")
+    with about(path):
+        log = read_log(open_source(path, settings.source), settings, map_path)
+        provenance = describe(
+            inputs=[*_files(path), map_path], config=settings.model_dump(mode="json", exclude_none=True)
+        )
+        runs = _chosen(log.runs, settings.time.restarts, log.findings)
+        for number, run in enumerate(runs, 1):
+            suffix = f"_run{number}" if len(runs) > 1 else ""
+            yield from _recordings_of(run, log, settings, wanted, (path, suffix, provenance))
+
+
+def _files(path: Path) -> list[Path]:
+    return sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
+
+
+def _chosen(runs: Sequence[Run], restarts: str, findings: list[Finding]) -> list[Run]:
+    """Return the runs that become recordings."""
+    long = [run for run in runs if len(run) >= FEWEST]
+    if not long:
+        raise InputError(f"no run of its clock has {FEWEST} rows; correct [time] in the map")
+    if len(runs) == 1:
+        return long
+    kept = long if restarts == "split" else [max(long, key=len)]
+    told = ", ".join(f"{run.rows[0]}-{run.rows[-1]}" for run in kept)
+    lost = sum(map(len, runs)) - sum(map(len, kept))
+    done = f"rows {told} kept, {lost} left out" + ("" if restarts == "split" else " (time.restarts)")
+    findings.append(Finding("time", f"{len(runs)} runs", done))
+    return kept
+
+
+def _recordings_of(
+    run: Run, log: Log, settings: ImportMap, wanted: Sequence[RecordingSettings], origin: tuple[Path, str, dict]
+) -> Iterator[Imported]:
+    path, suffix, provenance = origin
+    findings = [*log.findings, *run.findings]
+    columns = log.quantities(run, findings)
+    whole = _whole_rows(columns, log.required, findings)
+    time = run.time_s[whole]
+    sampling = Sampling.of(run.time_s, time)
+    findings += _sampling_findings(sampling)
+    columns = {"time_s": time} | {name: values[whole] for name, values in columns.items()}
+    _refuse_absurd_angles(columns, settings)
+    findings += look_at(columns, settings)
+    for recording in wanted:
+        rows = _span(time, float(run.time_s[-1]), recording)
+        own = {name: values[rows] for name, values in columns.items()}
+        cut = Sampling.of(run.time_s, own["time_s"])
+        metadata = _metadata(settings, recording, cut) | provenance
+        metadata["imported"] = _account(path, log, run, sampling, findings)
+        name = recording.name.replace("{file}", path.stem).replace("{purpose}", recording.purpose) + suffix
+        yield Imported(name, own, metadata, cut, tuple(findings))
+
+
+def _account(path: Path, log: Log, run: Run, sampling: Sampling, findings: Sequence[Finding]) -> dict[str, Any]:
+    """Return what the recording tells of how it was made."""
+    return {
+        "source": path.name,
+        "format": log.source.format,
+        "notes": list(log.source.notes),
+        "rows_in_source": log.rows,
+        "began_s": run.began_s,
+        "steps_s": dict(zip(("shortest", "median", "longest"), sampling.steps_s, strict=True)),
+        "irregular_share": sampling.irregular,
+        "findings": [finding.as_json() for finding in findings],
+    }
+
+
+def _whole_rows(columns: Mapping[str, NDArray], required: Sequence[str], findings: list[Finding]) -> NDArray:
+    """Return which rows have every quantity that a recording must have."""
+    known = {name: np.isfinite(values) for name, values in columns.items()}
+    for name in required:
+        if not known[name].any():
+            raise InputError(f"{name} has no value in any row; correct its column, range or time in the map")
+    whole = np.all([known[name] for name in required], axis=0)
+    if np.count_nonzero(whole) < FEWEST:
+        shares = ", ".join(f"{name} in {np.mean(known[name]):.0%}" for name in required)
+        raise InputError(
+            f"only {np.count_nonzero(whole)} rows have all of them ({shares} of the rows): they were sampled at "
+            "different instants; give those that are to be interpolated a time of their own in the map"
+        )
+    for name, present in known.items():
+        missing = len(present) - int(np.count_nonzero(present))
+        if missing and name in required:
+            findings.append(Finding(name, f"no value in {counted(missing, 'row')}", "rows left out"))
+        elif missing:
+            findings.append(Finding(name, f"no value in {counted(missing, 'row')}", "left empty"))
+    return whole
+
+
+def _sampling_findings(sampling: Sampling) -> list[Finding]:
+    found = []
+    if sampling.irregular > 0.05:
+        shortest, median, longest = (1e3 * step for step in sampling.steps_s)
+        seen = (
+            f"irregular: {sampling.irregular:.0%} of the steps are more than 2 % off their median; "
+            f"{shortest:.4g} to {longest:.4g} ms, median {median:.4g}"
+        )
+        found.append(Finding("time", seen, "stamps kept as they are; exoid filter interpolates angles between them"))
+    if sampling.gaps:
+        longest_gap = max(count for _, count in sampling.gaps) / sampling.rate_hz
+        seen = (
+            f"{counted(len(sampling.gaps), 'gap')}, {sampling.missing} samples missing, the longest {longest_gap:.3g} s"
+        )
+        found.append(Finding("time", seen, "told in `gaps`; nothing is filled in"))
+    return found
+
+
+def _refuse_absurd_angles(columns: Mapping[str, NDArray], settings: ImportMap) -> None:
+    for i, joint in enumerate(settings.joint):
+        angle = columns[joint.joint.column("angle")]
+        largest = float(np.max(np.abs(angle)))
+        if joint.kind == "revolute" and largest > LARGEST_ANGLE_RAD:
+            raise SettingsError(
+                f"joint[{i}].angle: would be {np.min(angle):.4g} to {np.max(angle):.4g} rad, expected at most "
+                f"{LARGEST_ANGLE_RAD:.3g} to both sides; correct its unit, zero, counts_per_turn or wraps_at in the map"
+            )
+
+
+def _span(time: NDArray, duration_s: float, recording: RecordingSettings) -> slice:
+    """Return the rows of a span; one that reaches to the end has the last row."""
+    begin, end = 0.0, np.inf
+    if recording.span is not None:
+        begin, end = (share * duration_s for share in recording.span)
+        end = np.inf if recording.span[1] == 1.0 else end
+    elif recording.span_s is not None:
+        begin, end = recording.span_s
+    first, last = np.searchsorted(time, [begin, end])
+    if last - first < FEWEST:
+        raise InputError(
+            f"{recording.purpose} from {begin:g} to {end:g} s has {last - first} rows of a run of {duration_s:.6g} s, "
+            f"expected at least {FEWEST}; correct its span in the map"
+        )
+    return slice(int(first), int(last))
+
+
+def _metadata(settings: ImportMap, recording: RecordingSettings, sampling: Sampling) -> dict[str, Any]:
+    known = {
+        "rig": settings.rig, "subject": recording.subject, "session": recording.session,
+        "period_s": recording.period_s, "geometry": settings.geometry.model_dump(exclude_none=True) or None,
+    }  # fmt: skip
+    return {
+        "joints": [{"name": joint.name, "kind": joint.kind} for joint in settings.joint],
+        "run": recording.run,
+        "purpose": recording.purpose,
+        "sample_rate_hz": sampling.rate_hz,
+        "gaps": [list(gap) for gap in sampling.gaps],
+    } | {key: value for key, value in known.items() if value is not None}
+
+
+def _refuse_to_overwrite_what_was_measured(path: Path) -> None:
+    if not path.is_file():
+        return
+    try:
+        _, metadata = parquet.header(path)
+    except ContractError:
+        return  # what it is instead, writing it will tell
+    if metadata["contract"] == RECORDING.label and "imported" not in metadata:
+        raise ContractError(f"{path}: holds a recording that was not imported, not overwritten; choose another folder")

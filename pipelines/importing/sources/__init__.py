@@ -1,0 +1,1 @@
+"""Logs of every format, each as named columns."""

@@ -1,0 +1,192 @@
+"""How a text file is written: encoding, delimiter, decimal point, comments, and where its header stands."""
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipelines.errors import InputError
+from pipelines.settings.import_map import SourceSettings
+
+LOOKED_AT = 2**18
+"""Bytes at the beginning of a file that tell how it is written."""
+DELIMITERS = (",", ";", "\t", "|", " ")
+COMMENTS = ("#", "%")
+BYTE_ORDER_MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
+NOT_A_NUMBER = {"", "nan", "null", "none", "na", "n/a", "inf", "-inf", "-nan", "true", "false"}
+ENOUGH = 0.5
+"""Share of a row's fields that are numbers, in a row of data; the others are dates, states and comments."""
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How a text file is to be parsed."""
+
+    encoding: str
+    delimiter: str
+    decimal: str
+    comment: str | None
+    rows_before: int
+    """Lines before the first one of data."""
+    names: tuple[str, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def separator(self) -> str:
+        """What pandas calls it; any white space counts as one delimiter."""
+        return r"\s+" if self.delimiter == " " else self.delimiter
+
+    @property
+    def in_words(self) -> str:
+        """Delimiter and decimal point as messages have them."""
+        named = {"\t": "tabs", " ": "spaces"}.get(self.delimiter, repr(self.delimiter))
+        return f"{named} between fields and decimal {self.decimal!r}"
+
+
+def find_dialect(path: Path, settings: SourceSettings) -> Dialect:
+    """Look at the first lines of a text file; what the settings say is not looked for.
+
+    Raises
+    ------
+    InputError
+        Where the file is no text, or no table of numbers is in it.
+    """
+    with open(path, "rb") as file:
+        start = file.read(LOOKED_AT)
+        whole = not file.read(1)
+    encoding = settings.encoding or _encoding(start)
+    try:
+        lines = start.decode(encoding, errors="replace").splitlines()
+    except LookupError as error:
+        raise InputError(f"source.encoding: found {encoding!r}, expected one such as utf-8") from error
+    lines = lines if whole else lines[:-1]
+    skipped = settings.skip_rows or 0
+    guesses = [
+        guess
+        for delimiter in ([settings.delimiter] if settings.delimiter else DELIMITERS)
+        if (guess := _Table.of(lines[skipped:], delimiter, settings))
+    ]
+    if not guesses:
+        raise InputError(_why_there_is_none(lines, settings))
+    table = max(guesses, key=lambda guess: guess.fields_of_numbers)
+    names = settings.columns or table.header(lines[skipped:])
+    if len(names) != table.width:
+        raise InputError(f"has {table.width} columns, but source.columns names {len(names)}; name each of them")
+    notes = [f"delimiter {table.delimiter!r}, decimal {table.decimal!r}, {encoding}"]
+    if names == table.numbered:
+        notes.append("no header: columns are named c1, c2, ...")
+    comment = settings.comment or _comment(lines)
+    return Dialect(
+        encoding, table.delimiter, table.decimal, comment, skipped + table.first, _told_apart(names), tuple(notes)
+    )
+
+
+def _encoding(start: bytes) -> str:
+    for mark, encoding in BYTE_ORDER_MARKS.items():
+        if start.startswith(mark):
+            return encoding
+    if b"\0" in start:
+        raise InputError(
+            f"is no text (it starts with {start[:8]!r}), nor of another format that exoid knows: "
+            "text, .mat, Parquet, JSON, HDF5, MCAP, ROS 2 bag; export it as one of these"
+        )
+    try:
+        start[:-4].decode("utf-8")  # the last character may be cut in two
+    except UnicodeDecodeError:
+        return "cp1252"
+    return "utf-8"
+
+
+def _comment(lines: Sequence[str]) -> str | None:
+    starts = Counter(line.lstrip()[:1] for line in lines)
+    return next((mark for mark in COMMENTS if starts[mark]), None)
+
+
+def _why_there_is_none(lines: Sequence[str], settings: SourceSettings) -> str:
+    if not any(line.strip() for line in lines):
+        return "is empty, expected a table of numbers; record it again"
+    how = f" with delimiter {settings.delimiter!r}" if settings.delimiter else ""
+    header = lines[settings.skip_rows or 0 :][:1]
+    return (
+        f"holds no rows of two numbers or more{how} after {header[0][:60]!r}; "
+        "check that it is a log, or say in the map's [source] how it is written"
+        if header
+        else "has fewer lines than source.skip_rows; lower it"
+    )
+
+
+@dataclass(frozen=True)
+class _Table:
+    """The rows of numbers that a delimiter would make."""
+
+    delimiter: str
+    decimal: str
+    first: int
+    """Line of the first row."""
+    width: int
+    fields_of_numbers: int
+
+    @classmethod
+    def of(cls, lines: Sequence[str], delimiter: str, settings: SourceSettings) -> "_Table | None":
+        """Return the table that a delimiter makes of some lines; None where there is none."""
+        decimals = [settings.decimal] if settings.decimal else ["."] if delimiter == "," else [".", ","]
+        found = [table for decimal in decimals if (table := cls._with(lines, delimiter, decimal))]
+        return max(found, key=lambda table: table.fields_of_numbers, default=None)
+
+    @classmethod
+    def _with(cls, lines: Sequence[str], delimiter: str, decimal: str) -> "_Table | None":
+        rows = [(k, _fields(line, delimiter)) for k, line in enumerate(lines) if not _is_comment(line)]
+        data = [(k, fields) for k, fields in rows if _are_numbers(fields, decimal)]
+        if not data:
+            return None
+        width = Counter(len(fields) for _, fields in data).most_common(1)[0][0]
+        data = [(k, fields) for k, fields in data if len(fields) == width]
+        numbers = sum(_is_number(field, decimal) for _, fields in data for field in fields)
+        return cls(delimiter, decimal, data[0][0], width, numbers) if width > 1 else None
+
+    @property
+    def numbered(self) -> tuple[str, ...]:
+        """Names of columns that have none."""
+        return tuple(f"c{k + 1}" for k in range(self.width))
+
+    def header(self, lines: Sequence[str]) -> tuple[str, ...]:
+        """Return the names above the rows: the last line of as many fields, and if that is of units the one before."""
+        above = [_fields(line.lstrip("".join(COMMENTS) + " "), self.delimiter) for line in lines[: self.first]]
+        fitting = [fields for fields in above if len(fields) == self.width and any(fields)]
+        if not fitting:
+            return self.numbered
+        names, *before = reversed(fitting)
+        names = [name or number for name, number in zip(names, self.numbered, strict=True)]
+        if before and all(re.fullmatch(r"[\[(].*[\])]|[-\w°µ/·*%.²]{1,5}", field) for field in names):
+            names = [f"{name} [{unit.strip('[]()')}]" for name, unit in zip(before[0], names, strict=True)]
+        return tuple(names)
+
+
+def _fields(line: str, delimiter: str) -> list[str]:
+    fields = line.split() if delimiter == " " else line.rstrip("\r\n").split(delimiter)
+    return [field.strip().strip('"').strip() for field in fields]
+
+
+def _is_comment(line: str) -> bool:
+    return line.lstrip().startswith(COMMENTS)
+
+
+def _are_numbers(fields: list[str], decimal: str) -> bool:
+    numbers = sum(_is_number(field, decimal) for field in fields)
+    return numbers >= 2 and numbers >= ENOUGH * sum(field.lower() not in NOT_A_NUMBER for field in fields)
+
+
+def _is_number(field: str, decimal: str) -> bool:
+    point = re.escape(decimal)
+    return re.fullmatch(rf"[-+]?(\d+({point}\d*)?|{point}\d+)([eE][-+]?\d+)?", field) is not None
+
+
+def _told_apart(names: Sequence[str]) -> tuple[str, ...]:
+    """Give names that stand twice a number: the second ``q`` is ``q#2``."""
+    seen: Counter[str] = Counter()
+    apart = []
+    for name in names:
+        seen[name] += 1
+        apart.append(name if seen[name] == 1 else f"{name}#{seen[name]}")
+    return tuple(apart)

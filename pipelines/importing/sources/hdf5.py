@@ -1,0 +1,70 @@
+"""Logs in HDF5, MATLAB's v7.3 among them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipelines.errors import InputError
+from pipelines.importing.sources.extra import library
+from pipelines.importing.sources.flatten import flattened
+from pipelines.importing.sources.source import Columns, Source
+from pipelines.settings.import_map import SourceSettings
+
+MATLAB_CLASSES_OF_NUMBERS = (b"double", b"single", b"logical", *(f"{s}int{b}".encode() for s in ("", "u") for b in (8, 16, 32, 64)))  # fmt: skip  # noqa: E501
+
+
+def open_hdf5(path: Path, settings: SourceSettings, format: str = "HDF5") -> Source:
+    """Return the log in an HDF5 file; a data set in groups has a name with slashes, ``run1/hip/angle``."""
+    h5py = library("h5py")
+    try:
+        with h5py.File(path) as file:
+            below = _group(file, settings.table)
+            sets = _data_sets(below)
+            columns = {name: data for data in sets for name in flattened(_values(below[data], sample=True), data)}
+    except OSError as error:
+        raise InputError(f"is a damaged or truncated HDF5 file ({error}); copy it again") from error
+
+    def load(names: Sequence[str]) -> Columns:
+        with h5py.File(path) as file:
+            below = _group(file, settings.table)
+            wanted = dict.fromkeys(columns[name] for name in names)
+            found = {name: values for data in wanted for name, values in flattened(_values(below[data]), data).items()}
+        return {name: found[name] for name in names}
+
+    return Source(path, format, tuple(columns), load)
+
+
+def _group(file: Any, table: str | None) -> Any:
+    if table is None:
+        return file
+    if table not in file:
+        raise InputError(f"has no group {table!r}, which source.table names; it has {', '.join(file)}")
+    return file[table]
+
+
+def _data_sets(group: Any) -> list[str]:
+    """Return the names of all data sets with numbers below a group, in the file's order."""
+    names: list[str] = []
+
+    def visit(name: str, item: Any) -> None:
+        # MATLAB keeps the content of its cells below #refs#, under names that say nothing.
+        if hasattr(item, "dtype") and not name.startswith("#") and _is_of_numbers(item):
+            names.append(name)
+
+    group.visititems(visit)
+    return names
+
+
+def _is_of_numbers(data: Any) -> bool:
+    kinds = [data.dtype[field] for field in data.dtype.names] if data.dtype.names else [data.dtype]
+    matlab = data.attrs.get("MATLAB_class")
+    return all(kind.kind in "biuf" for kind in kinds) and (matlab is None or matlab in MATLAB_CLASSES_OF_NUMBERS)
+
+
+def _values(data: Any, sample: bool = False) -> np.ndarray:
+    """Return a data set's values, of which a few rows tell the shape; MATLAB's have their axes the other way round."""
+    if "MATLAB_class" in data.attrs and data.ndim > 1:
+        return data[()].T if not sample else np.empty(data.shape[::-1], dtype=data.dtype)
+    return np.empty(data.shape, dtype=data.dtype) if sample else data[()]

@@ -1,0 +1,54 @@
+"""Logs in JSON: a list of records, records under a key, columns as lists, or one record a line."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pipelines.errors import InputError
+from pipelines.importing.sources.flatten import flattened
+from pipelines.importing.sources.source import Columns, Source
+from pipelines.settings.import_map import SourceSettings
+from pipelines.validation import suggestion
+
+
+def open_json(path: Path, settings: SourceSettings) -> Source:
+    """Return the log in a JSON file."""
+    columns = _flattened(_content(path), settings.table)
+    notes = (f"records under {settings.table}",) if settings.table else ()
+    return Source(path, "JSON", tuple(columns), lambda names: {name: columns[name] for name in names}, notes)
+
+
+def _content(path: Path) -> Any:
+    text = path.read_bytes().decode("utf-8-sig", errors="replace")
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as error:
+        lines = [line for line in text.splitlines() if line.strip()]
+        try:
+            return [json.loads(line) for line in lines]
+        except json.JSONDecodeError:
+            raise InputError(f"is not valid JSON: {error}; write it again") from error
+
+
+def _flattened(content: Any, table: str | None) -> Columns:
+    """Return columns by their names below the table; where none is named, of the only one that has records."""
+    if table is None:
+        columns = flattened(content)
+        prefixes = {name.partition(".")[0] for name, values in columns.items() if len(values) > 1}
+        if isinstance(content, Mapping) and len(prefixes) == 1 and isinstance(content[next(iter(prefixes))], list):
+            table = next(iter(prefixes))
+        else:
+            return columns
+    below = content
+    for key in table.split("."):
+        if not isinstance(below, Mapping) or key not in below:
+            known = [str(known) for known in below] if isinstance(below, Mapping) else []
+            raise InputError(f"has no {key!r}, which source.table names; {suggestion(key, known)}")
+        below = below[key]
+    constants = {name: values for name, values in flattened(content).items() if len(values) == 1}
+    return flattened(below, "" if _has_keys(below) else table) | constants
+
+
+def _has_keys(below: Any) -> bool:
+    return isinstance(below, Mapping) or (isinstance(below, list) and bool(below) and isinstance(below[0], Mapping))

@@ -1,0 +1,37 @@
+"""Logs in MATLAB's .mat files, v4 to v7.3."""
+
+from pathlib import Path
+
+import scipy.io
+
+from pipelines.errors import InputError
+from pipelines.importing.sources.flatten import flattened
+from pipelines.importing.sources.hdf5 import open_hdf5
+from pipelines.importing.sources.source import Source
+from pipelines.settings.import_map import SourceSettings
+from pipelines.validation import suggestion
+
+V73 = b"MATLAB 7.3"
+
+
+def open_matlab(path: Path, settings: SourceSettings) -> Source:
+    """Return the variables of a .mat file; fields of a struct have dotted names, columns of a matrix numbered ones."""
+    with open(path, "rb") as file:
+        if file.read(len(V73)) == V73:
+            return open_hdf5(path, settings, "MATLAB v7.3")
+    try:
+        content = scipy.io.loadmat(path, simplify_cells=True)
+    except Exception as error:  # scipy tells of a damaged file by whatever error its bytes lead to
+        raise InputError(
+            f"is a damaged .mat file ({type(error).__name__}: {error}); save it again, with -v7 or -v7.3"
+        ) from error
+    variables = {name: value for name, value in content.items() if not name.startswith("__")}
+    if settings.table is not None:
+        if settings.table not in variables:
+            raise InputError(
+                f"has no variable {settings.table!r}, which source.table names; "
+                f"{suggestion(settings.table, list(variables))}"
+            )
+        variables = variables[settings.table]
+    columns = flattened(variables)
+    return Source(path, "MATLAB", tuple(columns), lambda names: {name: columns[name] for name in names})

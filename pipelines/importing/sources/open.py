@@ -1,0 +1,58 @@
+"""The right reader for a file, by its content rather than its name."""
+
+from pathlib import Path
+
+from pipelines.errors import InputError
+from pipelines.importing.sources.hdf5 import open_hdf5
+from pipelines.importing.sources.json_text import open_json
+from pipelines.importing.sources.matlab import open_matlab
+from pipelines.importing.sources.parquet import open_parquet
+from pipelines.importing.sources.rosbag import open_rosbag
+from pipelines.importing.sources.source import Source
+from pipelines.importing.sources.text import open_text
+from pipelines.settings.import_map import SourceSettings
+
+BEGINNINGS = {
+    b"PAR1": open_parquet,
+    b"\x89HDF\r\n\x1a\n": open_hdf5,
+    b"MATLAB": open_matlab,
+    b"\x89MCAP0": open_rosbag,
+    b"SQLite format 3\0": open_rosbag,
+}
+"""What a file of a format starts with."""
+
+
+def open_source(path: Path, settings: SourceSettings) -> Source:
+    """Return the log in a file, whatever its format.
+
+    Raises
+    ------
+    InputError
+        Where there is no such file, or it is of no format that exoid knows, or damaged.
+    """
+    if not path.exists():
+        raise InputError("no such file; check the name")
+    if path.is_dir():
+        if not (path / "metadata.yaml").exists():
+            raise InputError("is a folder, expected a log or the folder of a ROS 2 bag; name a file in it")
+        return _with_columns(open_rosbag(path, settings))
+    with open(path, "rb") as file:
+        start = file.read(64)
+    if not start:
+        raise InputError("is empty (0 bytes), expected a log; record or copy it again")
+    for beginning, reader in BEGINNINGS.items():
+        if start.startswith(beginning):
+            return _with_columns(reader(path, settings))
+    if path.suffix == ".mat":  # v4 has no signature
+        return _with_columns(open_matlab(path, settings))
+    is_json = start.removeprefix(b"\xef\xbb\xbf").lstrip()[:1] in (b"{", b"[")
+    return _with_columns((open_json if is_json and b"\0" not in start else open_text)(path, settings))
+
+
+def _with_columns(source: Source) -> Source:
+    if not source.names:
+        raise InputError(
+            f"holds no column of numbers that exoid could read as {source.format}; "
+            "export it with plain arrays (of a MATLAB table, table2struct or writetable)"
+        )
+    return source

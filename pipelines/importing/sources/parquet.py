@@ -1,0 +1,51 @@
+"""Logs in Parquet."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from pipelines.errors import InputError
+from pipelines.importing.sources.flatten import flattened
+from pipelines.importing.sources.source import Columns, Source
+from pipelines.settings.import_map import SourceSettings
+
+
+def open_parquet(path: Path, settings: SourceSettings) -> Source:
+    """Return the log in a Parquet file; columns of a struct have dotted names, those of a list numbered ones."""
+    empty = _unnested(_opened(path).schema_arrow.empty_table())
+    if any(pa.types.is_nested(field.type) for field in empty.schema):
+        columns = flattened(_opened(path).read().to_pydict())
+        return Source(path, "Parquet", tuple(columns), lambda names: {name: columns[name] for name in names})
+
+    def load(names: Sequence[str]) -> Columns:
+        file = _opened(path)
+        tops = [top for top in file.schema_arrow.names if any(f"{name}.".startswith(f"{top}.") for name in names)]
+        table = _unnested(file.read(columns=tops))
+        return {name: _numpy(table.column(name)) for name in names}
+
+    return Source(path, "Parquet", tuple(empty.column_names), load)
+
+
+def _opened(path: Path) -> pq.ParquetFile:
+    try:
+        return pq.ParquetFile(path)
+    except pa.ArrowException as error:
+        raise InputError(f"is a damaged or truncated Parquet file ({error}); copy it again") from error
+
+
+def _unnested(table: pa.Table) -> pa.Table:
+    while any(pa.types.is_struct(field.type) for field in table.schema):
+        table = table.flatten()
+    return table
+
+
+def _numpy(column: pa.ChunkedArray) -> NDArray:
+    """Return the values; instants and durations as whole nanoseconds."""
+    if pa.types.is_timestamp(column.type):
+        column = column.cast(pa.timestamp("ns", column.type.tz)).cast(pa.int64())
+    elif pa.types.is_duration(column.type):
+        column = column.cast(pa.duration("ns")).cast(pa.int64())
+    return column.to_numpy()

@@ -1,0 +1,72 @@
+"""Logs of ROS 2: sensor_msgs/JointState out of bags (.mcap, .db3, or the folder that holds them)."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipelines.errors import InputError
+from pipelines.importing.sources.extra import library
+from pipelines.importing.sources.source import Columns, Source
+from pipelines.settings.import_map import SourceSettings
+from pipelines.validation import suggestion
+
+JOINT_STATE = "sensor_msgs/msg/JointState"
+QUANTITIES = ("position", "velocity", "effort")
+
+
+def open_rosbag(path: Path, settings: SourceSettings) -> Source:
+    """Return the joint states in a bag.
+
+    Columns are ``JOINT.position``, ``.velocity`` and ``.effort``; ``stamp`` is the header's time and ``log_time``
+    when the message was recorded, both in whole nanoseconds.
+    """
+    highlevel, typesys = library("rosbags.highlevel"), library("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.LATEST)
+    try:
+        with highlevel.AnyReader([path], default_typestore=store) as reader:
+            topic = _topic(reader, settings.table)
+            connections = [c for c in reader.connections if c.topic == topic]
+            columns = _columns(
+                (received, reader.deserialize(raw, c.msgtype)) for c, received, raw in reader.messages(connections)
+            )
+    except InputError:
+        raise
+    except Exception as error:  # a damaged bag makes its library fail in any way
+        raise InputError(f"is no ROS 2 bag that can be read ({error}); record or copy it again") from error
+    notes = (f"topic {topic}",)
+    return Source(path, "ROS 2 bag", tuple(columns), lambda names: {name: columns[name] for name in names}, notes)
+
+
+def _topic(reader: Any, named: str | None) -> str:
+    """Return the topic that is named, or the only one of joint states."""
+    topics = list(dict.fromkeys(c.topic for c in reader.connections if c.msgtype == JOINT_STATE))
+    if not topics:
+        others = ", ".join(f"{c.topic} ({c.msgtype})" for c in reader.connections) or "nothing"
+        raise InputError(f"holds no {JOINT_STATE}, but {others}; record the joint states too")
+    if named is None:
+        if len(topics) > 1:
+            raise InputError(f"has joint states on {', '.join(topics)}; name one in the map: source.table")
+        return topics[0]
+    if named not in topics:
+        raise InputError(f"has no topic {named!r}, which source.table names; {suggestion(named, topics)}")
+    return named
+
+
+def _columns(messages: Iterator[tuple[int, Any]]) -> Columns:
+    """Return a column of each joint's quantity; messages may name their joints in any order, or only some."""
+    stamps: list[int] = []
+    received: list[int] = []
+    values: dict[str, dict[int, float]] = {}
+    for row, (time, message) in enumerate(messages):
+        received.append(time)
+        stamps.append(10**9 * message.header.stamp.sec + message.header.stamp.nanosec)
+        for quantity in QUANTITIES:
+            for joint, value in zip(message.name, getattr(message, quantity), strict=False):
+                values.setdefault(f"{joint}.{quantity}", {})[row] = value
+    columns: Columns = {"stamp": np.array(stamps), "log_time": np.array(received)}
+    for name, known in values.items():
+        columns[name] = np.full(len(stamps), np.nan)
+        columns[name][list(known)] = list(known.values())
+    return columns

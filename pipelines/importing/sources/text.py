@@ -1,0 +1,60 @@
+"""Logs in text files: comma-separated values and all their relatives."""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from pipelines.errors import InputError
+from pipelines.importing.sources.dialect import Dialect, find_dialect
+from pipelines.importing.sources.source import Columns, Source
+from pipelines.settings.import_map import SourceSettings
+
+BEYOND = "\0beyond"
+"""A column after the last, in which nothing may stand."""
+CHUNK = 2**17
+"""Rows that are parsed at a time; the columns that nobody asked for are gone before the next."""
+
+
+def open_text(path: Path, settings: SourceSettings) -> Source:
+    """Return the log in a text file, in the dialect that was found or told."""
+    dialect = find_dialect(path, settings)
+    return Source(path, "text", dialect.names, lambda names: _load(path, dialect, names), dialect.notes)
+
+
+def _load(path: Path, dialect: Dialect, names: Sequence[str]) -> Columns:
+    parts: list[pd.DataFrame] = []
+    wanted = list(dict.fromkeys(names))
+    try:
+        # All columns: told to read only some, pandas would not see that a row has too many.
+        reader = pd.read_csv(
+            path, sep=dialect.separator, decimal=dialect.decimal, comment=dialect.comment, header=None,
+            names=[*dialect.names, BEYOND], skiprows=dialect.rows_before, encoding=dialect.encoding,
+            encoding_errors="replace", chunksize=CHUNK, skipinitialspace=True, index_col=False, low_memory=False,
+        )  # fmt: skip
+        with reader:
+            for part in reader:
+                if part[BEYOND].notna().any():
+                    raise InputError(_too_many_fields(f"row {part[BEYOND].notna().idxmax()}", dialect))
+                parts.append(part[wanted].copy())
+    except (pd.errors.ParserError, ValueError) as error:
+        line = re.search(r"in line (\d+), saw", str(error))
+        why = _too_many_fields(f"line {line[1]}", dialect) if line else f"cannot be read as text ({error})"
+        raise InputError(why) from error
+    return {name: _joined([part.pop(name).to_numpy() for part in parts]) for name in wanted}
+
+
+def _too_many_fields(where: str, dialect: Dialect) -> str:
+    return (
+        f"{where} has more than the {len(dialect.names)} fields of the others, and nobody knows which is which; mend "
+        f"it, or say in the map's [source] how the file is written (read with {dialect.in_words})"
+    )
+
+
+def _joined(parts: list[np.ndarray]) -> np.ndarray:
+    """Return the chunks of a column in one; what was text in one of them is none in the others."""
+    if len({part.dtype for part in parts}) > 1 and all(part.dtype != object for part in parts):
+        return np.concatenate([part.astype(float) for part in parts])
+    return np.concatenate(parts)

@@ -1,0 +1,265 @@
+"""A map: what the columns of a log from elsewhere are, so that ``exoid import`` can make recordings of it."""
+
+from collections import Counter
+from collections.abc import Iterator
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from pipelines.contracts.joints import Joint, Kind
+from pipelines.errors import SettingsError
+from pipelines.settings import transmission
+from pipelines.settings.base import Settings, load_toml
+from pipelines.settings.rig import GeometrySettings
+from pipelines.settings.units import unit_named, units_of
+
+LARGEST_ZERO = 1e12
+
+Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class SourceSettings(Settings):
+    """How the log is to be read; what is left out is found by looking at the file."""
+
+    delimiter: str | None = Field(None, min_length=1, description="What stands between the fields of a text file.")
+    decimal: Literal[".", ","] | None = Field(None, description="Decimal point of a text file.")
+    comment: str | None = Field(None, min_length=1, max_length=1, description="What a line to be skipped starts with.")
+    skip_rows: int | None = Field(None, ge=0, description="Lines of a text file before its header.")
+    columns: tuple[str, ...] | None = Field(None, description="Names of the columns, of a text file without a header.")
+    encoding: str | None = Field(None, description="Encoding of a text file, such as latin-1.")
+    table: str | None = Field(
+        None, description="Where in the file the columns are: a key (JSON), group (HDF5), struct (.mat) or topic (ROS)."
+    )
+
+
+class TimeSettings(Settings):
+    """The clock."""
+
+    column: str | None = Field(None, description="The column with the time stamps.")
+    unit: str = Field("s", description="s, ms, us, ns, min, or iso8601 for dates written out.")
+    wraps_at: float | None = Field(
+        None, gt=0.0, description="Reading at which the clock starts anew at 0, such as 4294967296 (32 bits)."
+    )
+    rate_hz: float | None = Field(
+        None, gt=0.0, description="In place of a column: rows a second, where no clock was logged."
+    )
+    restarts: Literal["longest", "split"] = Field(
+        "longest", description="Where the clock starts over: keep the longest run, or make a recording of each."
+    )
+
+    @model_validator(mode="after")
+    def _is_one_clock(self) -> Self:
+        if (self.column is None) == (self.rate_hz is None):
+            raise ValueError("expected either column or rate_hz (rows a second, where no clock was logged)")
+        _refuse_other_units(self.unit, ["time"])
+        return self
+
+
+class ReadingSettings(Settings):
+    """A column, or arithmetic with several, and how its numbers are to be understood."""
+
+    column: str | None = Field(None, description="Name of the column.")
+    expression: str | None = Field(
+        None, description='In place of a column: numbers and columns with + - * / ( ), such as "gtau * vir".'
+    )
+    unit: str = Field(description="Unit of the readings, after `scale`.")
+    scale: float = Field(1.0, description="Readings are multiplied by it first: 0.1 where a register counts tenths.")
+    sign: Literal[1, -1] = Field(1, description="-1 where the log counts the other way.")
+    zero: float = Field(
+        0.0, ge=-LARGEST_ZERO, le=LARGEST_ZERO, description="What the log says where the joint is at zero, in `unit`."
+    )
+    signed_bits: Literal[8, 16, 24, 32] | None = Field(
+        None, description="Bits of a signed register that was logged as if it had no sign; 65535 of 16 bits is -1."
+    )
+    wraps_at: float | None = Field(
+        None, gt=0.0, description="Raw reading at which a counter starts anew at 0 (65536, 360); turns are counted on."
+    )
+    range: tuple[float, float] | None = Field(
+        None, description="Lowest and highest raw reading to believe; rows with others are left out."
+    )
+    time: str | None = Field(
+        None, description="Column with this channel's own time stamps, where it was sampled at other instants."
+    )
+
+    @model_validator(mode="after")
+    def _is_one_reading(self) -> Self:
+        if (self.column is None) == (self.expression is None):
+            raise ValueError("expected either column or expression, one of them")
+        if self.scale == 0.0:
+            raise ValueError("scale: found 0, expected any other number")
+        if self.range is not None and self.range[0] >= self.range[1]:
+            raise ValueError(f"range: found {list(self.range)}, expected the lower limit first")
+        return self
+
+
+class ForceSettings(ReadingSettings):
+    """One axis of a cuff force sensor."""
+
+    at: Literal["thigh_front", "thigh_back", "shank_front", "shank_back"] = Field(description="Which cuff.")
+    axis: Literal["x", "y", "z"] = Field(description="x along the segment (distal), y forward, z lateral.")
+
+    @field_validator("unit")
+    @classmethod
+    def _is_a_force(cls, unit: str) -> str:
+        _refuse_other_units(unit, ["force"])
+        return unit
+
+    @property
+    def target(self) -> str:
+        """The recording's column."""
+        return f"{self.at}_force_{self.axis}_n"
+
+
+class JointReadingSettings(ReadingSettings):
+    """A quantity of a joint, measured there or at its motor."""
+
+    gear_ratio: float = Field(
+        1.0, gt=0.0, description="Turns of the motor for one of the joint, where the reading is the motor's."
+    )
+    counts_per_turn: float | None = Field(None, gt=0.0, description="Encoder counts in a turn of what it sits on.")
+    counts_per_m: float | None = Field(None, gt=0.0, description="Counts in a metre of a linear encoder.")
+    lead_m: float | None = Field(None, gt=0.0, description="Travel of a prismatic joint for a turn of its screw.")
+    torque_constant_nm_a: float | None = Field(None, gt=0.0, description="The motor's torque for its current.")
+    force_constant_n_a: float | None = Field(None, gt=0.0, description="The same of a linear motor.")
+    gain_nm_v: float | None = Field(None, gt=0.0, description="Torque for a voltage.")
+    gain_n_v: float | None = Field(None, gt=0.0, description="Force for a voltage.")
+    rated_torque_nm: float | None = Field(None, gt=0.0, description="What 100 % or 1000 permille are.")
+    rated_force_n: float | None = Field(None, gt=0.0, description="The same of a linear motor.")
+
+    def gain(self, target: str) -> float:
+        """Return what a reading in SI is multiplied by to be what it is at the joint."""
+        unit = unit_named(self.unit)
+        assert unit is not None, "was looked at with the joint"
+        given = {key: value for key in transmission.KEYS if (value := getattr(self, key)) is not None}
+        return transmission.gain(unit.dimension, target, given, self.gear_ratio)
+
+
+class JointSettings(Settings):
+    """A joint: its name, its kind, and its columns."""
+
+    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")] = Field(
+        description="Its name; a leg's are hip and knee, in this order."
+    )
+    kind: Kind = Field("revolute", description="revolute turns, prismatic slides.")
+    angle: JointReadingSettings = Field(description="Measured angle, or position of a prismatic joint.")
+    torque: JointReadingSettings = Field(description="What the drive delivers at the joint: torque, or force.")
+    reference: JointReadingSettings | None = Field(None, description="Commanded angle or position.")
+    velocity: JointReadingSettings | None = Field(None, description="The drive's own velocity estimate.")
+    current: JointReadingSettings | None = Field(None, description="Motor current.")
+    temperature: JointReadingSettings | None = Field(None, description="Temperature of drive or motor.")
+
+    @model_validator(mode="after")
+    def _units_lead_to_the_joint(self) -> Self:
+        for quantity, reading in self.readings():
+            target = transmission.TARGETS[quantity][self.kind]
+            try:
+                _refuse_other_units(reading.unit, transmission.sources(target))
+                reading.gain(target)
+            except ValueError as error:
+                raise ValueError(f"{quantity}.unit: {error}") from error
+        return self
+
+    def readings(self) -> Iterator[tuple[str, JointReadingSettings]]:
+        """Yield the quantities that the log has, and where they are."""
+        for quantity in transmission.TARGETS:
+            reading = getattr(self, quantity)
+            if reading is not None:
+                yield quantity, reading
+
+    @property
+    def joint(self) -> Joint:
+        """The joint as files have it."""
+        return Joint(self.name, self.kind)
+
+
+class RecordingSettings(Settings):
+    """A recording to make of each file: all of it, or a span."""
+
+    name: str = Field("{file}_{purpose}", description="Its name; {file} is the source's, without its ending.")
+    files: str = Field("*", description='Which files it is of, such as "swing_0[0-2].csv".')
+    purpose: Literal["train", "validate"] = Field(description="To be fitted to, or to be judged on.")
+    run: Literal["exo_alone", "with_human"] = Field(
+        "exo_alone", description="exo_alone is any machine with nobody in it."
+    )
+    span_s: tuple[float, float] | None = Field(None, description="Seconds of the run to take, from its start.")
+    span: tuple[Fraction, Fraction] | None = Field(None, description="The same as a share of the run, 0 to 1.")
+    period_s: float | None = Field(None, gt=0.0, description="Period of the excitation, where it repeats.")
+    subject: str | None = Field(None, description="Who was in the machine.")
+    session: str | None = Field(None, description="Of which session it is.")
+
+    @model_validator(mode="after")
+    def _is_one_span(self) -> Self:
+        if self.span is not None and self.span_s is not None:
+            raise ValueError("expected either span (shares) or span_s (seconds), one of them")
+        for name in ("span", "span_s"):
+            limits = getattr(self, name)
+            if limits is not None and limits[0] >= limits[1]:
+                raise ValueError(f"{name}: found {list(limits)}, expected its begin before its end")
+        return self
+
+    def is_of(self, file: str) -> bool:
+        """Tell whether it is to be made of a file of that name."""
+        return fnmatch(file, self.files)
+
+
+def _two_parts() -> tuple[RecordingSettings, ...]:
+    return (
+        RecordingSettings(purpose="train", span=(0.0, 0.7)),
+        RecordingSettings(purpose="validate", span=(0.7, 1.0)),
+    )
+
+
+class ImportMap(Settings):
+    """Everything that a log does not say of itself."""
+
+    rig: str | None = Field(None, description="Name of the machine.")
+    source: SourceSettings = Field(SourceSettings(), description="How the log is read.")
+    time: TimeSettings = Field(description="The clock.")
+    joint: tuple[JointSettings, ...] = Field(min_length=1, description="The joints.")
+    force: tuple[ForceSettings, ...] = Field((), description="Cuff force sensors.")
+    geometry: GeometrySettings = Field(GeometrySettings(), description="Lengths and gravity.")
+    recording: tuple[RecordingSettings, ...] = Field(
+        default_factory=_two_parts, min_length=1, description="What recordings to make."
+    )
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        for name, times in Counter(joint.name for joint in self.joint).items():
+            if times > 1:
+                raise ValueError(f"joint: found {name} twice, expected each name once; rename one")
+        for target, times in Counter(force.target for force in self.force).items():
+            if times > 1:
+                raise ValueError(f"force: found {target} twice, expected each axis of a cuff once; remove one")
+        owners: dict[str, str] = {}
+        for place, reading in self.readings():
+            if reading.column is not None:
+                owner = owners.setdefault(reading.column, place)
+                if owner != place:
+                    raise ValueError(
+                        f"{place}.column: found {reading.column!r}, which is {owner} already; correct one of them"
+                    )
+        return self
+
+    def readings(self) -> Iterator[tuple[str, ReadingSettings]]:
+        """Yield every reading and its place in the map, as messages name it."""
+        for i, joint in enumerate(self.joint):
+            for quantity, reading in joint.readings():
+                yield f"joint[{i}].{quantity}", reading
+        for i, force in enumerate(self.force):
+            yield f"force[{i}]", force
+
+
+def load_map(path: Path) -> ImportMap:
+    """Return the map in a file."""
+    if not path.exists():
+        raise SettingsError(f"{path}: no such file; `exoid import FILE... --guess --map {path}` proposes one")
+    return load_toml(path, ImportMap)
+
+
+def _refuse_other_units(name: str, dimensions: list[str]) -> None:
+    unit = unit_named(name)
+    if unit is None or unit.dimension not in dimensions:
+        what = f", a unit of {unit.dimension}" if unit else ""
+        raise ValueError(f"found {name!r}{what}, expected one of {dimensions[0]}: {', '.join(units_of(*dimensions))}")

@@ -1,0 +1,64 @@
+"""The page docs/import-map.md, written from the map's settings themselves.
+
+``python -m pipelines.settings.map_reference > docs/import-map.md`` brings it up to date; a test says when it is not.
+"""
+
+from pydantic import BaseModel
+
+from pipelines.settings.import_map import ImportMap
+from pipelines.settings.reference import rows_of, sections_of
+from pipelines.settings.transmission import GEARED, TARGETS, paths
+from pipelines.settings.units import ALIASES, UNITS
+
+INTRODUCTION = """\
+# Every key of a map for `exoid import`
+
+Written by `make docs` from `pipelines/settings/`; change it there. [import.md](import.md) tells how to write a map.
+
+Outside of all tables stands `rig`, the name of the machine.
+"""
+HEAD = "| key | default | meaning |\n|---|---|---|\n"
+
+
+def reference() -> str:
+    """Return the page as Markdown."""
+    headings: dict[type[BaseModel], list[str]] = {}
+    for heading, model in sections_of(ImportMap):
+        headings.setdefault(model, []).append(f"`{heading}`")
+    sections = [
+        f"## {', '.join(names)}\n\n{model.__doc__}\n\n{HEAD}" + "\n".join(rows_of(model))
+        for model, names in headings.items()
+    ]
+    return "\n\n".join([INTRODUCTION.rstrip(), *sections, _units(), _drive_trains()]) + "\n"
+
+
+def _units() -> str:
+    dimensions = dict.fromkeys(unit.dimension for unit in UNITS.values())
+    rows = [
+        f"| {dimension} | {', '.join(f'`{name}`' for name, unit in UNITS.items() if unit.dimension == dimension)} |"
+        for dimension in dimensions
+    ]
+    also = ", ".join(f"`{alias}` for `{name}`" for alias, name in ALIASES.items())
+    return "## Units\n\n| of | written |\n|---|---|\n" + "\n".join(rows) + f"\n\nAlso known: {also}."
+
+
+def _drive_trains() -> str:
+    """Return which keys lead from a unit to what a joint's quantity is."""
+    dimensions = dict.fromkeys(unit.dimension for unit in UNITS.values())
+    rows = [
+        f"| {source} | {target} | {' and '.join(f'`{step.key}`' for step in way)} | {_geared(target)} |"
+        for target in dict.fromkeys(target for kinds in TARGETS.values() for target in kinds.values())
+        for source in dimensions
+        for way in paths(source, target)
+        if way
+    ]
+    head = "| reading of | at the joint | needs | `gear_ratio` |\n|---|---|---|---|\n"
+    return "## From the motor to the joint\n\n" + head + "\n".join(rows)
+
+
+def _geared(target: str) -> str:
+    return {1: "multiplies", -1: "divides", 0: "is not used"}[GEARED[target]]
+
+
+if __name__ == "__main__":
+    print(reference(), end="")

@@ -1,0 +1,60 @@
+"""The units that a log may be written in, and what each is in SI."""
+
+from dataclasses import dataclass
+from math import pi
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit: SI value = factor x reading + offset."""
+
+    dimension: str
+    factor: float
+    offset: float = 0.0
+
+
+_TURN = 2.0 * pi
+_INCH, _POUND_FORCE, _KILOGRAM_FORCE = 0.0254, 4.4482216152605, 9.80665
+
+UNITS: dict[str, Unit] = {
+    "s": Unit("time", 1.0), "ms": Unit("time", 1e-3), "us": Unit("time", 1e-6), "ns": Unit("time", 1e-9),
+    "min": Unit("time", 60.0), "iso8601": Unit("time", 1e-9),
+    "rad": Unit("angle", 1.0), "mrad": Unit("angle", 1e-3), "deg": Unit("angle", pi / 180.0),
+    "rev": Unit("angle", _TURN),
+    "m": Unit("length", 1.0), "cm": Unit("length", 1e-2), "mm": Unit("length", 1e-3), "um": Unit("length", 1e-6),
+    "in": Unit("length", _INCH),
+    "counts": Unit("counts", 1.0), "counts/s": Unit("counts per second", 1.0),
+    "rad/s": Unit("angular velocity", 1.0), "mrad/s": Unit("angular velocity", 1e-3),
+    "deg/s": Unit("angular velocity", pi / 180.0), "rev/s": Unit("angular velocity", _TURN),
+    "rpm": Unit("angular velocity", _TURN / 60.0),
+    "m/s": Unit("velocity", 1.0), "cm/s": Unit("velocity", 1e-2), "mm/s": Unit("velocity", 1e-3),
+    "in/s": Unit("velocity", _INCH),
+    "N·m": Unit("torque", 1.0), "mN·m": Unit("torque", 1e-3), "kgf·cm": Unit("torque", 0.01 * _KILOGRAM_FORCE),
+    "lbf·in": Unit("torque", _INCH * _POUND_FORCE), "lbf·ft": Unit("torque", 12.0 * _INCH * _POUND_FORCE),
+    "N": Unit("force", 1.0), "mN": Unit("force", 1e-3), "kN": Unit("force", 1e3), "kgf": Unit("force", _KILOGRAM_FORCE),
+    "lbf": Unit("force", _POUND_FORCE),
+    "A": Unit("current", 1.0), "mA": Unit("current", 1e-3),
+    "V": Unit("voltage", 1.0), "mV": Unit("voltage", 1e-3),
+    "%": Unit("share", 1e-2), "permille": Unit("share", 1e-3),
+    "°C": Unit("temperature", 1.0), "K": Unit("temperature", 1.0, -273.15),
+    "°F": Unit("temperature", 5.0 / 9.0, -160.0 / 9.0),
+}  # fmt: skip
+
+ALIASES = {
+    "sec": "s", "µs": "us", "μs": "us", "°": "deg", "degree": "deg", "degrees": "deg", "turn": "rev", "turns": "rev",
+    "count": "counts", "ticks": "counts", "rps": "rev/s", "RPM": "rpm", "1/min": "rpm", "°/s": "deg/s", "dps": "deg/s",
+    "Nm": "N·m", "N*m": "N·m", "N.m": "N·m", "N m": "N·m", "mNm": "mN·m", "mN*m": "mN·m", "kgf*cm": "kgf·cm",
+    "in-lb": "lbf·in", "ft-lb": "lbf·ft", "degC": "°C", "C": "°C", "degF": "°F", "‰": "permille",
+    "µm": "um", "μm": "um",
+}  # fmt: skip
+"""Other ways to write them."""
+
+
+def unit_named(name: str) -> Unit | None:
+    """Return the unit that is written so; None where there is none."""
+    return UNITS.get(ALIASES.get(name, name))
+
+
+def units_of(*dimensions: str) -> list[str]:
+    """Return the names of all units of some dimensions."""
+    return [name for name, unit in UNITS.items() if unit.dimension in dimensions]

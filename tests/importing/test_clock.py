@@ -1,0 +1,170 @@
+"""A clock that repeats, goes back, starts over, stops or wraps: seen, told, handled; nothing is invented."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from tests.importing.conftest import MAP
+
+
+def cut(columns, rows):
+    return {name: values[rows] for name, values in columns.items()}
+
+
+def joined(*parts):
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def test_irregular_samples_keep_their_instants(imported, pendulum, write_csv):
+    jitter = np.random.default_rng(1).uniform(-0.001, 0.001, len(pendulum.time))
+    columns = pendulum.columns() | {"time": pendulum.time + jitter}
+    outcome = imported(write_csv(columns))
+    table = outcome.recording()
+    assert "irregular" in outcome.told
+    assert_allclose(table.frame["time_s"], columns["time"] - columns["time"][0], atol=1e-9)
+    assert table.metadata["sample_rate_hz"] == pytest.approx(200.0, rel=1e-3)
+    assert table.metadata["imported"]["irregular_share"] > 0.5
+    assert table.metadata["gaps"] == []
+
+
+def test_a_clock_in_whole_milliseconds_is_told_of_but_has_no_gaps(imported, pendulum, write_csv):
+    time = np.arange(2000) / 300.0
+    columns = pendulum.columns() | {"time": np.round(1e3 * time).astype(int)}
+    outcome = imported(write_csv(columns), map_text=MAP.replace('unit = "s"', 'unit = "ms"'))
+    metadata = outcome.recording().metadata
+    assert metadata["sample_rate_hz"] == pytest.approx(300.0, rel=1e-3)
+    assert metadata["gaps"] == []
+
+
+def test_lost_rows_become_gaps_and_are_not_filled_in(imported, pendulum, write_csv):
+    kept = np.ones(2000, dtype=bool)
+    kept[300:310] = kept[700] = False
+    outcome = imported(write_csv(cut(pendulum.columns(), kept)))
+    table = outcome.recording()
+    assert len(table.frame) == 1989
+    assert table.metadata["sample_rate_hz"] == pytest.approx(200.0)
+    assert_allclose(table.metadata["gaps"], [[1.5, 10], [3.5, 1]])
+    assert "2 gaps, 11 samples missing" in outcome.told
+
+
+def test_rows_without_a_number_become_gaps(imported, pendulum, write_csv):
+    angle = pendulum.angle.astype(object)
+    angle[100:103] = ""
+    angle[500] = "ERR"
+    velocity = pendulum.velocity.copy()
+    velocity[900] = np.nan
+    outcome = imported(write_csv(pendulum.columns() | {"angle": angle, "velocity": velocity}))
+    table = outcome.recording()
+    assert_allclose(table.metadata["gaps"], [[0.5, 3], [2.5, 1]])
+    assert np.isnan(table.frame["pivot_velocity_rad_s"]).sum() == 1
+    assert "'ERR' in row 500" in outcome.told
+    assert "no value in 4 rows; rows left out" in outcome.told
+
+
+def test_repeated_stamps_are_dropped_and_told(imported, pendulum, write_csv):
+    outcome = imported(write_csv(cut(pendulum.columns(), np.sort(np.append(np.arange(2000), [50, 50, 60])))))
+    assert len(outcome.recording().frame) == 2000
+    assert "3 rows (0.1%) with the stamp of another, the first is row 51; the first of each kept" in outcome.told
+
+
+def test_rows_out_of_order_are_put_in_order(imported, pendulum, write_csv):
+    order = np.arange(2000)
+    order[[100, 101]] = order[[101, 100]]
+    outcome = imported(write_csv(cut(pendulum.columns(), order)))
+    assert_allclose(outcome.recording().frame["pivot_angle_rad"], pendulum.angle)
+    assert "rows put in order" in outcome.told
+
+
+def test_a_clock_that_starts_over_keeps_the_longest_run(imported, pendulum, write_csv):
+    columns = joined(cut(pendulum.columns(), slice(0, 600)), pendulum.columns())
+    outcome = imported(write_csv(columns))
+    frame = outcome.recording().frame
+    assert_allclose(frame["time_s"], pendulum.time, atol=1e-9)
+    assert_allclose(frame["pivot_angle_rad"], pendulum.angle)
+    assert "clock starts over at row 600, 2.995 s back" in outcome.told
+    assert "2 runs; rows 600-2599 kept, 600 left out" in outcome.told
+
+
+def test_a_clock_that_starts_over_can_be_split_into_runs(imported, pendulum, write_csv):
+    columns = joined(cut(pendulum.columns(), slice(0, 600)), pendulum.columns())
+    outcome = imported(write_csv(columns), map_text=MAP.replace('unit = "s"', 'unit = "s"\nrestarts = "split"', 1))
+    assert len(outcome.recording("whole_run1").frame) == 600
+    assert len(outcome.recording("whole_run2").frame) == 2000
+
+
+def test_a_short_run_that_starts_over_is_not_mixed_with_the_next(imported, pendulum, write_csv):
+    """Half a second back is no more than a late packet could be; a hundred rows of it are."""
+    columns = joined(cut(pendulum.columns(), slice(0, 100)), pendulum.columns())
+    assert_allclose(imported(write_csv(columns)).recording().frame["pivot_angle_rad"], pendulum.angle)
+
+
+def test_a_first_sample_long_before_the_rest_is_left_out(imported, pendulum, write_csv):
+    late = cut(pendulum.columns(), slice(1, None)) | {"time": pendulum.time[1:] + 1.0}
+    outcome = imported(write_csv(joined(cut(pendulum.columns(), slice(0, 1)), late)))
+    table = outcome.recording()
+    assert "1 row 1 s before the rest; left out" in outcome.told
+    assert_allclose(table.frame["time_s"], pendulum.time[:-1], atol=1e-9)
+    assert table.metadata["imported"]["began_s"] == pytest.approx(1.005)
+
+
+def test_a_single_wild_stamp_is_left_out(imported, pendulum, write_csv):
+    time = pendulum.time.copy()
+    time[1000] = 4e9
+    outcome = imported(write_csv(pendulum.columns() | {"time": time}))
+    assert len(outcome.recording().frame) == 1999
+    assert "1 stamp far from both neighbours, the first in row 1000; left out" in outcome.told
+
+
+@pytest.mark.parametrize(("bits", "unit", "scale"), [(16, "ms", 1e3), (32, "us", 1e6)])
+def test_a_clock_that_was_full_is_told_of_and_counted_on_where_the_map_says_so(
+    imported, pendulum, write_csv, bits, unit, scale
+):
+    ticks = (np.round(pendulum.time * scale).astype(np.int64) + 2**bits - round(4 * scale)) % 2**bits
+    path = write_csv(pendulum.columns() | {"time": ticks})
+    text = MAP.replace('unit = "s"', f'unit = "{unit}"', 1)
+    silent = imported(path, map_text=text)
+    assert f"set time.wraps_at = {2**bits}" in silent.told
+    outcome = imported(path, map_text=text.replace("[time]", f"[time]\nwraps_at = {2**bits}"))
+    assert_allclose(outcome.recording().frame["time_s"], pendulum.time, atol=1e-9)
+
+
+def test_a_log_without_a_clock_is_uniform_where_the_map_says_so(imported, pendulum, write_csv):
+    columns = pendulum.columns()
+    del columns["time"]
+    text = MAP.replace('column = "time"\nunit = "s"', "rate_hz = 200.0")
+    outcome = imported(write_csv(columns), map_text=text)
+    assert_allclose(outcome.recording().frame["time_s"], pendulum.time)
+    assert "no clock in the log" in outcome.told
+
+
+def test_a_channel_with_a_clock_of_its_own_is_interpolated(imported, pendulum, tmp_path):
+    """Torque at 1 kHz, from its own clock, beside angles at 200 Hz: 0.05 N·m s² of bend make at most 10^-4 N·m."""
+    import scipy.io
+
+    fast = np.arange(0.5, 9.0, 0.001)
+    path = tmp_path / "log.mat"
+    torque = np.interp(fast, pendulum.time, pendulum.torque)
+    scipy.io.savemat(path, pendulum.columns() | {"torque": torque, "fast": fast})
+    without = imported(path)
+    assert (without.code, "8500 rows where the clock has 2000" in without.err) == (2, True)
+    text = MAP.replace('column = "torque"', 'column = "torque", time = "fast"')
+    outcome = imported(path, map_text=text)
+    frame = outcome.recording().frame
+    inside = (pendulum.time >= 0.5) & (pendulum.time <= fast[-1])
+    assert_allclose(frame["pivot_torque_nm"], pendulum.torque[inside], atol=1e-4)
+    assert "sampled at 1000 Hz by a clock of its own (fast)" in outcome.told
+
+
+def test_rows_that_never_hold_both_need_to_be_interpolated(imported, pendulum, write_csv):
+    """Two streams merged by time: each row has what one of them said."""
+    torque = np.where(np.arange(2000) % 2, pendulum.torque, np.nan)
+    angle = np.where(np.arange(2000) % 2, np.nan, pendulum.angle)
+    path = write_csv(pendulum.columns() | {"torque": torque, "angle": angle})
+    without = imported(path)
+    assert without.code == 2
+    assert "pivot_angle_rad in 50%, pivot_torque_nm in 50% of the rows" in without.err
+    text = MAP.replace('column = "angle"', 'column = "angle", time = "time"')
+    frame = imported(path, map_text=text).recording().frame
+    assert len(frame) == 999  # not the last row: no angle follows it
+    assert_allclose(frame["pivot_torque_nm"], pendulum.torque[1:-1:2], atol=1e-12)
+    assert_allclose(frame["pivot_angle_rad"], pendulum.angle[1:-1:2], atol=2e-4)

@@ -1,0 +1,226 @@
+"""A log says the same whatever format it is written in."""
+
+import json
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+import scipy.io
+from numpy.testing import assert_allclose
+
+from tests.importing.conftest import MAP
+
+
+def assert_is_the_pendulum(outcome, pendulum, name="whole"):
+    assert (outcome.code, outcome.err) == (0, "")
+    frame = outcome.recording(name).frame
+    assert_allclose(frame["time_s"], pendulum.time, atol=1e-9)
+    assert_allclose(frame["pivot_angle_rad"], pendulum.angle, atol=1e-12)
+    assert_allclose(frame["pivot_torque_nm"], pendulum.torque, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {},
+        {"delimiter": ";", "decimal": ","},
+        {"delimiter": "\t"},
+        {"delimiter": "|"},
+        {"delimiter": " "},
+        {"encoding": "utf-8-sig"},
+        {"encoding": "utf-16"},
+        {"before": "# recorded by hand\n# at 20 °C\n"},
+        {"before": "Logger 3\nDate;2025-01-31\n\n", "delimiter": ";"},
+        {"name": "log.txt"},
+    ],
+    ids=str,
+)
+def test_text_is_read_however_it_is_delimited(imported, pendulum, write_csv, how):
+    assert_is_the_pendulum(imported(write_csv(pendulum.columns(), **how)), pendulum)
+
+
+def test_comments_among_the_rows_are_no_rows(imported, pendulum, write_csv):
+    path = write_csv(pendulum.columns())
+    lines = path.read_text().splitlines()
+    lines.insert(500, "# the operator coughed, twice, loudly, here")
+    path.write_text("\n".join(lines))
+    assert_is_the_pendulum(imported(path), pendulum)
+
+
+def test_a_row_of_units_below_the_header_belongs_to_the_names(imported, pendulum, write_csv):
+    path = write_csv(pendulum.columns())
+    header, rest = path.read_text().split("\n", 1)
+    path.write_text(f"{header}\n[s],[rad],[rad/s],[Nm]\n{rest}")
+    text = MAP.replace('"time"', '"time [s]"').replace('"angle"', '"angle [rad]"')
+    text = text.replace('"velocity"', '"velocity [rad/s]"').replace('"torque"', '"torque [Nm]"')
+    assert_is_the_pendulum(imported(path, map_text=text), pendulum)
+
+
+def test_columns_without_a_header_can_be_named_or_numbered(imported, pendulum, write_csv):
+    path = write_csv(pendulum.columns(), header=False)
+    named = '[source]\ncolumns = ["time", "angle", "velocity", "torque"]\n' + MAP
+    assert_is_the_pendulum(imported(path, map_text=named), pendulum)
+    numbered = MAP
+    for k, name in enumerate(pendulum.columns(), 1):
+        numbered = numbered.replace(f'column = "{name}"', f'column = "c{k}"')
+    assert_is_the_pendulum(imported(path, map_text=numbered), pendulum)
+
+
+def test_dates_are_time(imported, pendulum, write_csv):
+    dates = pd.Timestamp("2025-03-30 01:59:58.000123") + pd.to_timedelta(pendulum.time, unit="s")
+    path = write_csv(pendulum.columns() | {"time": dates.strftime("%Y-%m-%d %H:%M:%S.%f")})
+    assert_is_the_pendulum(imported(path, map_text=MAP.replace('unit = "s"', 'unit = "iso8601"')), pendulum)
+
+
+def test_nanoseconds_since_1970_lose_no_digit(imported, pendulum, write_csv):
+    stamps = 1_700_000_000_123_456_789 + np.round(pendulum.time * 1e9).astype(np.int64)
+    path = write_csv(pendulum.columns() | {"time": stamps})
+    assert_is_the_pendulum(imported(path, map_text=MAP.replace('unit = "s"', 'unit = "ns"')), pendulum)
+
+
+def test_parquet(imported, pendulum, tmp_path):
+    path = tmp_path / "log.parquet"
+    pd.DataFrame(pendulum.columns()).to_parquet(path)
+    assert_is_the_pendulum(imported(path), pendulum)
+
+
+def test_parquet_with_nested_columns(imported, pendulum, tmp_path):
+    path = tmp_path / "log.parquet"
+    states = [{"angle": a, "velocity": v} for a, v in zip(pendulum.angle, pendulum.velocity, strict=True)]
+    pd.DataFrame({"time": pendulum.time, "state": states, "torque": pendulum.torque}).to_parquet(path)
+    text = MAP.replace('"angle"', '"state.angle"').replace('"velocity"', '"state.velocity"')
+    assert_is_the_pendulum(imported(path, map_text=text), pendulum)
+
+
+@pytest.mark.parametrize("shape", ["records", "under a key", "columns", "lines"])
+def test_json(imported, pendulum, tmp_path, shape):
+    columns = {name: values.tolist() for name, values in pendulum.columns().items()}
+    records = pd.DataFrame(columns).to_dict("records")
+    text = {
+        "records": json.dumps(records),
+        "under a key": json.dumps({"mass": 0.5, "motor": "m", "entries": records}),
+        "columns": json.dumps({"mass": 0.5, **columns}),
+        "lines": "\n".join(json.dumps(record) for record in records),
+    }[shape]
+    path = tmp_path / "log.json"
+    path.write_text(text)
+    assert_is_the_pendulum(imported(path), pendulum)
+
+
+def test_json_with_arrays_in_its_records(imported, pendulum, tmp_path):
+    records = [
+        {"t": t, "joints": {"q": [0.0, q], "dq": [0.0, dq]}, "tau": [0.0, tau]}
+        for t, q, dq, tau in zip(*(values.tolist() for values in pendulum.columns().values()), strict=True)
+    ]
+    path = tmp_path / "log.json"
+    path.write_text(json.dumps({"data": {"samples": records}, "note": "x"}))
+    text = '[source]\ntable = "data.samples"\n' + MAP.replace('"time"', '"t"').replace('"angle"', '"joints.q[1]"')
+    text = text.replace('"velocity"', '"joints.dq[1]"').replace('"torque"', '"tau[1]"')
+    assert_is_the_pendulum(imported(path, map_text=text), pendulum)
+
+
+@pytest.mark.parametrize("version", ["4", "5"])
+def test_matlab(imported, pendulum, tmp_path, version):
+    path = tmp_path / "log.mat"
+    columns = {name: values[:, np.newaxis] for name, values in pendulum.columns().items()}
+    scipy.io.savemat(path, columns, format=version)
+    assert_is_the_pendulum(imported(path), pendulum)
+
+
+def test_matlab_structs_and_matrices(imported, pendulum, tmp_path):
+    path = tmp_path / "log.mat"
+    state = np.column_stack([pendulum.angle, pendulum.velocity])
+    scipy.io.savemat(path, {"run": {"time": pendulum.time, "state": state, "drive": {"torque": pendulum.torque}}})
+    text = MAP.replace('"time"', '"run.time"').replace('"angle"', '"run.state[0]"')
+    text = text.replace('"velocity"', '"run.state[1]"').replace('"torque"', '"run.drive.torque"')
+    assert_is_the_pendulum(imported(path, map_text=text), pendulum)
+
+
+def test_matlab_v73(imported, pendulum, tmp_path):
+    """As MATLAB writes it: HDF5 behind a header of 512 bytes, axes the other way round, a class at each variable."""
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "log.mat"
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, values in pendulum.columns().items():
+            file[name] = values[np.newaxis, :]
+            file[name].attrs["MATLAB_class"] = np.bytes_("double")
+        file["title"] = np.array([[104, 105]], dtype=np.uint16)
+        file["title"].attrs["MATLAB_class"] = np.bytes_("char")
+    with open(path, "r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+    assert_is_the_pendulum(imported(path), pendulum)
+
+
+def test_hdf5(imported, pendulum, tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "log.h5"
+    with h5py.File(path, "w") as file:
+        file["run/time"] = pendulum.time
+        file["run/state"] = np.column_stack([pendulum.angle, pendulum.velocity])
+        file["run/drive"] = np.array([(t,) for t in pendulum.torque], dtype=[("torque", float)])
+    text = MAP.replace('"time"', '"run/time"').replace('"angle"', '"run/state[0]"')
+    text = text.replace('"velocity"', '"run/state[1]"').replace('"torque"', '"run/drive.torque"')
+    assert_is_the_pendulum(imported(path, map_text=text), pendulum)
+    below = text.replace("run/", "")
+    assert_is_the_pendulum(imported(path, map_text='[source]\ntable = "run"\n' + below), pendulum)
+
+
+@pytest.fixture(params=["mcap", "sqlite3"])
+def bag(request, pendulum, tmp_path):
+    """A ROS 2 bag whose messages name two joints in changing order, beside another topic."""
+    rosbag2, typesys = pytest.importorskip("rosbags.rosbag2"), pytest.importorskip("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    types = store.types
+    plugin = rosbag2.StoragePlugin.MCAP if request.param == "mcap" else rosbag2.StoragePlugin.SQLITE3
+    with rosbag2.Writer(tmp_path / "bag", version=9, storage_plugin=plugin) as writer:
+        kind = "sensor_msgs/msg/JointState"
+        states = writer.add_connection("/joint_states", kind, typestore=store)
+        text = writer.add_connection("/rosout_text", "std_msgs/msg/String", typestore=store)
+        hello = types["std_msgs/msg/String"]("hello")
+        writer.write(text, 1_700_000_000_000_000_000, store.serialize_cdr(hello, "std_msgs/msg/String"))
+        rows = zip(pendulum.time, pendulum.angle, pendulum.velocity, pendulum.torque, strict=True)
+        for k, (time, *values) in enumerate(rows):
+            stamp = 1_700_000_000_000_000_000 + round(time * 1e9)
+            header = types["std_msgs/msg/Header"](
+                types["builtin_interfaces/msg/Time"](sec=stamp // 10**9, nanosec=stamp % 10**9), "base"
+            )
+            order = [0, 1] if k % 2 else [1, 0]
+            arrays = [np.array([value, 9.0])[order] for value in values]
+            message = types[kind](header, [["pivot", "other"][j] for j in order], *arrays)
+            writer.write(states, stamp + 150_000, store.serialize_cdr(message, kind))
+    return tmp_path / "bag"
+
+
+BAG_MAP = """
+[time]
+column = "stamp"
+unit = "ns"
+
+[[joint]]
+name = "pivot"
+angle = { column = "pivot.position", unit = "rad" }
+velocity = { column = "pivot.velocity", unit = "rad/s" }
+torque = { column = "pivot.effort", unit = "N·m" }
+
+[[recording]]
+name = "whole"
+purpose = "train"
+"""
+
+
+def test_ros_bags(imported, pendulum, bag):
+    assert_is_the_pendulum(imported(bag, map_text=BAG_MAP), pendulum)
+    (stored,) = (file for file in bag.iterdir() if file.suffix in (".mcap", ".db3"))
+    assert_is_the_pendulum(imported(stored, map_text=BAG_MAP), pendulum)
+
+
+def test_a_library_that_is_not_installed_is_named_with_its_extra(imported, pendulum, tmp_path, monkeypatch):
+    path = tmp_path / "log.h5"
+    path.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    outcome = imported(path)
+    assert outcome.code == 2
+    assert outcome.err == (
+        f"exoid: {path}: to read it exoid needs h5py, which is not installed; pip install 'exoid[import]'\n"
+    )

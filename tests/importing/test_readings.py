@@ -1,0 +1,171 @@
+"""A reading becomes the quantity at the joint: unit, sign, zero, registers, drive train."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pipelines.settings.units import UNITS
+from tests.importing.conftest import MAP
+
+WRITTEN = [
+    ("rad", 1.0, ""),
+    ("deg", 180.0 / np.pi, ""),
+    ("rev", 0.5 / np.pi, ""),
+    ("mrad", 1e3, ""),
+    ("counts", 4096 / (2 * np.pi), ", counts_per_turn = 4096"),
+    ("counts", 50 * 4096 / (2 * np.pi), ", counts_per_turn = 4096, gear_ratio = 50"),
+]
+
+
+@pytest.mark.parametrize(("unit", "factor", "keys"), WRITTEN)
+def test_angles_are_radians_at_the_joint(imported, pendulum, write_csv, unit, factor, keys):
+    path = write_csv(pendulum.columns() | {"angle": factor * pendulum.angle})
+    text = MAP.replace('column = "angle", unit = "rad"', f'column = "angle", unit = "{unit}"{keys}')
+    assert_allclose(imported(path, map_text=text).recording().frame["pivot_angle_rad"], pendulum.angle, atol=1e-12)
+
+
+def test_sign_and_zero(imported, pendulum, write_csv):
+    """A joint whose encoder says 30 degrees where it hangs down, and counts the other way."""
+    path = write_csv(pendulum.columns() | {"angle": 30.0 - np.degrees(pendulum.angle)})
+    text = MAP.replace('column = "angle", unit = "rad"', 'column = "angle", unit = "deg", sign = -1, zero = 30.0')
+    assert_allclose(imported(path, map_text=text).recording().frame["pivot_angle_rad"], pendulum.angle, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "keys"),
+    [
+        ("N·m", 1.0, ""),
+        ("Nm", 1.0, ""),
+        ("mN·m", 1e3 / 50, ", gear_ratio = 50"),
+        ("A", 1 / (0.07 * 50), ", torque_constant_nm_a = 0.07, gear_ratio = 50"),
+        ("mA", 1e3 / (0.07 * 50), ", torque_constant_nm_a = 0.07, gear_ratio = 50"),
+        ("V", 1 / 2.5, ", gain_nm_v = 2.5"),
+        ("permille", 1e3 / (1.2 * 50), ", rated_torque_nm = 1.2, gear_ratio = 50"),
+        ("kgf·cm", 1 / 0.0980665, ""),
+    ],
+)
+def test_torque_is_what_the_drive_delivers_at_the_joint(imported, pendulum, write_csv, unit, factor, keys):
+    path = write_csv(pendulum.columns() | {"torque": factor * pendulum.torque})
+    text = MAP.replace('column = "torque", unit = "N·m"', f'column = "torque", unit = "{unit}"{keys}')
+    assert_allclose(imported(path, map_text=text).recording().frame["pivot_torque_nm"], pendulum.torque, atol=1e-12)
+
+
+def test_a_screw_turns_torque_into_force_and_turns_into_travel(imported, pendulum, write_csv):
+    """What a motor does, 2 pi x torque a turn, is what the slide does, lead x force: power is the same."""
+    columns = pendulum.columns()
+    text = MAP.replace('name = "pivot"', 'name = "axis"\nkind = "prismatic"')
+    text = text.replace('unit = "rad" }', 'unit = "rad", lead_m = 0.005 }')
+    text = text.replace('unit = "rad/s" }', 'unit = "rad/s", lead_m = 0.005 }')
+    text = text.replace('unit = "N·m" }', 'unit = "N·m", lead_m = 0.005 }')
+    table = imported(write_csv(columns), map_text=text).recording()
+    power = table.frame["axis_force_n"] * table.frame["axis_velocity_m_s"]
+    assert_allclose(power, pendulum.torque * pendulum.velocity, atol=1e-12)
+    assert_allclose(table.frame["axis_position_m"], pendulum.angle * 0.005 / (2 * np.pi))
+    assert [(joint.name, joint.kind) for joint in table.joints] == [("axis", "prismatic")]
+
+
+def test_a_register_logged_without_its_sign_gets_it_back(imported, pendulum, write_csv):
+    current = np.round(1e3 * pendulum.torque).astype(int)
+    path = write_csv(pendulum.columns() | {"torque": current % 65536})
+    text = MAP.replace('unit = "N·m"', 'unit = "mA", signed_bits = 16, torque_constant_nm_a = 1.0')
+    outcome = imported(path, map_text=text)
+    assert_allclose(outcome.recording().frame["pivot_torque_nm"], 1e-3 * current)
+    assert "a signed register of 16 bits logged without its sign" in outcome.told
+
+
+def test_what_a_register_cannot_hold_is_missing(imported, pendulum, write_csv):
+    """4.2949673e9 is more than 2^32: a small negative number whose last digits a float32 has lost."""
+    counts = np.round(4096 / (2 * np.pi) * pendulum.angle).astype(np.int64)
+    unsigned = (counts % 2**32).astype(object)
+    unsigned[40] = "4.2949673E9"
+    text = MAP.replace('unit = "rad"', 'unit = "counts", signed_bits = 32, counts_per_turn = 4096')
+    outcome = imported(write_csv(pendulum.columns() | {"angle": unsigned}), map_text=text)
+    assert_allclose(outcome.recording().metadata["gaps"], [[0.2, 1]])
+    assert "1 row that 32 bits cannot hold, the first 4294967300; taken for missing" in outcome.told
+
+
+def test_an_encoder_that_wraps_is_counted_on(imported, pendulum, write_csv):
+    path = write_csv(pendulum.columns() | {"angle": np.degrees(pendulum.angle) % 360.0})
+    text = MAP.replace('unit = "rad"', 'unit = "deg", wraps_at = 360.0', 1)
+    outcome = imported(path, map_text=text)
+    assert_allclose(np.diff(outcome.recording().frame["pivot_angle_rad"]), np.diff(pendulum.angle), atol=1e-12)
+    assert "wraps at 360" in outcome.told
+
+
+def test_a_range_leaves_out_what_cannot_be(imported, pendulum, write_csv):
+    torque = pendulum.torque.copy()
+    torque[7] = 1e6
+    text = MAP.replace('unit = "N·m"', 'unit = "N·m", range = [-100, 100]')
+    outcome = imported(write_csv(pendulum.columns() | {"torque": torque}), map_text=text)
+    assert len(outcome.recording().frame) == 1999
+    assert "1 row outside -100 … 100; taken for missing" in outcome.told
+
+
+def test_expressions_are_arithmetic_with_columns(imported, pendulum, tmp_path):
+    """The second link's absolute angle, and a controller's volts times a constant that stands in the file."""
+    import scipy.io
+
+    path = tmp_path / "log.mat"
+    content = {
+        "time": pendulum.time, "q1": np.cos(pendulum.time), "q2": pendulum.angle + np.cos(pendulum.time),
+        "velocity": pendulum.velocity, "vir": pendulum.torque / 35.15, "gtau": 35.15,
+    }  # fmt: skip
+    scipy.io.savemat(path, content)
+    text = MAP.replace('column = "angle"', 'expression = "q2 - q1"')
+    text = text.replace('column = "torque"', 'expression = "gtau * vir"')
+    frame = imported(path, map_text=text).recording().frame
+    assert_allclose(frame["pivot_angle_rad"], pendulum.angle, atol=1e-12)
+    assert_allclose(frame["pivot_torque_nm"], pendulum.torque, atol=1e-12)
+
+
+def test_names_with_blanks_stand_in_backquotes(imported, pendulum, write_csv):
+    columns = pendulum.columns()
+    columns["drive torque (Nm)"] = 2.0 * columns.pop("torque")
+    text = MAP.replace('column = "torque"', 'expression = "-(-`drive torque (Nm)`) / 2"')
+    frame = imported(write_csv(columns), map_text=text).recording().frame
+    assert_allclose(frame["pivot_torque_nm"], pendulum.torque, atol=1e-12)
+
+
+def test_spans_of_one_file_become_recordings_that_do_not_overlap(imported, pendulum, write_csv):
+    text = MAP.partition("[[recording]]")[0] + (
+        '[[recording]]\npurpose = "train"\nspan = [0.0, 0.7]\n[[recording]]\npurpose = "validate"\nspan = [0.7, 1.0]\n'
+    )
+    outcome = imported(write_csv(pendulum.columns()), map_text=text)
+    train, validate = outcome.recording("log_train"), outcome.recording("log_validate")
+    assert (train.metadata["purpose"], validate.metadata["purpose"]) == ("train", "validate")
+    both = np.concatenate([train.frame["pivot_angle_rad"], validate.frame["pivot_angle_rad"]])
+    assert_allclose(both, pendulum.angle)
+    assert validate.frame["time_s"].iloc[0] == pytest.approx(7.0, abs=0.006)
+
+
+def test_where_a_recording_came_from_stands_in_it(imported, pendulum, write_csv):
+    path = write_csv(pendulum.columns())
+    text = 'rig = "bench"\n' + MAP + "[geometry]\ngravity_m_s2 = 9.81\n"
+    metadata = imported(path, map_text=text).recording().metadata
+    assert [entry["name"] for entry in metadata["inputs"]] == ["log.csv", "map.toml"]
+    assert metadata["config"]["joint"][0]["angle"]["column"] == "angle"
+    assert (metadata["rig"], metadata["geometry"]) == ("bench", {"gravity_m_s2": 9.81})
+    assert metadata["imported"]["rows_in_source"] == 2000
+
+
+def test_a_velocity_that_does_not_integrate_to_the_angle_is_told(imported, pendulum, write_csv):
+    path = write_csv(pendulum.columns() | {"velocity": np.degrees(pendulum.velocity)})
+    outcome = imported(path)
+    assert "integrates to 57.3 times the way that pivot_angle_rad goes" in outcome.told
+
+
+def test_a_torque_of_the_wrong_sign_is_told(imported, pendulum, write_csv):
+    friction = 3.0 * np.tanh(pendulum.velocity / 0.01)
+    right = imported(write_csv(pendulum.columns() | {"torque": pendulum.torque + friction}))
+    wrong = imported(write_csv(pendulum.columns() | {"torque": -pendulum.torque - friction}))
+    assert "check the signs" not in right.told
+    assert "check the signs of angles and torques" in wrong.told
+
+
+def test_every_unit_is_what_it_is():
+    """A few that stand in everybody's handbook."""
+    assert UNITS["rpm"].factor == pytest.approx(0.10471975512)
+    assert UNITS["lbf·ft"].factor == pytest.approx(1.3558179483)
+    assert UNITS["kgf·cm"].factor == pytest.approx(0.0980665)
+    assert UNITS["°F"].factor * 212 + UNITS["°F"].offset == pytest.approx(100.0)
+    assert UNITS["K"].factor * 273.15 + UNITS["K"].offset == pytest.approx(0.0)

@@ -1,0 +1,154 @@
+"""What cannot be imported is refused in one line that says where, what and what to do; nothing half is left."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from pipelines.contracts import RECORDING
+from pipelines.settings.map_reference import reference
+from tests.importing.conftest import MAP
+
+BAD_MAPS = [
+    ('column = "angle"', 'column = "angel"', "has no column 'angel', which joint[0].angle in", "did you mean angle?"),
+    ('unit = "rad"', 'unit = "rpm"', "angle.unit: found 'rpm', a unit of angular velocity, expected one of angle: rad"),
+    ('unit = "N·m"', 'unit = "mA"', "torque.unit: needs torque_constant_nm_a; add it from the data sheet"),
+    ('unit = "rad"', 'unit = "counts"', "angle.unit: needs counts_per_turn"),
+    ('unit = "N·m"', 'unit = "N·m", gain_nm_v = 2.0', "torque.unit: has no use for gain_nm_v; remove it"),
+    ('unit = "N·m"', 'unit = "N·n"', "torque.unit: found 'N·n', expected one of torque: N·m"),
+    ('column = "torque"', 'column = "angle"', "found 'angle', which is joint[0].angle already"),
+    ('column = "torque"', 'column = "torque", expression = "2 * torque"', "expected either column or expression"),
+    ('column = "torque"', 'expression = "__import__(1)"', "expected numbers and columns with + - * / ( )"),
+    ('column = "torque"', 'expression = "torque ** 2"', "expected numbers and columns with + - * / ( )"),
+    ('column = "torque"', 'expression = "2 * torq"', "has no column 'torq'", "did you mean torque?"),
+    ('unit = "rad"', 'unit = "rad", zero = 1e6', "would be -1e+06 to -1e+06 rad", "correct its unit, zero"),
+    ('unit = "rad"', 'unit = "rad", zero = 1e300', "zero: found 1e+300, expected less than or equal to"),
+    ('unit = "rad"', 'unit = "rad", sing = -1', "joint[0].angle.sing: unknown key; did you mean sign?"),
+    ('purpose = "train"', 'purpose = "train"\nspan = [0.7, 0.2]', "span: found [0.7, 0.2], expected its begin before"),
+    ('purpose = "train"', 'purpose = "train"\nspan_s = [50, 60]', " from 50 to 60 s has 0 rows of a run of 9.995 s"),
+    ('purpose = "train"', 'purpose = "train"\nfiles = "x*"', "no [[recording]] is of log.csv, only of x*; add one"),
+    ('unit = "s"', 'unit = "s"\nrate_hz = 5.0', "expected either column or rate_hz"),
+    ('unit = "N·m"', 'unit = "N·m", range = [90, 100]', "pivot_torque_nm has no value in any row"),
+    ('name = "pivot"', 'name = "Pivot 1"', "joint[0].name: found 'Pivot 1', expected text matching"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("right", "wrong", "line"), [(a, b, " ... ".join(c)) for a, b, *c in BAD_MAPS])
+def test_a_wrong_map_is_refused_with_its_key(imported, pendulum, write_csv, right, wrong, line):
+    outcome = imported(write_csv(pendulum.columns()), map_text=MAP.replace(right, wrong, 1))
+    assert (outcome.code, outcome.out) == (2, "")
+    assert len(outcome.err.splitlines()) == 1
+    for part in line.split(" ... "):
+        assert part in outcome.err
+    assert list(outcome.folder.glob("*")) == []
+
+
+@pytest.mark.parametrize(
+    ("content", "line"),
+    [
+        (b"", "log.csv: is empty (0 bytes), expected a log"),
+        (b"\n\n\n", "log.csv: is empty, expected a table of numbers"),
+        (b"time,angle,velocity,torque\n", "log.csv: holds no rows of two numbers or more after 'time,angle,velocity"),
+        (bytes(range(256)) * 50, "log.csv: is no text (it starts with"),
+        (b"\x89HDF\r\n\x1a\n" + b"x" * 900, "log.csv: is a damaged or truncated HDF5 file"),
+        (b"PAR1" + b"x" * 900, "log.csv: is a damaged or truncated Parquet file"),
+        (b"MATLAB 5.0 MAT-file" + b"x" * 900, "log.csv: is a damaged .mat file"),
+        (b"\x89MCAP0\r\n" + b"x" * 900, "log.csv: is no ROS 2 bag that can be read"),
+        (b"SQLite format 3\0" + b"x" * 900, "log.csv: is no ROS 2 bag that can be read"),
+        (b'{"a": [1, 2', "log.csv: is not valid JSON"),
+        (b'{"name": "nothing"}', "has no column 'time'"),
+        (b"time;angle\n1,2,3\nfoo\n", "has no column"),
+        (b"dear diary,\ntoday I measured nothing.\n", "holds no rows of two numbers or more"),
+    ],
+    ids=lambda value: str(value)[:20],
+)
+def test_a_file_that_is_no_log_is_refused(imported, tmp_path, content, line):
+    path = tmp_path / "log.csv"
+    path.write_bytes(content)
+    outcome = imported(path)
+    assert (outcome.code, len(outcome.err.splitlines())) == (2, 1)
+    assert line in outcome.err
+
+
+def test_a_file_that_is_not_there_is_refused(imported, tmp_path):
+    assert imported(tmp_path / "log.csv").err.endswith("log.csv: no such file; check the name\n")
+    assert "is a folder, expected a log or the folder of a ROS 2 bag" in imported(tmp_path).err
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
+def test_an_unreadable_file_is_refused(imported, pendulum, write_csv):
+    path = write_csv(pendulum.columns())
+    path.chmod(0)
+    outcome = imported(path)
+    assert (outcome.code, "Permission denied" in outcome.err) == (2, True)
+
+
+@pytest.mark.parametrize(("beyond", "where"), [(",5", "row 699"), (",5,6", "line 701")])
+def test_a_line_with_too_many_fields_is_refused(imported, pendulum, write_csv, beyond, where):
+    path = write_csv(pendulum.columns())
+    lines = path.read_text().splitlines()
+    lines[700] += beyond
+    path.write_text("\n".join(lines))
+    outcome = imported(path)
+    assert (outcome.code, f"{where} has more than the 4 fields" in outcome.err) == (2, True)
+
+
+def test_a_log_that_was_cut_off_loses_its_last_line_only(imported, pendulum, write_csv):
+    path = write_csv(pendulum.columns())
+    text = path.read_text()
+    path.write_text(text[: text.rstrip().rindex(",")])
+    outcome = imported(path)
+    assert (outcome.code, len(outcome.recording().frame)) == (0, 1999)
+    assert "pivot_torque_nm: no value in 1 row; rows left out" in outcome.told
+
+
+def test_a_recording_that_was_measured_is_never_overwritten(imported, pendulum, write_csv):
+    path = write_csv(pendulum.columns())
+    first = imported(path)
+    assert imported(path).code == 0  # what was imported may be imported again
+    table = first.recording()
+    metadata = {key: value for key, value in table.metadata.items() if key != "imported"}
+    RECORDING.write(first.folder / "whole.parquet", table.frame, metadata)
+    outcome = imported(path)
+    assert (outcome.code, "holds a recording that was not imported, not overwritten" in outcome.err) == (2, True)
+
+
+def test_two_files_do_not_become_one_recording(imported, pendulum, write_csv):
+    files = [write_csv(pendulum.columns(), name=name) for name in ("a.csv", "b.csv")]
+    outcome = imported(*files)
+    assert outcome.code == 2
+    assert "whole.parquet would replace that of" in outcome.err
+
+
+def test_the_map_page_is_up_to_date(request):
+    page = request.config.rootpath / "docs" / "import-map.md"
+    assert page.read_text(encoding="utf-8") == reference(), "run `make docs`"
+
+
+def test_ctrl_c_leaves_no_half_recording(pendulum, write_csv, tmp_path):
+    path = write_csv(pendulum.columns())
+    (tmp_path / "map.toml").write_text(MAP, encoding="utf-8")
+    code = (
+        "import os, signal; from pipelines.importing import recordings as r; from exoid_cli.app import run; "
+        "real = r.Imported.pieces\n"
+        "def pieces(self):\n  yield next(real(self)); os.kill(os.getpid(), signal.SIGINT); yield None\n"
+        "r.Imported.pieces = pieces\n"
+        f"folder = {str(tmp_path)!r}\n"
+        f"raise SystemExit(run(['import', {str(path)!r}, '--map', folder + '/map.toml', '-o', folder + '/out']))"
+    )
+    stopped = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert (stopped.returncode, stopped.stderr) == (130, "exoid: stopped by Ctrl-C\n")
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_ten_rows_are_too_few_to_be_a_run(imported, pendulum, write_csv):
+    columns = {name: values[:5] for name, values in pendulum.columns().items()}
+    outcome = imported(write_csv(columns))
+    assert (outcome.code, "no run of its clock has 10 rows" in outcome.err) == (2, True)
+
+
+def test_a_joint_that_never_moves_is_told(imported, pendulum, write_csv):
+    outcome = imported(write_csv(pendulum.columns() | {"angle": np.full(2000, 0.3)}))
+    assert "pivot_angle_rad: is 0.3 in every row; nothing can be learnt from it" in outcome.told
