@@ -16,34 +16,39 @@ def identify(
     files: Annotated[list[Path], typer.Argument(help="motion/1 files, or recording/1 files to be filtered first.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for parameters, residuals and figures.")],
     config: Annotated[Path | None, typer.Option("--config", help="exoid.toml: geometry, [filter], [identify].")] = None,
+    method: Annotated[
+        str | None, typer.Option(help="Estimator, weighted_least_squares unless [identify] says otherwise.")
+    ] = None,
 ) -> None:
     """Fit the leg's parameters to training runs and measure the torque error on validation runs.
 
     \b
     Example:
       exoid identify motions/*.parquet -o identified/
+      exoid identify motions/*.parquet -o identified/ --method instrumental_variables
     """
     from pipelines.contracts import PARAMETERS, RESIDUALS, describe
+    from pipelines.estimation.estimators import estimator_named
     from pipelines.identification import identify as fit
-    from pipelines.identification.two_step import METHOD
     from pipelines.identification.validation import residuals
     from pipelines.mechanics.read import geometry_from, read_runs
     from pipelines.settings import Experiment
 
     settings = Experiment.load(config) if config else Experiment()
+    estimator = estimator_named(method or settings.identify.method)
     runs = read_runs(files, settings.filter, geometry_from(settings.mechanism))
-    found = fit(runs)
+    found = fit(runs, estimator)
     config_used = {
         "mechanism": settings.mechanism.model_dump(mode="json"),
         "filter": settings.filter.model_dump(mode="json"),
-        "identify": settings.identify.model_dump(mode="json"),
+        "identify": settings.identify.changed(method=estimator.name).model_dump(mode="json"),
     }
     shared = {"joints": runs[0].joint_metadata} | describe(inputs=files, config=config_used)
     described = {
         "covariance": found.covariance.tolist(),
         "mechanism": "leg",
         "geometry": runs[0].geometry.metadata(),
-        "method": METHOD,
+        "method": found.method,
         "one_step": found.one_step.tolist(),
         "validation": found.validation.as_json(),
         "collinear": found.collinear,
@@ -72,6 +77,8 @@ def _report(found: "Identified") -> None:
             "validation": found.validation.as_json(),
             "collinear": found.collinear,
             "unrealizable": found.unrealizable,
+            "method": found.method,
+            "remarks": found.remarks,
         }
     )
     console.table(
@@ -100,5 +107,7 @@ def _report(found: "Identified") -> None:
         ],
         numbers="RMSE N·m, with reversals, torque rms N·m",
     )
+    for sentence in found.remarks:
+        console.say(f"{sentence}.")
     for sentence in [*found.collinear, *(f"not a real leg: {s}" for s in found.unrealizable)]:
         console.warn(sentence)

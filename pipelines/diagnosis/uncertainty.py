@@ -48,7 +48,7 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
     scores = [
         np.einsum("mo,o,mo,moi->mi", run.usable, weights, e, a) for run, e, a in zip(runs, left, wide, strict=True)
     ]
-    filling, critical = long_run_covariance(lambda: enumerate(scores), gram.shape[0])
+    filling, critical, _ = long_run_covariance(lambda: enumerate(scores), gram.shape[0])
     misfit = np.maximum(imperfect, slow_error(runs, left).excess)
     for run, a in zip(runs, wide, strict=True):
         alike = ALIKE_S * run.motion.sample_rate_hz / run.block.decimation

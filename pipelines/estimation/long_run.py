@@ -7,6 +7,7 @@ critical values allow for the lag's length (Kiefer and Vogelsang, 2005, Economet
 """
 
 from collections.abc import Callable, Hashable, Iterable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,18 @@ Scores = Callable[[], Iterable[tuple[Hashable, NDArray]]]
 (m, p). What follows under the same name goes on where it ended."""
 
 
-def long_run_covariance(scores: Scores, parameters: int) -> tuple[NDArray, float]:
+class LongRun(NamedTuple):
+    """The covariance of a sum of scores, and how well it is known."""
+
+    covariance: NDArray
+    """(p, p)."""
+    critical: float
+    """Half-width of a 95 % interval in standard errors."""
+    freedom: float
+    """Of a variance that is estimated so well: 3 / (2 b), b the lag's share of the rows (Priestley, 1981, 6.2.4)."""
+
+
+def long_run_covariance(scores: Scores, parameters: int) -> LongRun:
     """Sum the scores' autocovariances with Bartlett weights; nothing is multiplied across a gap.
 
     Parameters
@@ -25,16 +37,12 @@ def long_run_covariance(scores: Scores, parameters: int) -> tuple[NDArray, float
         Gone through twice: for the lag, and for the sum.
     parameters : int
         Fitted parameters, for the loss of degrees of freedom.
-
-    Returns
-    -------
-    (p, p) covariance of the scores' sum, and the critical value that goes with its lag.
     """
     lag, total = _lag(scores)
     S = _bartlett(scores, lag)
     share = (lag + 1) / total
     critical = 1.96 + 2.9694 * share + 0.4160 * share**2 - 0.5324 * share**3
-    return S * total / max(total - parameters, 1), critical
+    return LongRun(S * total / max(total - parameters, 1), critical, 1.5 / share)
 
 
 def _bartlett(scores: Scores, lag: int) -> NDArray:

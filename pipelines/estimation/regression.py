@@ -45,6 +45,19 @@ class Regression:
         return np.asarray(self.usable.all(axis=1))
 
 
+def residual_of(r: Regression, values: NDArray) -> NDArray:
+    """Return measured less predicted torque, (m, J) N·m."""
+    return r.torque - r.regressor @ values
+
+
+def by_segment(r: Regression, scores: NDArray) -> Iterator[tuple[int, NDArray]]:
+    """Yield each segment's number and its part of the blocks' ``scores`` (m, k)."""
+    begins = np.flatnonzero(np.diff(r.segment)) + 1
+    for rows in np.split(np.arange(len(scores)), begins):
+        if len(rows):
+            yield int(r.segment[rows[0]]), scores[rows]
+
+
 def block_average(motion: Run) -> BlockAverage:
     """Return the regression filter that the motion's file asks for; a filter of another kind is refused."""
     chosen = motion.metadata.get("regression_filter") or {}

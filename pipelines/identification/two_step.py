@@ -1,13 +1,14 @@
-"""The two-step fit.
+"""The two-step fit, by whatever estimator.
 
 Step 1 fits the rigid body and the friction of the empty exoskeleton. Step 2 holds that friction and
 fits the rigid body of human and exoskeleton; step 1's covariance is carried into step 2's intervals.
-A fit of everything at once is computed beside it as a check. Each training run is gone through once to compress its
-rows, from which every fit follows, and twice for the covariance of what the fit left.
+A fit of everything at once is computed beside it as a check. Least squares goes through each training run once to
+compress its rows, from which every fit follows, and twice for the covariance of what the fit left.
 """
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,29 +16,13 @@ from numpy.typing import NDArray
 
 from pipelines.effects import Effect, Parameter
 from pipelines.estimation.collinearity import collinearities
-from pipelines.estimation.least_squares import (
-    Compressed,
-    Estimate,
-    Fit,
-    compress,
-    estimate,
-    normal_equations,
-    score,
-    solve,
-    together,
-)
-from pipelines.estimation.long_run import Scores
-from pipelines.estimation.regression import regressions
+from pipelines.estimation.estimator import Estimate, Estimator, estimated
+from pipelines.estimation.least_squares import WeightedLeastSquares
+from pipelines.estimation.problem import Problem, Training
 from pipelines.identification.runs import Runs, checked
 from pipelines.identification.validation import Validation, validate
 from pipelines.mechanics.run import Run
 from pipelines.model import Model, Term, baseline
-
-METHOD = {
-    "name": "two-step weighted least squares",
-    "covariance": "sandwich with Bartlett-weighted long-run scores, Andrews' lag",
-    "interval": "95 %, critical value after Kiefer and Vogelsang",
-}
 
 
 @dataclass(frozen=True)
@@ -67,126 +52,104 @@ class Identified:
     """What this motion cannot separate, a sentence each."""
     unrealizable: list[str]
     """Which rigid bodies no real leg could have, a sentence each."""
+    method: dict[str, Any]
+    """How it was found, for the file's metadata."""
+    remarks: list[str]
+    """What the method says of these data, a sentence each."""
 
 
-def identify(motions: Sequence[Run]) -> Identified:
+def identify(motions: Sequence[Run], estimator: Estimator | None = None) -> Identified:
     """Identify friction, the exoskeleton's rigid body and, where there are runs with one, the human's.
+
+    Parameters
+    ----------
+    motions : sequence of Run
+        Runs to train on and to validate on.
+    estimator : Estimator, optional
+        The method of both steps; weighted least squares unless given.
 
     Raises
     ------
     InputError
-        Where runs are missing or do not belong together.
+        Where runs are missing, do not belong together or lack what the method needs.
     NotIdentifiable
         Where the motion cannot separate the parameters.
     """
+    estimator = estimator or WeightedLeastSquares()
     runs = checked(motions)
-    models = {kind: _model(runs, (kind,)) for kind in runs.kinds}
-    train = {kind: _compressed(runs, kind, models[kind]) for kind in runs.kinds}
-    alone = _alone(runs, train["exo_alone"], models["exo_alone"])
-    rows = [Row(e, p, e.run, "friction") for e, p in models["exo_alone"].linear_parameters]
+    model = _model(runs)
+    columns = model.linear_parameters
+    training = Training(tuple(runs.of("train")), model)
+    nothing = np.zeros(len(columns))
+    friction = _columns(model, None)
+    first = Problem(training, ("exo_alone",), np.append(_columns(model, "exo_alone"), friction), nothing)
+    fits = {"exo_alone": estimated(estimator.fit(first))}
+    alone = fits["exo_alone"]
+    rows = [Row(effect, parameter, effect.run, "friction") for effect, parameter in (columns[c] for c in first.fitted)]
     values, covariance = alone.values, alone.covariance
     critical = np.full(len(rows), alone.critical)
-    collinear = [f"exo_alone: {s}" for s in _collinear(train["exo_alone"], alone, models["exo_alone"])]
+    problems = {"exo_alone": first}
     if "with_human" in runs.kinds:
-        second = _with_friction_held(runs, train["with_human"], alone, models["with_human"])
-        values, covariance = _joined(alone, second)
-        body = [(e, p) for e, p in models["with_human"].linear_parameters if e.name == "rigid_body"]
+        second = Problem(training, ("with_human",), _columns(model, "with_human"), first.completed(alone.values))
+        held = fits["with_human"] = estimated(estimator.fit(second))
+        problems["with_human"] = second
+        values, covariance = _joined(alone, held, first)
+        body = [columns[column] for column in second.fitted]
         rows += [Row(e, p, "with_human", "inertia") for e, p in body]
         rows += [Row(e, p, "human", "inertia") for e, p in body]
         # Each fit's intervals by its own lag; a difference of both fits is no surer than the less sure of them.
-        own, either = second.estimate.critical, max(alone.critical, second.estimate.critical)
+        own, either = held.critical, max(alone.critical, held.critical)
         critical = np.concatenate([critical, np.repeat([own, either], len(body))])
-        collinear += [f"with_human: {s}" for s in second.collinear]
     table = _table(rows, values, covariance, critical)
-    final = {kind: _of_run(models[kind], table, kind) for kind in runs.kinds}
+    final = {kind: _of_run(model.for_run(kind), table, kind) for kind in runs.kinds}
     return Identified(
         parameters=table,
         covariance=covariance,
-        one_step=_one_step(runs, train, models, rows),
+        one_step=_one_step(Problem(training, runs.kinds, np.arange(len(columns)), nothing), estimator, rows),
         validation=validate(runs.of("validate"), final),
         models=final,
-        collinear=collinear,
+        collinear=[
+            f"{kind}: {s}" for kind, fit in fits.items() for s in collinearities(fit.normal, problems[kind].names)
+        ],
         unrealizable=_unrealizable(table, runs),
+        method=_method(estimator, fits),
+        remarks=[f"{kind}: {remark}" for kind, fit in fits.items() for remark in fit.remarks],
     )
 
 
-def _model(runs: Runs, kinds: Sequence[str]) -> Model:
-    effects = baseline(runs.motions[0].machine, kinds)
+def _model(runs: Runs) -> Model:
+    effects = baseline(runs.motions[0].machine, runs.kinds)
     return Model(tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects))
 
 
-def _names(model: Model) -> list[str]:
-    return [_name(effect, parameter) for effect, parameter in model.linear_parameters]
+def _columns(model: Model, kind: str | None) -> NDArray:
+    """Return the columns of what is there in one kind of run alone, or, for None, in all."""
+    return np.flatnonzero([effect.run == kind for effect, _ in model.linear_parameters])
 
 
-def _name(effect: Effect, parameter: Parameter) -> str:
-    return f"{effect.joint} {parameter.name}" if effect.joint else parameter.name
+def _method(estimator: Estimator, fits: Mapping[str, Estimate]) -> dict[str, Any]:
+    return {
+        "name": f"two-step {estimator.title}",
+        "estimator": estimator.name,
+        "covariance": "sandwich with Bartlett-weighted long-run scores, Andrews' lag",
+        "interval": "95 %, critical value after Kiefer and Vogelsang",
+        "steps": {kind: fit.told for kind, fit in fits.items()},
+    }
 
 
-def _compressed(runs: Runs, kind: str, model: Model) -> Compressed:
-    return compress(r for run in runs.of("train", kind) for r in regressions(run, model))
-
-
-def _scores(runs: Runs, kind: str, model: Model, values: NDArray, weights: NDArray, columns: NDArray) -> Scores:
-    """Return the scores of the fitted ``columns`` of a model whose columns all have ``values``."""
-
-    def go_through() -> Iterator[tuple[Hashable, NDArray]]:
-        for number, run in enumerate(runs.of("train", kind)):
-            for r in regressions(run, model):
-                for segment, scores in score(r, values, weights, columns):
-                    yield (number, segment), scores
-
-    return go_through
-
-
-def _alone(runs: Runs, rows: Compressed, model: Model) -> Estimate:
-    """Fit the rigid body and the friction of the empty exoskeleton."""
-    fit = solve(rows, _names(model))
-    every = np.arange(len(fit.values))
-    return estimate(fit, _scores(runs, "exo_alone", model, fit.values, fit.weights, every))
-
-
-def _collinear(rows: Compressed, fit: Fit, model: Model) -> list[str]:
-    return collinearities(normal_equations(rows, fit.weights)[0], _names(model))
-
-
-@dataclass(frozen=True)
-class _Second:
-    estimate: Estimate
-    carry: NDArray
-    """(body, friction) how the rigid body answers to the friction that was held."""
-    collinear: list[str]
-
-
-def _with_friction_held(runs: Runs, rows: Compressed, alone: Estimate, model: Model) -> _Second:
-    """Fit the rigid body of human and exoskeleton under step 1's friction."""
-    is_body = np.array([effect.name == "rigid_body" for effect, _ in model.linear_parameters])
-    body, friction = np.flatnonzero(is_body), np.flatnonzero(~is_body)
-    names = [name for name, chosen in zip(_names(model), is_body, strict=True) if chosen]
-    fit = solve(rows.with_held(friction, alone.values[friction]).select(body), names)
-    values = alone.values.copy()
-    values[body] = fit.values
-    found = estimate(fit, _scores(runs, "with_human", model, values, fit.weights, body))
-    gram, _ = normal_equations(rows, fit.weights)
-    carry = -fit.sensitivity @ gram[np.ix_(body, friction)]
-    return _Second(found, carry, collinearities(gram[np.ix_(body, body)], names))
-
-
-def _joined(alone: Estimate, second: _Second) -> tuple[NDArray, NDArray]:
+def _joined(alone: Estimate, second: Estimate, first: Problem) -> tuple[NDArray, NDArray]:
     """Stack (step 1, with_human, human) and propagate step 1's covariance into the rest."""
-    p, b = len(alone.values), len(second.estimate.values)
-    friction = np.arange(b, p)
-    to_body = np.zeros((b, p))
-    to_body[:, friction] = second.carry
+    p, b = len(alone.values), len(second.values)
+    to_body = second.carry[:, first.fitted]
     covariance = np.zeros((p + b, p + b))
     covariance[:p, :p] = alone.covariance
     covariance[p:, :p] = to_body @ alone.covariance
     covariance[:p, p:] = covariance[p:, :p].T
-    covariance[p:, p:] = second.estimate.covariance + to_body @ alone.covariance @ to_body.T
+    covariance[p:, p:] = second.covariance + to_body @ alone.covariance @ to_body.T
     # The human is with_human less exo_alone.
     human = np.hstack([-np.eye(b, p), np.eye(b)])
     stack = np.vstack([np.eye(p + b), human])
-    values = np.concatenate([alone.values, second.estimate.values])
+    values = np.concatenate([alone.values, second.values])
     return stack @ values, stack @ covariance @ stack.T
 
 
@@ -216,15 +179,13 @@ def _of_run(model: Model, table: pd.DataFrame, kind: str) -> Model:
     return model.with_linear(np.concatenate([body["value"], friction["value"]]))
 
 
-def _one_step(runs: Runs, train: Mapping[str, Compressed], models: Mapping[str, Model], rows: Sequence[Row]) -> NDArray:
+def _one_step(problem: Problem, estimator: Estimator, rows: Sequence[Row]) -> NDArray:
     """Fit all runs at once, friction shared, and return the values in the order of ``rows``."""
-    model = _model(runs, runs.kinds)
-    columns = {parameter: column for column, parameter in enumerate(model.linear_parameters)}
-    own = {kind: np.array([columns[parameter] for parameter in models[kind].linear_parameters]) for kind in train}
-    fit = solve(together([train[kind].spread(own[kind], len(columns)) for kind in train]), _names(model))
     found = {
         (effect.name, effect.joint, parameter.name, effect.run): value
-        for (effect, parameter), value in zip(model.linear_parameters, fit.values, strict=True)
+        for (effect, parameter), value in zip(
+            problem.model.linear_parameters, estimator.fit(problem).values, strict=True
+        )
     }
 
     def of_run(row: Row, run: str | None) -> float:

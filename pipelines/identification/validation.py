@@ -8,8 +8,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from pipelines.contracts.joints import joints_of
-from pipelines.estimation.least_squares import residual_of
-from pipelines.estimation.regression import Regression, regressions
+from pipelines.estimation.regression import Regression, regressions, residual_of
 from pipelines.mechanics.run import Run
 from pipelines.model import Model
 

@@ -110,6 +110,16 @@ def _broken(X: NDArray, geometry: Geometry) -> list[str]:
     return broken
 
 
+def _inertia_forms(geometry: Geometry) -> NDArray:
+    """Return symmetric B, (4, 2, 2): M(q) > 0 at every knee angle if and only if the sum of X_i B_i is.
+
+    The sum is [[X1 - X2, L1 X3], [L1 X3, X2]], whose determinant and last element are the conditions of
+    ``_broken``: linear in X, as a convex program wants them.
+    """
+    L1 = geometry.thigh_length_m
+    return np.array([[[1, 0], [0, 0]], [[-1, 0], [0, 1]], [[0, L1], [L1, 0]], [[0, 0], [0, 0]]], dtype=float)
+
+
 LEG = Mechanism(
     name="leg",
     title="two revolute joints in series, whose axes are parallel: a leg, any double pendulum",
@@ -125,6 +135,7 @@ LEG = Mechanism(
     along=_along,
     reactions={"rigid_body": _rigid_body, "mass_off_axis": _mass_off_axis, "payload_change": _payload_change},
     broken=_broken,
+    inertia_forms=_inertia_forms,
 )
 
 

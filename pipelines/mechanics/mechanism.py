@@ -47,6 +47,9 @@ class Mechanism:
     among them; an effect that is not listed cannot be there."""
     broken: Callable[[NDArray, Geometry], list[str]] = field(hash=False, compare=False)
     """Say which conditions of a real machine the parameters X break; empty when none."""
+    inertia_forms: Callable[[Geometry], NDArray] = field(hash=False, compare=False)
+    """Symmetric B, (p, m, m): M(q) > 0 at every q if and only if the sum of X_i B_i is, the same conditions as a convex
+    program wants them."""
 
     def regressor(self, q: NDArray, dq: NDArray, ddq: NDArray, geometry: Geometry) -> NDArray:
         """Return A along a motion, (n, J, p): torque (N·m, at a prismatic joint N) per unit of each parameter.

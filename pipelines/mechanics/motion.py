@@ -87,6 +87,10 @@ class Motion:
         """Yield the run in pieces of which each knows ``margin`` samples to both sides: here one, for all is there."""
         yield Piece(self, slice(0, len(self)), 0)
 
+    def whole(self) -> "Motion":
+        """Return all of it, every channel, in memory: there it is."""
+        return self
+
     def joint_index(self, joint: str) -> int:
         """Return the column of a joint in q, dq, ddq and torque."""
         return self.joints.index(joint)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+import pyarrow as pa
 
 from pipelines.contracts.table import Rows, Table
 from pipelines.contracts.windows import windows
@@ -43,6 +44,10 @@ class Run(Protocol):
 
     def pieces(self, margin: int) -> Iterator[Piece]:
         """Yield the run in its order, each piece with ``margin`` samples to both sides."""
+        ...
+
+    def whole(self) -> Motion:
+        """Return all of it, every channel, in memory."""
         ...
 
 
@@ -119,3 +124,7 @@ class StoredRun:
             yield Piece(motion, window.core, window.first - begun)
             following = changes[changes <= window.first + window.core.stop - margin]
             begun = int(following[-1]) if len(following) else begun
+
+    def whole(self) -> Motion:
+        """Return all of it, every channel, in memory."""
+        return self._motion(pa.concat_tables(self.rows.pieces()))

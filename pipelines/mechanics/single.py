@@ -85,6 +85,14 @@ def _broken_mass(X: NDArray, geometry: Geometry) -> list[str]:
     return [f"X1 = {X[0]:.4g} kg is not positive: what slides would have no mass"] if X[0] <= 0 else []
 
 
+def _inertia_forms(geometry: Geometry) -> NDArray:
+    return np.array([[[1.0]]])
+
+
+def _inertia_forms_under_gravity(geometry: Geometry) -> NDArray:
+    return np.array([[[1.0]], [[0.0]]])
+
+
 _INERTIA = Inertial("X1", "kg·m²", "inertia about the joint's axis, the drive's rotor included", (0.001, 10.0))
 _MASS = Inertial("X1", "kg", "mass along the axis, the drive's rotor included", (0.1, 200.0))
 
@@ -98,6 +106,7 @@ PENDULUM = Mechanism(
     along=_pendulum_along,
     reactions={"rigid_body": _pendulum, "mass_off_axis": _mass_off_axis, "payload_change": _payload_change},
     broken=_broken_inertia,
+    inertia_forms=_inertia_forms_under_gravity,
 )
 
 TURNTABLE = Mechanism(
@@ -110,6 +119,7 @@ TURNTABLE = Mechanism(
     along=_inertia_along,
     reactions={"rigid_body": _inertia},
     broken=_broken_inertia,
+    inertia_forms=_inertia_forms,
 )
 
 LIFT = Mechanism(
@@ -125,6 +135,7 @@ LIFT = Mechanism(
     along=_lift_along,
     reactions={"rigid_body": _lift},
     broken=_broken_mass,
+    inertia_forms=_inertia_forms_under_gravity,
 )
 
 SLIDE = Mechanism(
@@ -137,4 +148,5 @@ SLIDE = Mechanism(
     along=_inertia_along,
     reactions={"rigid_body": _inertia},
     broken=_broken_mass,
+    inertia_forms=_inertia_forms,
 )

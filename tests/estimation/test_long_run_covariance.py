@@ -56,8 +56,8 @@ def test_a_gap_is_not_bridged():
     """Two segments count as two: nothing is multiplied across the gap between them."""
     rng = np.random.default_rng(1)
     noise = lfilter([1], [1, -0.9], rng.standard_normal(4000))[:, np.newaxis]
-    whole, _ = long_run_covariance([noise], 1)
-    halves, _ = long_run_covariance([noise[:2000], noise[2000:]], 1)
+    whole, *_ = long_run_covariance([noise], 1)
+    halves, *_ = long_run_covariance([noise[:2000], noise[2000:]], 1)
     assert halves.item() != whole.item()
     assert halves.item() == pytest.approx(whole.item(), rel=0.1)
 
@@ -73,7 +73,7 @@ def test_a_parameter_in_another_unit_changes_no_lag():
     rng = np.random.default_rng(3)
     fast, slow = (lfilter([1], [1, -rho], rng.standard_normal(4000)) for rho in (0.1, 0.95))
     scores, scale = np.column_stack([fast, slow]), np.array([100.0, 0.01])
-    covariance, critical = long_run_covariance([scores], 2)
-    scaled, scaled_critical = long_run_covariance([scores * scale], 2)
+    covariance, critical, _ = long_run_covariance([scores], 2)
+    scaled, scaled_critical, _ = long_run_covariance([scores * scale], 2)
     assert scaled_critical == critical
     np.testing.assert_allclose(scaled, covariance * np.outer(scale, scale), rtol=1e-10)

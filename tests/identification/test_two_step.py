@@ -73,15 +73,16 @@ def test_the_formula_for_independent_samples_covers_far_less(noiseless_motions, 
 
 
 def covers_as_if_independent(motions, truth):
-    from pipelines.estimation.least_squares import compress, solve
-    from pipelines.estimation.regression import regressions
+    from pipelines.estimation.least_squares import WeightedLeastSquares
+    from pipelines.estimation.problem import Problem, Training
     from pipelines.mechanics.machine import THE_LEG
     from pipelines.model import Model, Term, baseline
 
     effects = baseline(THE_LEG, ("exo_alone",))
     model = Model(tuple(Term(e, np.zeros(len(e.linear))) for e in effects))
-    estimate = solve(compress(regressions(motions[0], model)), ["?"] * 8)
-    return np.abs(estimate.values - truth) < 1.96 * np.sqrt(np.diag(estimate.sensitivity))
+    problem = Problem(Training((motions[0],), model), ("exo_alone",), np.arange(8), np.zeros(8))
+    fit = WeightedLeastSquares().fit(problem)
+    return np.abs(fit.values - truth) < 1.96 * np.sqrt(np.diag(fit.sensitivity))
 
 
 def test_uncertain_friction_widens_the_interval_of_inertia(noiseless_motions):

@@ -1,0 +1,30 @@
+"""Every estimator exoid knows, in plain sight; docs/estimators.md compares them.
+
+Adding one is a file, a line here, and its name in ``[identify] method``.
+"""
+
+from pipelines.errors import InputError
+from pipelines.estimation.estimator import Estimator
+from pipelines.estimation.instrumental_variables import InstrumentalVariables
+from pipelines.estimation.iteratively_reweighted import IterativelyReweighted
+from pipelines.estimation.least_squares import OrdinaryLeastSquares, WeightedLeastSquares
+from pipelines.estimation.output_error import OutputError
+from pipelines.estimation.realizable import Realizable
+from pipelines.validation import suggestion
+
+ESTIMATORS: tuple[type[Estimator], ...] = (
+    WeightedLeastSquares,
+    OrdinaryLeastSquares,
+    IterativelyReweighted,
+    InstrumentalVariables,
+    OutputError,
+    Realizable,
+)
+
+
+def estimator_named(name: str) -> Estimator:
+    """Look an estimator up by the name that ``--method`` and exoid.toml use."""
+    known = {estimator.name: estimator for estimator in ESTIMATORS}
+    if name not in known:
+        raise InputError(f"--method: there is no method {name!r}; {suggestion(name, list(known))}")
+    return known[name]()

@@ -1,0 +1,145 @@
+"""Iteratively reweighted least squares: blocks far off count less, and those farthest off not at all.
+
+An M-estimate after Huber (1964, Ann. Math. Statist. 35(1)) and Beaton and Tukey (1974, Technometrics 16(2)), in the
+order of Yohai's MM-estimate (1987, Ann. Statist. 15(2)): Huber's convex weights with each joint's scale, the median
+absolute residual, until both rest; then Tukey's bisquare with that scale. On Gaussian noise it needs 5 % more data than
+least squares for equal intervals.
+"""
+
+from collections.abc import Callable, Hashable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.estimation.estimator import Estimator, Fit, carry_of
+from pipelines.estimation.least_squares import LEAST_NM, WeightedLeastSquares
+from pipelines.estimation.long_run import Scores
+from pipelines.estimation.normal_matrix import inverse
+from pipelines.estimation.problem import Problem
+from pipelines.estimation.regression import by_segment, residual_of
+
+HUBER = 1.345
+BISQUARE = 4.685
+"""Standard deviations where the weights begin to fall, and where they end: 95 % efficiency on Gaussian noise."""
+MAD = 1.4826
+"""Standard deviation of Gaussian noise over its median absolute value."""
+ITERATIONS = 50
+SETTLED = 1e-3
+"""Largest change of a value, in standard errors of independent blocks, at which iterations end."""
+WORTH_SAYING = 1e-3
+"""Share of blocks that count for nothing from which on the user is told."""
+
+
+@dataclass(frozen=True)
+class Loss:
+    """How much a residual of ``u`` standard deviations counts."""
+
+    weight: Callable[[NDArray], NDArray]
+    """Over that of a small one."""
+    slope: Callable[[NDArray], NDArray]
+    """Derivative of u times the weight."""
+
+
+def _bisquare(u: NDArray) -> NDArray:
+    return np.maximum(1.0 - (u / BISQUARE) ** 2, 0.0)
+
+
+Huber = Loss(lambda u: HUBER / np.maximum(np.abs(u), HUBER), lambda u: (np.abs(u) <= HUBER).astype(float))
+Bisquare = Loss(lambda u: _bisquare(u) ** 2, lambda u: _bisquare(u) * (1.0 - 5.0 * (u / BISQUARE) ** 2))
+
+
+@dataclass(frozen=True)
+class Sums:
+    """What one passage through the rows leaves."""
+
+    normal: NDArray
+    """(p, p) sum of weighted outer products of the columns."""
+    slope: NDArray
+    """(p, p) the same with the loss's slope for weight."""
+    right: NDArray
+    """(p,) sum of weighted columns times torque."""
+    scale: NDArray
+    """(J,) N·m, 1.48 times the median absolute residual."""
+    rejected: NDArray
+    """(J,) share of usable blocks that count for nothing."""
+
+
+class IterativelyReweighted(Estimator):
+    """Huber's weights, then Tukey's bisquare, a scale for each joint."""
+
+    name = "iteratively_reweighted"
+    title = "iteratively reweighted least squares"
+
+    def fit(self, problem: Problem) -> Fit:
+        """Fit all runs at once."""
+        start = WeightedLeastSquares().fit(problem)
+        scale = _sums(problem, start.values, start.weights**-0.5, Huber).scale
+        values, scale, first = _iterated(problem, start.values, scale, Huber)
+        values, _, second = _iterated(problem, values, scale, Bisquare)
+        sums = _sums(problem, values, scale, Bisquare)
+        free = np.ix_(problem.fitted, problem.fitted)
+        sensitivity = inverse(sums.slope[free], problem.names)
+        joints = problem.runs[0][1].joints
+        shares = dict(zip(joints, sums.rejected.tolist(), strict=True))
+        return Fit(
+            values, sums.normal[free], sensitivity, carry_of(problem, sensitivity, sums.slope[problem.fitted]),
+            scale**-2.0, _scores(problem, values, scale),
+            {"iterations": first + second, "scale_nm": scale.tolist(), "rejected_share": shares},
+            tuple(
+                f"{joint}: {100 * share:.1f} % of the blocks are more than {BISQUARE:g} robust standard deviations off "
+                "and count for nothing"
+                for joint, share in shares.items()
+                if share > WORTH_SAYING
+            ),
+        )  # fmt: skip
+
+
+def _iterated(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> tuple[NDArray, NDArray, int]:
+    """Return values and scale where they rest, and after how many iterations; the bisquare's scale is held."""
+    free, held = problem.fitted, problem.of_held
+    for iteration in range(1, ITERATIONS + 1):  # noqa: B007
+        sums = _sums(problem, values, scale, loss)
+        sensitivity = inverse(sums.normal[np.ix_(free, free)], problem.names)
+        before = values
+        values = sensitivity @ (sums.right[free] - sums.normal[np.ix_(free, held)] @ problem.held[held])
+        if loss is Huber:
+            scale = sums.scale
+        if np.all(np.abs(values - before) < SETTLED * np.sqrt(np.diag(sensitivity))):
+            break
+    return values, scale, iteration
+
+
+def _sums(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> Sums:
+    every, p = problem.completed(values), len(problem.held)
+    normal, slope, right = np.zeros((p, p)), np.zeros((p, p)), np.zeros(p)
+    sizes: list[list[NDArray]] = [[] for _ in scale]
+    for _, r in problem.regressions():
+        residual = residual_of(r, every)
+        u = residual / scale
+        weights = np.where(r.usable, loss.weight(u), 0.0) / scale**2
+        slopes = np.where(r.usable, loss.slope(u), 0.0) / scale**2
+        normal += np.einsum("mj,mjp,mjq->pq", weights, r.regressor, r.regressor, optimize=True)
+        slope += np.einsum("mj,mjp,mjq->pq", slopes, r.regressor, r.regressor, optimize=True)
+        right += np.einsum("mj,mjp,mj->p", weights, r.regressor, r.torque, optimize=True)
+        for j, size in enumerate(sizes):
+            size.append(np.abs(residual[r.usable[:, j], j]))
+    left = [np.concatenate(size) for size in sizes]
+    return Sums(
+        normal, slope, right,
+        np.array([max(MAD * np.median(size), LEAST_NM) for size in left]),
+        np.array([np.mean(size > BISQUARE * s) for size, s in zip(left, scale, strict=True)]),
+    )  # fmt: skip
+
+
+def _scores(problem: Problem, values: NDArray, scale: NDArray) -> Scores:
+    every = problem.completed(values)
+
+    def go_through() -> Iterator[tuple[Hashable, NDArray]]:
+        for number, r in problem.regressions():
+            residual = residual_of(r, every)
+            pull = np.where(r.usable, Bisquare.weight(residual / scale) * residual, 0.0) / scale**2
+            for segment, rows in by_segment(r, np.einsum("mj,mjk->mk", pull, r.regressor[:, :, problem.fitted])):
+                yield (number, segment), rows
+
+    return go_through

@@ -1,0 +1,38 @@
+"""The inverse of a normal matrix, refused where the motion leaves it singular."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.errors import NotIdentifiable
+from pipelines.estimation.collinearity import worst_direction
+
+SINGULAR = 1e7
+"""Condition number of the scaled regressor beyond which rounding decides."""
+
+
+def inverse(gram: NDArray, names: Sequence[str]) -> NDArray:
+    """Return the inverse of a normal matrix (p, p) whose columns have ``names``.
+
+    Raises
+    ------
+    NotIdentifiable
+        Where the motion does not separate the parameters; the message names them.
+    """
+    size = np.sqrt(np.diag(gram))
+    if not np.all(size > 0):
+        silent = [name for name, s in zip(names, size, strict=True) if s == 0]
+        raise NotIdentifiable(
+            f"the motion does not excite {', '.join(silent)} at all: their columns are zero on every usable sample; "
+            "move every joint, in both directions, faster than it sticks"
+        )
+    scaled = gram / np.outer(size, size)
+    eigenvalues = np.linalg.eigvalsh(scaled)
+    if eigenvalues[0] <= 0 or np.sqrt(eigenvalues[-1] / eigenvalues[0]) > SINGULAR:
+        mixed = worst_direction(scaled, names)
+        raise NotIdentifiable(
+            f"the motion does not separate {' and '.join(mixed)}: any of them can stand for the others; "
+            "excite more harmonics and both joints at once, or lengthen the run"
+        )
+    return np.linalg.inv(scaled) / np.outer(size, size)

@@ -1,0 +1,87 @@
+"""What is to be estimated from what: some columns of a model, from the training runs of some kinds."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.estimation.compressed import Compressed, compress, together
+from pipelines.estimation.regression import Regression, regressions
+from pipelines.mechanics.run import Run
+from pipelines.model import Model
+
+
+@dataclass(frozen=True)
+class Training:
+    """The runs that a model is fitted to."""
+
+    runs: tuple[Run, ...]
+    model: Model
+    """Of all kinds of run; what a run has not is a column of zeros there."""
+
+    @cached_property
+    def compressed(self) -> tuple[Compressed, ...]:
+        """Each run's rows on all columns; they are gone through once, whatever is fitted to them."""
+        return tuple(compress(regressions(run, self.model)) for run in self.runs)
+
+    @cached_property
+    def whole(self) -> "Training":
+        """The same with whole runs in memory."""
+        return Training(tuple(run.whole() for run in self.runs), self.model)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """``torque = regressor @ parameters + noise``, p parameters, some of which are fitted and the others held."""
+
+    training: Training
+    kinds: tuple[str, ...]
+    """Of the runs that are fitted."""
+    fitted: NDArray
+    """(k,) columns that are fitted."""
+    held: NDArray
+    """(p,) values of the columns that are held; those of the fitted ones say nothing."""
+
+    @property
+    def model(self) -> Model:
+        """The training's."""
+        return self.training.model
+
+    @property
+    def names(self) -> list[str]:
+        """What messages call the fitted parameters."""
+        chosen = [self.model.linear_parameters[column] for column in self.fitted]
+        return [f"{effect.joint} {p.name}" if effect.joint else p.name for effect, p in chosen]
+
+    @property
+    def runs(self) -> list[tuple[int, Run]]:
+        """Number and run of those that are fitted."""
+        return [(number, run) for number, run in enumerate(self.training.runs) if run.run in self.kinds]
+
+    @property
+    def rows(self) -> Compressed:
+        """All usable rows of these runs on all columns, compressed."""
+        return together([self.training.compressed[number] for number, _ in self.runs])
+
+    @property
+    def of_held(self) -> NDArray:
+        """Columns that are held, (p - k,)."""
+        return np.setdiff1d(np.arange(len(self.held)), self.fitted)
+
+    def regressions(self) -> Iterator[tuple[int, Regression]]:
+        """Yield each run's number and its regression on all columns, piece by piece."""
+        for number, run in self.runs:
+            for regression in regressions(run, self.model):
+                yield number, regression
+
+    def whole(self) -> "Problem":
+        """Return the same problem with whole runs in memory, for methods that simulate them."""
+        return replace(self, training=self.training.whole)
+
+    def completed(self, values: NDArray) -> NDArray:
+        """Return the values of all columns, (p,), for those of the fitted ones."""
+        every = self.held.copy()
+        every[self.fitted] = values
+        return every

@@ -1,0 +1,128 @@
+"""Physically realizable least squares: the least residual among the models that can exist.
+
+That the mass matrix is positive definite at every angle is a linear matrix inequality in the inertial parameters, and
+friction that takes energy is a sign, so the fit is a convex program with one answer (Sousa and Cortesão, 2014, Int. J.
+Robotics Research 33(6); Wensing, Kim and Slotine, 2018, IEEE RA-L 3(1)). Clarabel solves it.
+
+Moving to the nearest point of a convex set that holds the truth brings a fit no farther from it, in the norm of the
+normal matrix; the covariance of the free fit is kept, and intervals are rather too wide than too narrow where a
+constraint is active.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import clarabel
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_matrix
+
+from pipelines.effects.rigid_body import RigidBody
+from pipelines.errors import NotIdentifiable
+from pipelines.estimation.compressed import residual_rms
+from pipelines.estimation.estimator import Estimator, Fit
+from pipelines.estimation.least_squares import WeightedLeastSquares
+from pipelines.estimation.problem import Problem
+
+MARGIN = 1e-6
+"""Least eigenvalue of a body's inertia form over its trace: a boundary that rounding does not cross."""
+MOVED = 1e-3
+"""Standard errors of independent blocks by which a value has to move before a constraint is called active."""
+
+
+class Realizable(Estimator):
+    """Weighted least squares on the models that can exist."""
+
+    name = "realizable"
+    title = "physically realizable least squares"
+
+    def fit(self, problem: Problem) -> Fit:
+        """Fit all runs at once, then go to the nearest model that can exist."""
+        free = WeightedLeastSquares().fit(problem)
+        values = nearest(problem, free.values, free.normal)
+        moved = np.abs(values - free.values) > MOVED * np.sqrt(np.diag(free.sensitivity))
+        if not moved.any():
+            return replace(free, told={**free.told, "constrained": False})
+        rises = [residual_rms(problem.rows, problem.completed(v)) for v in (free.values, values)]
+        raised = ", ".join(
+            f"{joint} {before:.4g} to {after:.4g} N·m"
+            for joint, before, after in zip(problem.runs[0][1].joints, *rises, strict=True)
+        )
+        remark = (
+            f"least squares alone finds no machine that can exist; the nearest that can leaves more torque: {raised}. "
+            "That is evidence of an effect that the model lacks: `exoid diagnose` looks for it"
+        )
+        told = {**free.told, "constrained": True, "least_squares_values": free.values.tolist()}
+        return replace(free, values=values, told=told, remarks=(remark,))
+
+
+def nearest(problem: Problem, values: NDArray, normal: NDArray) -> NDArray:
+    """Return the realizable values (k,) nearest to ``values`` in the norm of the ``normal`` matrix (k, k).
+
+    For least-squares values and their normal matrix these leave the least residual.
+    """
+    # In standard errors about the free fit: numbers near one, whatever the units.
+    size = np.sqrt(np.diag(np.linalg.inv(normal)))
+    blocks, cones = zip(*_constraints(problem, values, size), strict=True)
+    rows = np.concatenate([slope for slope, _ in blocks])
+    bounds = np.concatenate([bound for _, bound in blocks])
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    quadratic = csc_matrix(np.triu(normal * np.outer(size, size)))
+    solution = clarabel.DefaultSolver(
+        quadratic, np.zeros(len(values)), csc_matrix(-rows), bounds, list(cones), settings
+    ).solve()
+    if str(solution.status) not in ("Solved", "AlmostSolved"):
+        raise NotIdentifiable(
+            f"no realizable model was found near the fit ({solution.status}): with the values that are held none can "
+            "exist; choose --method weighted_least_squares and look at what it says of realizability"
+        )
+    return values + size * np.array(solution.x)
+
+
+Constraint = tuple[tuple[NDArray, NDArray], object]
+
+
+def _constraints(problem: Problem, values: NDArray, size: NDArray) -> Iterator[Constraint]:
+    """Yield slope (r, k) and bound (r,) with ``slope @ step + bound`` in a cone, and the cone.
+
+    ``step`` is that from ``values``, in units of ``size``.
+    """
+    every = problem.completed(values)
+    for form in _inertia_forms(problem):
+        leading = form - MARGIN * np.trace(form, axis1=1, axis2=2)[:, np.newaxis, np.newaxis] * np.eye(form.shape[1])
+        rows = np.array([_triangle(matrix) for matrix in leading]).T
+        yield (rows[:, problem.fitted] * size, rows @ every), clarabel.PSDTriangleConeT(form.shape[1])
+    signed = [i for i, column in enumerate(problem.fitted) if _takes_energy(problem, column)]
+    if signed:
+        yield (np.diag(size)[signed], values[signed]), clarabel.NonnegativeConeT(len(signed))
+
+
+def _takes_energy(problem: Problem, column: int) -> bool:
+    effect, _ = problem.model.linear_parameters[column]
+    return effect.dissipative
+
+
+def _inertia_forms(problem: Problem) -> Iterator[NDArray]:
+    """Yield for each body that is fitted (p, m, m): of all parameters, a matrix that a real body has positive definite.
+
+    The wearer is what the machine has more with them than without.
+    """
+    run = problem.training.runs[0]
+    forms = run.machine.mechanism.inertia_forms(run.geometry)
+    effects = [effect for effect, _ in problem.model.linear_parameters]
+    of_kind: dict[str | None, NDArray] = {}
+    for kind in dict.fromkeys(effect.run for effect in effects if isinstance(effect, RigidBody)):
+        form = np.zeros((len(effects), *forms.shape[1:]))
+        form[[isinstance(effect, RigidBody) and effect.run == kind for effect in effects]] = forms
+        of_kind[kind] = form
+    fitted = {effects[column].run for column in problem.fitted if isinstance(effects[column], RigidBody)}
+    yield from (form for kind, form in of_kind.items() if kind in fitted)
+    if "with_human" in fitted and "exo_alone" in of_kind:
+        yield of_kind["with_human"] - of_kind["exo_alone"]
+
+
+def _triangle(matrix: NDArray) -> Sequence[float]:
+    """Return the upper triangle, column by column, off-diagonal elements times √2, as Clarabel has it."""
+    n = len(matrix)
+    return [matrix[i, j] * (1.0 if i == j else np.sqrt(2.0)) for j in range(n) for i in range(j + 1)]
