@@ -1,5 +1,6 @@
 """``exoid import``: recordings out of logs from elsewhere."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,15 +15,46 @@ if TYPE_CHECKING:
 
 def import_(
     files: Annotated[list[Path], typer.Argument(help="Logs: CSV, .mat, Parquet, JSON, HDF5, MCAP, ROS 2 bags.")],
-    map_: Annotated[Path, typer.Option("--map", help="The map: what each column is, and in which unit.")],
+    map_: Annotated[Path | None, typer.Option("--map", help="The map: what each column is, and in which unit.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the recordings.")] = Path("recordings"),
+    guess: Annotated[
+        bool, typer.Option("--guess", help="Propose a map instead; into the file that --map names, if any.")
+    ] = False,
 ) -> None:
     """Make recordings of logs from elsewhere; a map says what their columns are.
 
     \b
-    Example:
+    Examples:
+      exoid import run1.csv run2.csv --guess --map machine.toml
       exoid import run1.csv run2.csv --map machine.toml -o recordings/
     """
+    if guess:
+        _propose(files, map_)
+    elif map_ is None:
+        raise InputError("--map: missing; `exoid import FILE... --guess --map MAP.toml` proposes one")
+    else:
+        _import(files, map_, output)
+
+
+def _propose(files: list[Path], place: Path | None) -> None:
+    from pipelines.contracts.atomic import write_text
+    from pipelines.importing.guess.guess import propose
+
+    if place is not None and place.exists():
+        raise InputError(f"{place}: exists already, not overwritten with a guess; choose another name")
+    proposal = propose(files)
+    doubts = [asdict(doubt) for doubt in proposal.doubts]
+    console.emit({"map": proposal.text, "doubts": doubts})
+    if place is None:
+        console.say(proposal.text.rstrip())
+        return
+    write_text(place, proposal.text)
+    console.say(f"{place}: proposed; look at what is doubtful in it, then `exoid import` with --map {place}")
+    for doubt in proposal.doubts:
+        console.say(f"  {'fill in' if doubt.blocks else 'unsure'}: {doubt.key}: {doubt.why}")
+
+
+def _import(files: list[Path], map_: Path, output: Path) -> None:
     from pipelines.contracts.atomic import open_folder
     from pipelines.importing.recordings import recordings
     from pipelines.settings.import_map import load_map

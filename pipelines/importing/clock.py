@@ -97,7 +97,7 @@ def runs(time_s: NDArray, raw: NDArray, findings: list[Finding]) -> list[Run]:
     for k in begins[1:]:
         back = time_s[rows[k - 1]] - time_s[rows[k]]
         seen = f"clock starts over at row {rows[k]}, {back:.6g} s back"
-        findings.append(Finding("time", seen, _if_full(raw, rows[k - 1]) or "another run begins"))
+        findings.append(Finding("time", seen, _if_full(float(raw[rows[k - 1]]), float(raw[rows[k]]))))
     found = [_ordered(part, time_s) for part in np.split(rows, begins[1:])]
     return [run for run in found if len(run) > 1]
 
@@ -142,12 +142,17 @@ def _stays_behind(time: NDArray) -> int | None:
     return int(starts[long[0]]) if len(long) else None
 
 
-def _if_full(raw: NDArray, row: int) -> str:
-    if raw.dtype.kind not in "iuf":
-        return ""
-    last = float(raw[row])
-    full = next((limit for limit in REGISTERS if (1.0 - NEAR) * limit < last < limit), None)
-    return f"after {last:.10g}: if it was full, set time.wraps_at = {full:.0f}" if full else ""
+def full_register(before: float, after: float) -> float | None:
+    """Return at how much a counter is full that goes back from one stamp to another; None where neither says so."""
+    near = [limit for limit in REGISTERS if (1.0 - NEAR) * limit < before < limit]
+    if not near:
+        return None
+    return 2.0 * near[0] if after < 0.0 else near[0]  # with a sign it goes on at the lowest number
+
+
+def _if_full(before: float, after: float) -> str:
+    full = full_register(before, after)
+    return f"after {before:.10g}: if it was full, set time.wraps_at = {full:.0f}" if full else "another run begins"
 
 
 def _ordered(rows: NDArray, time_s: NDArray) -> Run:

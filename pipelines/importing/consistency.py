@@ -25,7 +25,7 @@ def integral_agreement(time_s: NDArray, angle: NDArray, velocity: NDArray) -> Ag
     ``slope`` is velocity's integral for a unit of angle: 1 where units and signs agree, -1 where signs differ.
     None where nothing moves.
     """
-    time_s, angle, velocity = _whole(time_s, angle, velocity)
+    time_s, angle, velocity = whole_rows(time_s, angle, velocity)
     if len(time_s) < 5 * SPAN:
         return None
     travel = np.concatenate([[0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time_s))])
@@ -46,7 +46,7 @@ def mean_power(time_s: NDArray, angle: NDArray, torque: NDArray) -> tuple[float,
     What a drive delivers between two instants of equal state can only have gone into friction: the mean is positive
     where the signs of both columns agree.
     """
-    time_s, angle, torque = _whole(time_s, angle, torque)
+    time_s, angle, torque = whole_rows(time_s, angle, torque)
     if len(time_s) < 5 * SPAN:
         return 0.0, 0.0
     velocity = (angle[SPAN:] - angle[:-SPAN]) / (time_s[SPAN:] - time_s[:-SPAN])
@@ -55,7 +55,7 @@ def mean_power(time_s: NDArray, angle: NDArray, torque: NDArray) -> tuple[float,
     return float(np.mean(power)), float(np.mean(np.abs(power)))
 
 
-def _whole(*columns: NDArray) -> list[NDArray]:
+def whole_rows(*columns: NDArray) -> list[NDArray]:
     """Return the rows, from the middle of the log, in which every column has a number."""
     middle = slice(max(0, (len(columns[0]) - MOST) // 2), (len(columns[0]) + MOST) // 2)
     known = np.all([np.isfinite(column[middle]) for column in columns], axis=0)

@@ -67,3 +67,41 @@ def test_what_is_wrong_with_the_logs_of_modexo_is_told(imported):
     assert "that 16 bits cannot hold, the first 630040" in told
     assert "rows put in order" in told
     assert tables["20170712-loadcellTests_2_train"].metadata["imported"]["rows_in_source"] == 22803
+
+
+@pytest.mark.parametrize(
+    ("pattern", "map_name", "joints"),
+    [
+        ("simple_pendulum/*.csv", "simple_pendulum.toml", {"joint": "pivot"}),
+        ("double_pendulum/A0_fourier_75s.csv", "double_pendulum_fourier.toml", {"joint1": "hip", "joint2": "knee"}),
+    ],
+)
+def test_a_guess_of_a_real_log_says_what_its_map_says(real_data, tmp_path, capsys, pattern, map_name, joints):
+    files = sorted(str(file) for file in real_data.glob(pattern))
+    guess = tmp_path / "guess.toml"
+    assert run(["import", *files, "--guess", "--map", str(guess)]) == 0
+    for path, folder in ((guess, "guessed"), (datasets() / "maps" / map_name, "known")):
+        assert run(["import", *files, "--map", str(path), "-o", str(tmp_path / folder)]) == 0
+    capsys.readouterr()
+    for path in (tmp_path / "known").iterdir():
+        known, guessed = (RECORDING.read(tmp_path / folder / path.name).frame for folder in ("known", "guessed"))
+        guessed.columns = [_renamed(name, joints) for name in guessed.columns]
+        np.testing.assert_array_equal(known[sorted(known.columns)], guessed[sorted(guessed.columns)])
+
+
+def _renamed(column: str, joints: dict[str, str]) -> str:
+    for guessed, known in joints.items():
+        if column.startswith(f"{guessed}_"):
+            return column.replace(guessed, known, 1)
+    return column
+
+
+def test_a_guess_of_the_xl330_asks_for_its_torque_constant(real_data, tmp_path, capsys):
+    file = str(real_data / "xl330" / "2026-01-15_10h28m10.json")
+    assert run(["import", file, "--guess", "--map", str(tmp_path / "guess.toml")]) == 0
+    assert "fill in: joint[0].torque.torque_constant_nm_a" in capsys.readouterr().out
+    text = (tmp_path / "guess.toml").read_text(encoding="utf-8")
+    assert "make 2^12 of a turn in rad" in text  # the servo's encoder has 4096 steps
+    assert "signed_bits = 16" in text
+    (tmp_path / "guess.toml").write_text(text.replace("# torque_constant_nm_a =", "torque_constant_nm_a = 0.59 #"))
+    assert run(["import", file, "--map", str(tmp_path / "guess.toml"), "-o", str(tmp_path)]) == 0

@@ -1,0 +1,1 @@
+"""A first map of a log, from its names, its ranges and whether its columns agree."""

@@ -1,0 +1,113 @@
+"""Units of angle and velocity: from names, from what integrates to what, from the encoder's steps, from ranges."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.contracts.checks import LARGEST_ANGLE_RAD
+from pipelines.importing.consistency import Agreement, integral_agreement
+from pipelines.importing.guess.register import are_whole
+from pipelines.settings.units import UNITS
+
+NEAR = 0.12
+"""By so much a slope may be off that of two units: drives filter their velocities."""
+MANY = 100.0
+"""So many counts are no degrees."""
+CLEAR = 0.7
+"""Share of the variance that has to be in common for a slope to count."""
+VELOCITY_OF = {"rad": "rad/s", "deg": "deg/s", "rev": "rev/s", "m": "m/s", "mm": "mm/s", "counts": "counts/s"}
+PAIRS = [
+    (angle, velocity)
+    for angle in ("rad", "deg", "rev", "m", "mm")
+    for velocity in ("rad/s", "deg/s", "rpm", "rev/s", "m/s", "mm/s")
+    if (UNITS[angle].dimension == "angle") == (UNITS[velocity].dimension == "angular velocity")
+]
+TURNS = {"rad": 2.0 * np.pi, "deg": 360.0, "rev": 1.0}
+"""A full turn in each unit."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """Units of an angle and of its velocity, each with why and whether it is sure."""
+
+    angle: str
+    why: str
+    sure: bool
+    velocity: str = ""
+    velocity_why: str = ""
+    velocity_sure: bool = True
+    velocity_sign: int = 1
+
+
+def guess_units(
+    time_s: NDArray, angle: NDArray, named: str | None, velocity: NDArray | None, velocity_named: str | None
+) -> Units:
+    """Return the units of an angle and its velocity, (n,) each as logged; names say more than numbers."""
+    unit, why, sure = _angle_unit(angle, named)
+    if velocity is None:
+        return Units(unit, why, sure)
+    agreement = integral_agreement(time_s, angle, velocity)
+    if agreement is None or agreement.explained < CLEAR:
+        share = 0.0 if agreement is None else agreement.explained
+        doubt = f"does not integrate to the angle ({share:.0%} of its variance): is it of this joint?"
+        return Units(unit, why, sure, velocity_named or VELOCITY_OF[unit], doubt, False)
+    if unit == "counts":
+        return Units(unit, why, sure, *_velocity_of_counts(velocity_named))
+    return _from_slope(agreement, unit, why, sure, velocity_named)
+
+
+def _velocity_of_counts(named: str | None) -> tuple[str, str, bool]:
+    why = (
+        "its name says so"
+        if named
+        else "the angle is in counts; in what the velocity is, their slope alone does not say"
+    )
+    return named or "counts/s", why, named is not None
+
+
+def _from_slope(agreement: Agreement, unit: str, why: str, sure: bool, velocity_named: str | None) -> Units:
+    """Return the pair of units that explains how much velocity integrates to a unit of angle."""
+    slope, sign = abs(agreement.slope), int(np.sign(agreement.slope))
+    said = f"integrates to {agreement.slope:.4g} of the angle ({agreement.explained:.0%} of its variance)"
+    fitting = [pair for pair in PAIRS if abs(slope * UNITS[pair[1]].factor / UNITS[pair[0]].factor - 1.0) < NEAR]
+    if velocity_named:
+        fitting = [pair for pair in fitting if pair[1] == velocity_named]
+    same = [pair for pair in fitting if pair[0] == unit]
+    if same:
+        return Units(unit, why, sure, same[0][1], said, True, sign)
+    if fitting and not sure:
+        other, velocity = fitting[0]
+        return Units(other, f"fits the velocity, which {said}", False, velocity, said, False, sign)
+    return Units(unit, why, sure, velocity_named or VELOCITY_OF[unit], f"{said}, which no units explain", False, sign)
+
+
+def _angle_unit(angle: NDArray, named: str | None) -> tuple[str, str, bool]:
+    if named is not None and UNITS[named].dimension in ("angle", "length", "counts"):
+        return named, "its name says so", True
+    known = angle[np.isfinite(angle)]
+    reach = float(np.max(np.abs(known)))
+    if are_whole(known):
+        return "counts", "whole numbers only", reach > MANY
+    by_step = _by_encoder_step(known)
+    if by_step is not None:
+        return by_step
+    if reach > LARGEST_ANGLE_RAD:
+        return "deg", f"reaches {reach:.4g}, which in rad would be {reach / (2 * np.pi):.1f} turns", False
+    return "rad", f"reaches {reach:.4g}; in degrees it would hardly move. No name says its unit", False
+
+
+def _by_encoder_step(known: NDArray) -> tuple[str, str, bool] | None:
+    """Return the unit in which an encoder's steps divide a turn into a power of two; None where none does."""
+    steps = np.abs(np.diff(np.unique(known)))
+    steps = steps[steps > 1e-9 * np.ptp(known)] if len(steps) else steps
+    if len(steps) < 5:
+        return None
+    step = float(np.min(steps))
+    if np.max(np.abs(steps / step - np.round(steps / step))) > 0.02:
+        return None
+    for unit, turn in TURNS.items():
+        bits = np.log2(turn / step)
+        if 9.5 < bits < 24.5 and abs(bits - round(bits)) < 1e-3:
+            return unit, f"its steps of {step:.4g} make 2^{round(bits)} of a turn in {unit}", True
+    return None

@@ -1,0 +1,57 @@
+"""A map that is proposed: each line with its reason, and whether it is sure."""
+
+import json
+from dataclasses import dataclass, field
+from typing import Any
+
+COLUMN = 44
+"""Where reasons begin."""
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Something that somebody who knows the machine must look at."""
+
+    key: str
+    why: str
+    blocks: bool
+    """Whether the map cannot be used before it is answered."""
+
+
+@dataclass
+class Proposal:
+    """The lines of a map in their order, and what is doubtful about them."""
+
+    lines: list[str] = field(default_factory=list)
+    doubts: list[Doubt] = field(default_factory=list)
+    _table: str = ""
+
+    def remark(self, text: str) -> None:
+        """Add a line that is for the reader alone."""
+        self.lines.append(f"# {text}")
+
+    def table(self, heading: str, where: str) -> None:
+        """Begin a table; ``where`` is what doubts about its keys call it."""
+        self.lines += ["", heading]
+        self._table = where
+
+    def key(self, name: str, value: Any, why: str = "", sure: bool = True) -> None:
+        """Add a key with its value and why it is so."""
+        if not sure:
+            self.doubts.append(Doubt(f"{self._table}.{name}", why, blocks=False))
+        text = f"{name} = {json.dumps(value, ensure_ascii=False)}"
+        self.lines.append(_with_reason(text, why if sure else f"UNSURE: {why}"))
+
+    def unknown(self, name: str, why: str, blocks: bool = True) -> None:
+        """Add a key whose value no log tells, as a comment to be filled in."""
+        self.doubts.append(Doubt(f"{self._table}.{name}", why, blocks))
+        self.lines.append(_with_reason(f"# {name} = ", f"FILL IN: {why}"))
+
+    @property
+    def text(self) -> str:
+        """The map as TOML."""
+        return "\n".join(self.lines) + "\n"
+
+
+def _with_reason(text: str, why: str) -> str:
+    return f"{text.ljust(COLUMN)}# {why}" if why else text

@@ -1,0 +1,88 @@
+"""Which column is the clock, and in which unit."""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.importing import clock
+from pipelines.importing.guess.names import Meaning
+from pipelines.importing.guess.proposal import Proposal
+from pipelines.settings.units import UNITS
+
+SLOWEST_HZ, FASTEST_HZ = 10.0, 1e4
+"""Between these a machine is sampled; three decades, so that of s, ms, us and ns only one fits."""
+ADVANCES = 0.9
+"""Share of the steps of a clock that go forward."""
+
+
+@dataclass(frozen=True)
+class TimeGuess:
+    """The clock of a log."""
+
+    column: str
+    unit: str
+    why: str
+    sure: bool
+    wraps_at: float | None
+    restarts: bool
+
+
+def guess_time(meanings: Sequence[Meaning], columns: Mapping[str, NDArray]) -> TimeGuess | None:
+    """Return the clock; None where no column is one."""
+    advancing = [meaning for meaning in meanings if _advances(columns[meaning.column])]
+    candidates = [meaning for meaning in advancing if meaning.quantity == "time"] or advancing
+    for found in sorted(candidates, key=lambda meaning: meaning.unit is None):
+        values = columns[found.column].astype(float)
+        step = float(np.median(np.diff(values)[np.diff(values) > 0]))
+        fitting = [u for u in ("s", "ms", "us", "ns") if SLOWEST_HZ <= 1.0 / (step * UNITS[u].factor) <= FASTEST_HZ]
+        unit = found.unit if found.unit and UNITS[found.unit].dimension == "time" else None
+        if unit is None and not fitting:
+            continue
+        chosen = unit or fitting[0]
+        rate = f"{1.0 / (step * UNITS[chosen].factor):.4g} Hz"
+        why = (
+            f"its name says so: {rate}"
+            if unit
+            else f"steps of {step:.4g} are {rate} in {chosen}, and no rate in another"
+        )
+        named = found.quantity == "time"
+        wraps_at, restarts = _breaks(values, chosen)
+        why += "" if named else "; no name says which column is the time"
+        return TimeGuess(found.column, chosen, why, named, wraps_at, restarts)
+    return None
+
+
+def write_time(proposal: Proposal, found: TimeGuess | None) -> None:
+    """Write the clock's table."""
+    proposal.table("[time]", "time")
+    if found is None:
+        proposal.unknown("column", "no column goes forward as a clock does; or set rate_hz where rows are uniform")
+        return
+    proposal.key("column", found.column, "goes forward" + ("" if found.sure else ", as no other does"), found.sure)
+    proposal.key("unit", found.unit, found.why, found.sure)
+    if found.wraps_at:
+        proposal.key("wraps_at", found.wraps_at, "goes back where such a counter is full")
+    elif found.restarts:
+        proposal.key("restarts", "longest", 'the clock starts over; "split" makes a recording of each run', sure=False)
+
+
+def _advances(values: NDArray) -> bool:
+    if values.dtype.kind not in "iuf" or len(values) < 10:
+        return False
+    steps = np.diff(values.astype(float))
+    if np.all(steps == 1.0):
+        return False  # a counter of rows
+    return bool(np.mean(steps > 0) > ADVANCES)
+
+
+def _breaks(values: NDArray, unit: str) -> tuple[float | None, bool]:
+    """Return where the clock is full, where it looks so, and whether it starts over."""
+    runs = clock.runs((values - values[0]) * UNITS[unit].factor, values, [])
+    full = [
+        clock.full_register(values[before.rows[-1]], values[after.rows[0]])
+        for before, after in itertools.pairwise(runs)
+    ]
+    return (full[0], False) if full and full[0] and len(set(full)) == 1 else (None, len(runs) > 1)

@@ -1,0 +1,200 @@
+"""A guess is right where it is sure, says where it is not, and runs as it is."""
+
+import re
+import tomllib
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from exoid_cli.app import run
+from pipelines.importing.guess.names import meaning
+from pipelines.importing.guess.register import lost_sign
+
+
+@pytest.fixture
+def guessed(tmp_path, capsys):
+    """Let exoid propose a map for files; its text, and what is doubtful by its key."""
+
+    def call(*files):
+        path = tmp_path / "guess.toml"
+        assert run(["import", *map(str, files), "--guess", "--map", str(path)]) == 0, capsys.readouterr().err
+        told = capsys.readouterr().out
+        doubts = dict(re.findall(r"^  (?:unsure|fill in): (\S+): (.*)$", told, flags=re.MULTILINE))
+        return path.read_text(encoding="utf-8"), doubts
+
+    return call
+
+
+def swinging(pendulum):
+    """The pendulum's columns on a wide swing: gravity shows where down is."""
+    angle = 2.0 * pendulum.angle
+    velocity = 2.0 * pendulum.velocity
+    acceleration = np.gradient(velocity, pendulum.time)
+    torque = 0.05 * acceleration + 2.0 * np.sin(angle) + 0.2 * np.tanh(velocity / 0.01)
+    return {"time": pendulum.time, "angle": angle, "velocity": velocity, "torque": torque}
+
+
+@pytest.mark.parametrize(
+    ("names", "factors"),
+    [
+        (("time", "position", "velocity", "torque"), (1, 1, 1, 1)),
+        (("t_ms", "pos_meas1", "vel_meas1", "tau_meas1"), (1e3, 1, 1, -1)),
+        (("Time (us)", "Angle [deg]", "Speed [rpm]", "Torque [Nm]"), (1e6, 180 / np.pi, 30 / np.pi, 1)),
+        (("stamp", "pos", "vel", "tau"), (1e9, 180 / np.pi, 30 / np.pi, 1)),
+        (("clock", "q", "omega", "effort"), (1e3, 180 / np.pi, 180 / np.pi, 1)),
+        (("a", "b", "c", "d"), (1, 1, 1, 1)),
+    ],
+    ids=lambda value: str(value[0]),
+)
+def test_a_guess_imports_the_truth(imported, guessed, pendulum, write_csv, names, factors):
+    columns = swinging(pendulum)
+    logged = {name: factor * values for name, factor, values in zip(names, factors, columns.values(), strict=True)}
+    path = write_csv(logged)
+    text, _ = guessed(path)
+    outcome = imported(path, map_text=text)
+    assert (outcome.code, outcome.err) == (0, "")
+    name = re.search(r'name = "(\w+)"', text)[1]
+    frame = outcome.recording("log_train").frame
+    rows = len(frame)
+    assert_allclose(frame["time_s"], pendulum.time[:rows], atol=1e-9)
+    assert_allclose(frame[f"{name}_angle_rad"], columns["angle"][:rows], rtol=1e-9, atol=1e-9)
+    assert_allclose(frame[f"{name}_velocity_rad_s"], columns["velocity"][:rows], rtol=1e-9, atol=1e-9)
+    assert_allclose(frame[f"{name}_torque_nm"], columns["torque"][:rows], rtol=1e-9, atol=1e-9)
+
+
+def test_what_names_do_not_say_is_unsure(guessed, pendulum, write_csv):
+    _, doubts = guessed(write_csv(dict(zip("abcd", swinging(pendulum).values(), strict=True))))
+    assert {"joint[0].angle.column", "joint[0].angle.unit", "joint[0].torque.column", "time.column"} <= doubts.keys()
+    assert "integrates to it" in doubts["joint[0].angle.column"]
+
+
+def test_units_in_names_leave_no_doubt(guessed, pendulum, write_csv):
+    names = ("Time (s)", "Angle (deg)", "Speed (deg/s)", "Torque (Nm)")
+    columns = swinging(pendulum)
+    columns |= {"angle": np.degrees(columns["angle"]), "velocity": np.degrees(columns["velocity"])}
+    text, doubts = guessed(write_csv(dict(zip(names, columns.values(), strict=True))))
+    assert doubts.keys() == {"geometry.gravity_m_s2"}
+    angle = tomllib.loads(text)["joint"][0]["angle"]
+    assert (angle["unit"], angle["zero"]) == ("deg", 0.0)
+
+
+def test_gravity_tells_where_down_is(guessed, pendulum, write_csv):
+    columns = swinging(pendulum)
+    text, doubts = guessed(write_csv(columns | {"angle": columns["angle"] + 0.8}))
+    assert tomllib.loads(text)["joint"][0]["angle"]["zero"] == pytest.approx(0.8, abs=0.05)
+    assert "would hang" in doubts["joint[0].angle.zero"]
+
+
+def test_an_encoders_steps_tell_its_unit(guessed, pendulum, write_csv):
+    """4096 steps in a turn are 4096 in one unit only."""
+    columns = swinging(pendulum)
+    degrees = np.round(np.degrees(columns["angle"]) * 4096 / 360) * 360 / 4096
+    text, doubts = guessed(write_csv(columns | {"angle": degrees, "velocity": np.degrees(columns["velocity"])}))
+    assert "make 2^12 of a turn in deg" in text
+    assert "joint[0].angle.unit" not in doubts
+
+
+def test_a_torque_that_does_not_follow_the_motion_is_doubtful(guessed, pendulum, write_csv):
+    noise = np.random.default_rng(1).normal(size=len(pendulum.time))
+    _, doubts = guessed(write_csv(swinging(pendulum) | {"torque": noise}))
+    assert "of the torque only" in doubts["joint[0].torque.sign"]
+
+
+def test_a_velocity_of_another_joint_is_doubtful(guessed, pendulum, write_csv):
+    other = np.cos(7.0 * pendulum.time)
+    _, doubts = guessed(write_csv(swinging(pendulum) | {"velocity": other}))
+    assert "does not integrate to the angle" in doubts["joint[0].velocity.unit"]
+
+
+def test_a_current_needs_a_torque_constant_that_no_log_tells(imported, guessed, pendulum, write_csv):
+    columns = swinging(pendulum)
+    columns["Current (mA)"] = np.round(1e4 * columns.pop("torque")).astype(int) % 65536
+    path = write_csv(columns)
+    text, doubts = guessed(path)
+    assert "signed_bits = 16" in text
+    assert "joint[0].torque.torque_constant_nm_a" in doubts
+    refused = imported(path, map_text=text)
+    assert (refused.code, "torque.unit: needs torque_constant_nm_a" in refused.err) == (2, True)
+    filled = text.replace("# torque_constant_nm_a = ", "torque_constant_nm_a = 0.1")
+    assert imported(path, map_text=filled).code == 0
+
+
+def test_several_joints_are_told_apart_and_never_sure_of_their_signs(guessed, pendulum, write_csv):
+    one = swinging(pendulum)
+    columns = {"time": one["time"]}
+    for joint in ("hip", "knee"):
+        columns |= {f"{joint}_{name}": one[name] for name in ("angle", "velocity", "torque")}
+    columns["hip_torque_cmd"] = one["torque"]
+    text, doubts = guessed(write_csv(columns))
+    joints = tomllib.loads(text)["joint"]
+    assert [joint["name"] for joint in joints] == ["hip", "knee"]
+    assert joints[0]["torque"]["column"] == "hip_torque"
+    assert {"joint[0].torque.sign", "joint[1].torque.sign", "geometry.thigh_length_m"} <= doubts.keys()
+
+
+def test_a_clock_that_was_full_is_counted_on(imported, guessed, pendulum, write_csv):
+    ticks = (np.round(pendulum.time * 1e6).astype(np.int64) + 2**32 - 4_000_000) % 2**32
+    path = write_csv(swinging(pendulum) | {"time": ticks})
+    text, _ = guessed(path)
+    assert "wraps_at = 4294967296" in text
+    assert len(imported(path, map_text=text).recording("log_train").frame) == 1400
+
+
+def test_several_files_train_and_validate_as_a_whole(guessed, pendulum, write_csv):
+    files = [write_csv(swinging(pendulum), name=f"run{k}.csv") for k in range(3)]
+    recordings = tomllib.loads(guessed(*files)[0])["recording"]
+    assert [(one["files"], one["purpose"]) for one in recordings] == [
+        ("run0.csv", "train"), ("run1.csv", "train"), ("run2.csv", "validate")
+    ]  # fmt: skip
+
+
+def test_a_guess_never_overwrites_a_map(pendulum, write_csv, tmp_path, capsys):
+    path = tmp_path / "mine.toml"
+    path.write_text("precious")
+    assert run(["import", str(write_csv(pendulum.columns())), "--guess", "--map", str(path)]) == 2
+    assert "exists already, not overwritten" in capsys.readouterr().err
+    assert path.read_text() == "precious"
+
+
+def test_without_a_map_one_is_offered(pendulum, write_csv, capsys):
+    assert run(["import", str(write_csv(pendulum.columns()))]) == 2
+    assert "--guess --map MAP.toml` proposes one" in capsys.readouterr().err
+
+
+def test_a_log_in_which_nothing_moves_gets_no_guess(pendulum, write_csv, capsys):
+    path = write_csv({"time": pendulum.time, "x": np.zeros(2000), "y": np.ones(2000)})
+    assert run(["import", str(path), "--guess"]) == 2
+    assert "no column integrates to another" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "joint", "unit"),
+    [
+        ("pos_meas1", "angle", "1", None),
+        ("hip_angle_rad", "angle", "hip", "rad"),
+        ("pivot.position", "angle", "pivot", None),
+        ("EPOSCurrent ()", "current", "", None),
+        ("Time (ms)", "time", "", "ms"),
+        ("goal_position", "reference", "", None),
+        ("LoadCell ()", "", "", None),
+        ("torque_enable", "", "", None),
+        ("tau_con1", "torque", "1", None),
+        ("Motor Speed [1/min]", "velocity", "", "rpm"),
+        ("q[1]", "angle", "1", None),
+    ],
+)
+def test_names_tell_quantity_joint_and_unit(name, quantity, joint, unit):
+    found = meaning(name)
+    assert (found.quantity, found.unit) == (quantity, unit)
+    if quantity:
+        assert found.joint == joint
+
+
+def test_a_register_without_its_sign_is_known_by_the_hole_in_its_middle():
+    rng = np.random.default_rng(1)
+    current = np.round(rng.normal(0.0, 500.0, 5000))
+    assert lost_sign(current % 65536) == 16
+    assert lost_sign(current % 2**32) == 32
+    assert lost_sign(np.abs(current)) is None
+    assert lost_sign(np.round(rng.uniform(0.0, 65535.0, 5000))) is None
