@@ -64,6 +64,7 @@ docs: $(INSTALLED) ## bring the generated pages up to date
 	$(BIN)/python -m pipelines.settings.reference > docs/settings.md
 	$(BIN)/python -m pipelines.settings.map_reference > docs/import-map.md
 	$(BIN)/python -m pipelines.effects.reference docs/effects
+	$(BIN)/python -m pipelines.export.reference docs/export.md
 
 lock: ## pin the newest versions that fit pyproject.toml, in requirements.lock
 	rm -rf build/lock

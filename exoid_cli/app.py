@@ -23,6 +23,7 @@ from exoid_cli.design import design
 from exoid_cli.detect import detect
 from exoid_cli.diagnose import diagnose
 from exoid_cli.effects import effects
+from exoid_cli.export import export
 from exoid_cli.filter import filter_
 from exoid_cli.identify import identify
 from exoid_cli.import_ import import_
@@ -54,6 +55,7 @@ app.command("filter", short_help="Filter a recording's angles and differentiate 
 app.command("identify", short_help="Fit the leg's parameters; judge them on other runs.")(identify)
 app.command("diagnose", short_help="Name what the model gets wrong, and measure the gain.")(diagnose)
 app.command("simulate", short_help="Simulate the identified leg, or replay a recording.")(simulate)
+app.command("export", short_help="Hand a model to MuJoCo, URDF, MATLAB, C or JSON.")(export)
 app.command("show", short_help="Say what a file is, and what is in it.")(show)
 app.command("effects", short_help="List the effects a model can have, or explain one.")(effects)
 app.command("detect", short_help="Say which causes a motion would reveal.")(detect)

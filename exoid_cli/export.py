@@ -1,0 +1,85 @@
+"""``exoid export``: an identified model in the form that another tool reads."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from exoid_cli.console import console
+
+
+def export(
+    model: Annotated[Path, typer.Argument(help="A parameters/1 file, as `exoid identify` or `diagnose` writes it.")],
+    to: Annotated[str, typer.Option("--to", help="mjcf, urdf, json, matlab or c.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="The file, or a folder for it; beside the model unless given.")
+    ] = None,
+    run: Annotated[
+        str | None, typer.Option("--run", help="exo_alone, with_human or human; with_human if there are several.")
+    ] = None,
+    config: Annotated[
+        Path | None, typer.Option("--config", help="exoid.toml: geometry, where the model does not say its own.")
+    ] = None,
+) -> None:
+    """Hand an identified model to MuJoCo, pinocchio, MATLAB, a controller in C, or anything that reads JSON.
+
+    \b
+    Example:
+      exoid export diagnosed/parameters.parquet --to mjcf -o leg.xml
+    """
+    from pipelines.contracts import PARAMETERS
+    from pipelines.contracts.atomic import write_text
+    from pipelines.errors import SettingsError
+    from pipelines.export import FORMATS, exported
+    from pipelines.export.exported import values_in_words
+    from pipelines.mechanics.read import geometry_from
+    from pipelines.settings import Experiment
+    from pipelines.validation import suggestion
+
+    formats = {format.name: format for format in FORMATS}
+    if to not in formats:
+        raise SettingsError(f"--to {to}: there is no such format; {suggestion(to, list(formats))}")
+    chosen = formats[to]
+    settings = Experiment.load(config) if config else Experiment()
+    made = exported(PARAMETERS.read(model), run, geometry_from(settings.mechanism))
+    path = _path(model, output, chosen.suffix)
+    files = {path.with_suffix(suffix): text for suffix, text in chosen.write(made, path.stem).items()}
+    if path.suffix not in {file.suffix for file in files}:
+        files[path] = files.pop(path.with_suffix(chosen.suffix))
+    if any(file.resolve() == model.resolve() for file in files):
+        raise SettingsError(f"-o {path}: is the model itself; choose another file")
+    for file, text in files.items():
+        write_text(file, text)
+    holdings = made.holdings(chosen)
+    console.emit(
+        {
+            "to": to,
+            "run": made.run,
+            "files": [str(file) for file in files],
+            "terms": [
+                {
+                    "term": term.effect.label,
+                    "held": holding.degree.value,
+                    "how": holding.how,
+                    "parameters": {
+                        p.name: {"value": float(value), "unit": p.unit}
+                        for p, value in zip(term.effect.parameters, term.effect.physical(term.values), strict=True)
+                    },
+                }
+                for term, holding in holdings
+            ],
+        }
+    )
+    console.table(
+        ("term", "held", "how"), [(term.effect.label, holding.degree, holding.how) for term, holding in holdings]
+    )
+    for term, holding in holdings:
+        if holding.degree == "left out":
+            console.warn(f"{term.effect.label} is not in the file ({holding.how}): {values_in_words(term)}")
+    console.say(f"{', '.join(map(str, files))}: the {made.run} model")
+
+
+def _path(model: Path, output: Path | None, suffix: str) -> Path:
+    if output is None:
+        return model.with_suffix(suffix)
+    return output if output.suffix and not output.is_dir() else output / f"{model.stem}{suffix}"

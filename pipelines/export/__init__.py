@@ -1,0 +1,13 @@
+"""Identified models in the forms that other tools read; one file a format."""
+
+from pipelines.export.c import C
+from pipelines.export.exported import Exported, exported
+from pipelines.export.format import Degree, Format, Holding
+from pipelines.export.json_document import JSON
+from pipelines.export.matlab import MATLAB
+from pipelines.export.mjcf import MJCF
+from pipelines.export.urdf import URDF
+
+FORMATS: tuple[Format, ...] = (MJCF, URDF, JSON, MATLAB, C)
+
+__all__ = ["FORMATS", "Degree", "Exported", "Format", "Holding", "exported"]

@@ -1,0 +1,131 @@
+"""Bodies that move as the identified machine does: masses chosen, everything that was identified kept.
+
+Torques at the joints of a leg determine X1 to X4 (and moments across the segments), not the mass, centre and inertia
+of each segment: a mass can go from the shank to the thigh's lower end unnoticed. Simulators ask for all of these.
+With m the masses, c the centres along and a across the segments, I the inertias about the centres,
+
+    X2 = m2 (c2² + a2²) + I2,  X3 = m2 c2,  X4 = m1 c1 + m2 L1,  X1 = m1 (c1² + a1²) + I1 + m2 L1² + X2
+
+is a leg with I2 > 0 and I1 > 0 if and only if (X3² + Y3²) / X2 < m2 < (X1 - X2) / L1² and m1 is large enough; there is
+such an m2 exactly where the mass matrix is positive definite. Here m2 is the middle of that range, and m1 twice the
+least it may be, but no less than m2: a nominal leg, whose X are the identified ones to rounding.
+
+A single joint's body has X1 about the axis; a pendulum's mass is twice the least it may be. What slides has the mass X1.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.contracts import Joint
+from pipelines.errors import InputError
+from pipelines.export.exported import Exported
+from pipelines.mechanics.leg import LEG
+from pipelines.mechanics.mechanism import Mechanism
+from pipelines.mechanics.single import LIFT, PENDULUM, SLIDE, TURNTABLE
+
+Vector = tuple[float, float, float]
+
+SWINGS_FORWARD: Vector = (0.0, -1.0, 0.0)
+"""Axis about which a positive angle swings what hangs down forward: x is forward, z up."""
+
+RISES: Vector = (0.0, 0.0, 1.0)
+SLIDES_FORWARD: Vector = (1.0, 0.0, 0.0)
+
+NOMINAL_MASS = 1.0
+"""kg, where a body may have any."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body behind its joint. SI units, in the joint's frame, in which the body hangs at angle zero."""
+
+    joint: Joint
+    mass: float
+    inertia: float
+    """About the centre of mass, kg·m²; about every axis: those across the plane of motion do not show, and three equal
+    ones keep the triangle inequality that simulators check."""
+    forward: float = 0.0
+    """Of the centre of mass, m."""
+    down: float = 0.0
+    """Of the centre of mass, along the body, m."""
+    axis: Vector = SWINGS_FORWARD
+    below: float = 0.0
+    """From the joint before, along the body before, m."""
+    shift: float = 0.0
+    """By how much its encoder's angle is more than its own."""
+    carried: float = 0.0
+    """Share of its weight that a counterweight carries."""
+
+
+def bodies(exported: Exported) -> tuple[Body, ...]:
+    """Return the machine's bodies, from the base on.
+
+    Raises
+    ------
+    InputError
+        Where no bodies have such X: the mass matrix is then positive definite by a rotor's inertia alone.
+    """
+    return MADE[exported.machine.mechanism](exported)
+
+
+def _leg(exported: Exported) -> tuple[Body, ...]:
+    X1, X2, X3, X4 = exported.X
+    hip, knee = exported.joints
+    across = [_moment_across(exported, joint) for joint in (hip, knee)]
+    length, shift = exported.geometry.thigh_length_m, exported.shift()
+    of_shank = np.hypot(X3, across[1])
+    if X2 <= 0 or X2 * (X1 - X2) <= (length * of_shank) ** 2:
+        raise InputError(
+            f"no two bodies have the rigid body of {exported.run}: X2 = {X2:.4g} kg·m², X2 (X1 - X2) = "
+            f"{X2 * (X1 - X2):.4g}, expected above (L1 X3)² = {(length * of_shank) ** 2:.4g} kg²·m⁴; identify again "
+            "from motions that separate X1, X2 and X3 better, or export to c, matlab or json, which need no bodies"
+        )
+    m2 = 0.5 * (of_shank**2 / X2 + (X1 - X2) / length**2)
+    left, along = X1 - X2 - m2 * length**2, X4 - m2 * length
+    of_thigh = np.hypot(along, across[0])
+    m1 = max(2.0 * of_thigh**2 / left, m2)
+    thigh = Body(hip, m1, left - of_thigh**2 / m1, across[0] / m1, along / m1, shift=shift[0])
+    shank = Body(knee, m2, X2 - of_shank**2 / m2, across[1] / m2, X3 / m2, below=length, shift=shift[1])
+    return thigh, shank
+
+
+def _pendulum(exported: Exported) -> tuple[Body, ...]:
+    (joint,), (X1, X2), (shift,) = exported.joints, exported.X, exported.shift()
+    across = _moment_across(exported, joint)
+    moment = np.hypot(X2, across)
+    mass = 2.0 * moment**2 / X1 or NOMINAL_MASS
+    return (Body(joint, mass, X1 - moment**2 / mass, across / mass, X2 / mass, shift=shift),)
+
+
+def _turntable(exported: Exported) -> tuple[Body, ...]:
+    (joint,), (X1,), (shift,) = exported.joints, exported.X, exported.shift()
+    return (Body(joint, NOMINAL_MASS, X1, axis=RISES, shift=shift),)
+
+
+def _lift(exported: Exported) -> tuple[Body, ...]:
+    (joint,), (mass, weight), (shift,) = exported.joints, exported.X, exported.shift()
+    carried = 1.0 - weight / (mass * exported.geometry.gravity_m_s2)
+    return (Body(joint, mass, _cube(mass), axis=RISES, shift=shift, carried=carried),)
+
+
+def _slide(exported: Exported) -> tuple[Body, ...]:
+    (joint,), (mass,), (shift,) = exported.joints, exported.X, exported.shift()
+    return (Body(joint, mass, _cube(mass), axis=SLIDES_FORWARD, shift=shift),)
+
+
+def _cube(mass: float) -> float:
+    """Return the inertia of a cube of 0.1 m; what slides does not show its own."""
+    return mass * 0.1**2 / 6.0
+
+
+def _moment_across(exported: Exported, joint: Joint) -> float:
+    term = exported.of("mass_off_axis", joint.name)
+    return float(term.values[0]) if term else 0.0
+
+
+MADE: dict[Mechanism, Callable[[Exported], tuple[Body, ...]]] = {
+    LEG: _leg, PENDULUM: _pendulum, TURNTABLE: _turntable, LIFT: _lift, SLIDE: _slide,
+}  # fmt: skip
+"""How each mechanism's bodies are chosen."""

@@ -1,0 +1,216 @@
+"""C99: a header and a source file without dependencies, for controllers."""
+
+from collections.abc import Iterable, Mapping
+
+from pipelines.export.equations import GROUPS, Equation, Equations, equations, holding
+from pipelines.export.exported import Exported
+from pipelines.export.format import Format
+from pipelines.export.language import Language, function_name, one_line
+
+LANGUAGE = Language(
+    names={"abs": "fabs", "max": "fmax", "min": "fmin", "at.t": "at->t"},
+    element=lambda name, index: f"{name.replace('.', '->')}[{index}]",
+    power=lambda base, exponent: f"pow({base}, {exponent})",
+    unequal="!=",
+    choice=lambda question, yes, no: [
+        f"if ({question}) {{", *_indented(yes), *(["} else {", *_indented(no)] if no else []), "}",
+    ],
+)  # fmt: skip
+
+HEADER = """\
+{comment}
+#ifndef {GUARD}
+#define {GUARD}
+
+#ifdef __cplusplus
+extern "C" {{
+#endif
+
+#define {NAME}_JOINTS {joints}
+#define {NAME}_MEMORY {room} {memory_comment}
+
+/* Torque that the drives must deliver. t: seconds since the run began; q, dq, ddq: angles as the encoders give them,
+ * their rates, SI units; memory: {NAME}_MEMORY numbers, 0 to begin with. Friction that depends on the load makes it
+ * other than affine in ddq. */
+void {name}_inverse_dynamics(double t, const double q[{joints}], const double dq[{joints}], const double ddq[{joints}],
+                             const double memory[{room}], double tau[{joints}]);
+
+/* The same at ddq = 0: Coriolis and centrifugal torque, gravity, friction, springs. */
+void {name}_bias(double t, const double q[{joints}], const double dq[{joints}], const double memory[{room}],
+                 double tau[{joints}]);
+
+/* Mass matrix, rotors included. */
+void {name}_mass_matrix(double t, const double q[{joints}], double M[{joints}][{joints}]);
+
+/* Rate of the memory, for whoever integrates it. */
+void {name}_memory_rate(double t, const double q[{joints}], const double dq[{joints}], const double memory[{room}],
+                        double rate[{room}]);
+
+/* What the torque channels say where the drives deliver tau; in place. */
+void {name}_torque_reading(double t, double tau[{joints}]);
+
+#ifdef __cplusplus
+}}
+#endif
+#endif
+"""
+
+SOURCE = """\
+{comment}
+#include "{name}.h"
+
+#include <math.h>
+
+{constants}
+
+static const double sensor_shift[{joints}] = {sensor_shift}; /* encoders less motors, rad */
+static const double link_shift[{joints}] = {link_shift}; /* motors less angles from the vertical, rad */
+
+struct instant {{
+    double t;
+    double q[{joints}], motor[{joints}], dq[{joints}], ddq[{joints}], direction[{joints}], load[{joints}];
+    double memory[{room}];
+}};
+
+static double sign(double x) {{ return (x > 0.0) - (x < 0.0); }}
+
+static struct instant instant_of(double t, const double *q, const double *dq, const double *ddq,
+                                 const double *memory) {{
+    struct instant at;
+    at.t = t;
+    for (int j = 0; j < {joints}; j++) {{
+        at.motor[j] = q[j] - sensor_shift[j];
+        at.q[j] = at.motor[j] - link_shift[j];
+        at.dq[j] = dq[j];
+        at.ddq[j] = ddq[j];
+        at.direction[j] = sign(dq[j]);
+        at.load[j] = 0.0;
+    }}
+    for (int i = 0; i < {room}; i++) {{
+        at.memory[i] = memory[i];
+    }}
+    return at;
+}}
+
+{groups}
+
+void {name}_inverse_dynamics(double t, const double q[{joints}], const double dq[{joints}], const double ddq[{joints}],
+                             const double memory[{room}], double tau[{joints}]) {{
+    struct instant at = instant_of(t, q, dq, ddq, memory);
+    for (int j = 0; j < {joints}; j++) {{
+        tau[j] = 0.0;
+    }}
+    link_inertia(&at, tau);
+    link_torque(&at, tau);
+    for (int j = 0; j < {joints}; j++) {{
+        at.load[j] = tau[j];
+    }}
+    drive_inertia(&at, tau);
+    drive_torque(&at, tau);
+}}
+
+void {name}_bias(double t, const double q[{joints}], const double dq[{joints}], const double memory[{room}],
+                 double tau[{joints}]) {{
+    const double still[{joints}] = {{0.0}};
+    {name}_inverse_dynamics(t, q, dq, still, memory, tau);
+}}
+
+void {name}_mass_matrix(double t, const double q[{joints}], double M[{joints}][{joints}]) {{
+    const double still[{joints}] = {{0.0}}, no_memory[{room}] = {{0.0}};
+    struct instant at = instant_of(t, q, still, still, no_memory);
+    double at_rest[{joints}] = {{0.0}};
+    link_inertia(&at, at_rest);
+    drive_inertia(&at, at_rest);
+    for (int k = 0; k < {joints}; k++) {{
+        double column[{joints}] = {{0.0}};
+        at.ddq[k] = 1.0;
+        link_inertia(&at, column);
+        drive_inertia(&at, column);
+        at.ddq[k] = 0.0;
+        for (int j = 0; j < {joints}; j++) {{
+            M[j][k] = column[j] - at_rest[j];
+        }}
+    }}
+}}
+
+void {name}_memory_rate(double t, const double q[{joints}], const double dq[{joints}], const double memory[{room}],
+                        double rate[{room}]) {{
+    const double still[{joints}] = {{0.0}};
+    struct instant now = instant_of(t, q, dq, still, memory), *at = &now;
+    (void)at;
+    for (int i = 0; i < {room}; i++) {{
+        rate[i] = 0.0;
+    }}
+{rates}}}
+
+void {name}_torque_reading(double t, double tau[{joints}]) {{
+    struct instant now = {{.t = t}}, *at = &now;
+    (void)at;
+    (void)tau;
+{readings}}}
+"""
+
+
+def write(exported: Exported, stem: str) -> Mapping[str, str]:
+    """Return header and source; their functions begin with the file's name."""
+    made, name = equations(exported), function_name(stem, ".c")
+    joints = len(made.joints)
+    of_memory = ", ".join(dict.fromkeys(made.memory_of))
+    places = {
+        "comment": comment([*exported.heading(C), "", *order_of(made)]),
+        "name": name,
+        "NAME": name.upper(),
+        "GUARD": f"{name.upper()}_H",
+        "joints": joints,
+        "room": max(1, made.memories),
+        "memory_comment": comment(
+            [f"memory of {of_memory}" if of_memory else "no effect here has one; pass any number"]
+        ),
+        "constants": "\n".join(_constant(c.name, c.value, f"{c.unit}, {c.meaning}") for c in made.used),
+        "sensor_shift": _array(made.sensor_shift),
+        "link_shift": _array(made.link_shift),
+        "groups": "\n\n".join(_group(group, made.groups[group]) for group in GROUPS),
+        "rates": "".join(
+            f"{line}\n" for e in made.rates for line in _body(e, LANGUAGE.assigned(e.outcome, "rate", e.first))
+        ),
+        "readings": "".join(
+            f"{line}\n" for e in made.readings for line in _body(e, LANGUAGE.assigned(e.outcome, "tau"))
+        ),
+    }
+    return {".h": HEADER.format(**places), ".c": SOURCE.format(**places)}
+
+
+def order_of(made: Equations) -> list[str]:
+    """Say which joint stands where."""
+    return [f"joint {i}: {joint.name}, {joint.kind}" for i, joint in enumerate(made.joints)]
+
+
+def comment(lines: Iterable[str]) -> str:
+    """Return a comment that nothing in it can end."""
+    safe = [one_line(line).replace("*/", "* /").replace("/*", "/ *") for line in lines]
+    return "/* " + "\n".join(safe).replace("\n", "\n * ").replace(" \n", "\n") + " */"
+
+
+def _constant(name: str, value: float, says: str) -> str:
+    return f"static const double {name} = {value!r}; {comment([says])}"
+
+
+def _array(values: Iterable[float]) -> str:
+    return "{" + ", ".join(map(repr, values)) + "}"
+
+
+def _group(name: str, made: list[Equation]) -> str:
+    lines = [line for e in made for line in _body(e, LANGUAGE.added(e.outcome, "tau"))]
+    nothing = [] if made else ["    (void)at;", "    (void)tau;"]
+    return "\n".join([f"static void {name}(const struct instant *at, double *tau) {{", *nothing, *lines, "}"])
+
+
+def _body(equation: Equation, statements: list[str]) -> list[str]:
+    return _indented([comment([f"{equation.label}: {equation.says}"]), *statements])
+
+
+def _indented(lines: Iterable[str]) -> list[str]:
+    return [f"    {line}" for line in lines]
+
+
+C = Format("c", "C99 source", ".c", holding, write)

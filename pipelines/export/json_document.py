@@ -1,0 +1,85 @@
+"""JSON: all that the model's file holds, for programs that read no Parquet; it explains itself."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import pandas as pd
+
+from pipelines import __version__
+from pipelines.contracts.provenance import describe
+from pipelines.effects.reference import facts
+from pipelines.export.exported import Exported
+from pipelines.export.format import Format, Holding, exact
+from pipelines.model import Term
+
+CONTRACT = "model/1"
+
+CONVENTIONS = {
+    "units": "SI",
+    "angles": "of the first revolute joint from the downward vertical, forward positive, of the next relative to the "
+    "link before; a prismatic joint rises where gravity acts; all as their encoders give them",
+    "torques": "positive torque accelerates its angle upward; an effect's equation gives what the drive must add",
+    "covariance": "of the parameters' values, rows and columns in their order; null where it was not estimated",
+}
+
+
+def holding(term: Term) -> Holding:
+    """Return what becomes of a term in JSON."""
+    return exact("parameters, with intervals and covariance")
+
+
+def write(exported: Exported, stem: str) -> Mapping[str, str]:
+    """Return the document."""
+    table = exported.table
+    said = {
+        "contract": CONTRACT,
+        "name": stem,
+        "created_by": f"exoid {__version__}",
+        "inputs": describe([table.path] if table.path else [])["inputs"],
+        "run": exported.run,
+        "mechanism": {"name": exported.machine.mechanism.name, "title": exported.machine.mechanism.title},
+        "method": table.metadata.get("method"),
+        "joints": [
+            {
+                "name": joint.name,
+                "kind": joint.kind,
+                "angle_unit": joint.unit("angle"),
+                "torque_unit": joint.unit("torque"),
+            }
+            for joint in exported.joints
+        ],
+        "geometry": exported.geometry.metadata(),
+        "conventions": CONVENTIONS,
+        "parameters": [_plain(row) for row in table.frame.to_dict("records")],
+        "covariance": table.metadata.get("covariance"),
+        "effects": [_effect(term) for term in exported.terms],
+        "not_in_this_run": [_effect(term) | {"why": why.how} for term, why in exported.absent],
+    }
+    return {".json": json.dumps(said, ensure_ascii=False, indent=2, allow_nan=False) + "\n"}
+
+
+def _plain(row: Mapping[Any, Any]) -> dict[str, Any]:
+    return {str(key): None if pd.isna(value) else value for key, value in row.items()}
+
+
+def _effect(term: Term) -> dict[str, Any]:
+    """Say of a term what it is, and its values."""
+    effect = term.effect
+    told = facts(type(effect))
+    values = effect.physical(term.values)
+    return {
+        "effect": effect.name,
+        "joint": effect.joint,
+        "side": told["side"],
+        "equation": told["equation"],
+        "meaning": told["meaning"],
+        "source": told["source"],
+        "values": [
+            {"name": p.name, "symbol": p.symbol, "value": float(value), "unit": p.unit, "meaning": p.meaning}
+            for p, value in zip(effect.parameters, values, strict=True)
+        ],
+    }
+
+
+JSON = Format("json", "JSON document", ".json", holding, write)

@@ -1,0 +1,169 @@
+"""MATLAB, Octave and Simulink: one function file."""
+
+import re
+from collections.abc import Iterable, Mapping
+
+from pipelines.export.equations import GROUPS, Equation, Equations, equations, holding
+from pipelines.export.exported import Exported
+from pipelines.export.format import Format
+from pipelines.export.language import Language, function_name, one_line
+
+KEYWORDS = frozenset(
+    (
+        "break",
+        "case",
+        "catch",
+        "classdef",
+        "continue",
+        "else",
+        "elseif",
+        "end",
+        "for",
+        "function",
+        "global",
+        "if",
+        "otherwise",
+        "parfor",
+        "persistent",
+        "return",
+        "spmd",
+        "switch",
+        "try",
+        "while",
+    )
+)
+
+LANGUAGE = Language(
+    names={},
+    element=lambda name, index: f"{name}({index + 1})",
+    power=lambda base, exponent: f"{base}^{exponent}",
+    unequal="~=",
+    choice=lambda question, yes, no: [
+        f"if {question}", *_indented(yes), *(["else", *_indented(no)] if no else []), "end",
+    ],
+)  # fmt: skip
+
+FILE = """\
+function [tau, M, C, G, rate, reading] = {name}(q, dq, ddq, t, memory)
+{comment}
+%
+% [tau, M, C, G, rate, reading] = {name}(q, dq, ddq, t, memory)
+%   q, dq, ddq  {joints} x 1: angles as the encoders give them, their rates; SI units
+%   t           seconds since the run began; 0 unless given
+%   memory      {memories} x 1: {memory_of}; zeros unless given
+%   tau         {joints} x 1: torque that the drives must deliver
+%   M, C, G     mass matrix with rotors, Coriolis matrix (dM/dt - 2 C is skew), gravity torque:
+%               the rest of tau, friction and springs, is tau - M*ddq - C*dq - G
+%   rate        {memories} x 1: d(memory)/dt
+%   reading     {joints} x 1: what the torque channels say where the drives deliver tau
+if nargin < 4
+    t = 0;
+end
+if nargin < 5
+    memory = zeros({memories}, 1);
+end
+sensor_shift = {sensor_shift}; % encoders less motors, rad
+link_shift = {link_shift}; % motors less angles from the vertical, rad
+at.t = t;
+at.motor = q(:) - sensor_shift;
+at.q = at.motor - link_shift;
+at.dq = dq(:);
+at.ddq = ddq(:);
+at.direction = sign(dq(:));
+at.load = zeros({joints}, 1);
+at.memory = memory(:);
+
+tau = link_torque(at, link_inertia(at, zeros({joints}, 1)));
+at.load = tau;
+tau = drive_torque(at, drive_inertia(at, tau));
+if nargout > 1
+    still = at;
+    still.dq = zeros({joints}, 1);
+    still.ddq = zeros({joints}, 1);
+    G = inertial(still);
+    M = zeros({joints});
+    for k = 1:{joints}
+        still.ddq(k) = 1;
+        M(:, k) = inertial(still) - G;
+        still.ddq(k) = 0;
+    end
+    C = zeros({joints});
+    for k = 1:{joints}
+        unit = zeros({joints}, 1);
+        unit(k) = 1;
+        % The velocity torque is a quadratic form in dq; its polarisation is the Christoffel matrix.
+        C(:, k) = 0.5 * (velocity_torque(still, at.dq + unit, G) - velocity_torque(still, at.dq, G) ...
+            - velocity_torque(still, unit, G));
+    end
+    rate = memory_rate(at);
+    reading = torque_reading(at, tau);
+end
+end
+
+function tau = inertial(at)
+tau = drive_inertia(at, link_inertia(at, zeros({joints}, 1)));
+end
+
+function tau = velocity_torque(at, dq, G)
+at.dq = dq;
+tau = inertial(at) - G;
+end
+
+{functions}
+"""
+
+
+def write(exported: Exported, stem: str) -> Mapping[str, str]:
+    """Return the function file."""
+    made = equations(exported)
+    joints = len(made.joints)
+    order = [f"joint {i}: {joint.name}, {joint.kind}" for i, joint in enumerate(made.joints, start=1)]
+    return {
+        ".m": FILE.format(
+            name=function_name(stem, ".m", KEYWORDS),
+            comment=comment([*exported.heading(MATLAB), "", *order]),
+            joints=joints,
+            memories=made.memories,
+            memory_of=one_line(", ".join(dict.fromkeys(made.memory_of)) or "no effect here has one"),
+            sensor_shift=_column(made.sensor_shift),
+            link_shift=_column(made.link_shift),
+            functions="\n\n".join(_functions(made)),
+        )
+    }
+
+
+def comment(lines: Iterable[str]) -> str:
+    """Return a comment that nothing in it can end."""
+    return "\n".join(f"% {one_line(line)}".rstrip() for line in lines)
+
+
+def _column(values: Iterable[float]) -> str:
+    return "[" + "; ".join(map(repr, values)) + "]"
+
+
+def _functions(made: Equations) -> Iterable[str]:
+    for group in GROUPS:
+        lines = [line for e in made.groups[group] for line in _body(e, LANGUAGE.added(e.outcome, "tau"))]
+        yield _function(f"tau = {group}(at, tau)", lines, made)
+    rates = [line for e in made.rates for line in _body(e, LANGUAGE.assigned(e.outcome, "rate", e.first))]
+    yield _function("rate = memory_rate(at)", [f"rate = zeros({made.memories}, 1);", *rates], made)
+    readings = [line for e in made.readings for line in _body(e, LANGUAGE.assigned(e.outcome, "tau"))]
+    yield _function("tau = torque_reading(at, tau)", readings, made)
+
+
+def _function(head: str, lines: list[str], made: Equations) -> str:
+    """Return a function that knows the constants it uses."""
+    known = set(re.findall(r"\w+", "\n".join(lines)))
+    used = [f"{c.name} = {c.value!r}; {comment([f'{c.unit}, {c.meaning}'])}" for c in made.used if c.name in known]
+    return "\n".join([f"function {head}", *used, *lines, "end"])
+
+
+def _body(equation: Equation, statements: list[str]) -> list[str]:
+    return [comment([f"{equation.label}: {equation.says}"]), *statements]
+
+
+def _indented(lines: Iterable[str]) -> list[str]:
+    return [f"    {line}" for line in lines]
+
+
+MATLAB = Format("matlab", "MATLAB function", ".m", holding, write)

@@ -1,0 +1,176 @@
+"""MJCF: MuJoCo's own form of a model.
+
+A leg moves in the x-z plane, x forward and z up; its joints turn about -y, so that forward is positive. A joint's
+``qpos`` is what its encoder gives, an actuator's ``ctrl`` what its torque channel would say.
+"""
+
+from collections.abc import Callable, Mapping
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from pipelines.contracts import Joint
+from pipelines.effects.joint_elasticity import DAMPING_RATIO
+from pipelines.export.bodies import Body, bodies
+from pipelines.export.exported import Exported, shift_of
+from pipelines.export.format import Format, Holding, approximate, exact, left_out
+from pipelines.export.language import one_line, unique
+from pipelines.export.xml_text import document, number, numbers
+from pipelines.model import Term
+
+TIMESTEP_S = 0.001
+
+NO_ELEMENT = "MJCF has no element for it"
+
+
+def _friction(term: Term) -> Holding:
+    coulomb, viscous = term.values
+    if coulomb < 0.0 or viscous < 0.0:
+        return left_out("its Coulomb or viscous friction is negative, which would drive the joint")
+    return approximate("joint damping and frictionloss: exact while the joint moves, stuck joints creep a little")
+
+
+def _elasticity(term: Term) -> Holding:
+    return exact("a second joint, its stiffness and damping; the motor's inertia is the first one's armature")
+
+
+HELD: Mapping[str, Callable[[Term], Holding]] = {
+    "rigid_body": lambda term: exact("bodies of nominal masses that have these X"),
+    "friction": _friction,
+    "quadratic_drag": lambda term: exact("second coefficient of the joint's damping (read by MuJoCo 4.0)"),
+    "rotor_inertia": lambda term: exact("joint armature"),
+    "parallel_spring": lambda term: exact("joint stiffness and springref"),
+    "mass_off_axis": lambda term: exact("place of the body's centre of mass"),
+    "joint_elasticity": _elasticity,
+    "torque_gain": lambda term: exact("gain of the actuator"),
+    "torque_offset": lambda term: exact("bias of the actuator"),
+}
+
+
+def holding(term: Term) -> Holding:
+    """Return what becomes of a term in MJCF."""
+    if shift_of(term) is not None:
+        return exact("orientation of the joint's frame")
+    held = HELD.get(term.effect.name)
+    return held(term) if held else left_out(NO_ELEMENT)
+
+
+def write(exported: Exported, stem: str) -> Mapping[str, str]:
+    """Return the model."""
+    root = ET.Element("mujoco", model=one_line(stem))
+    ET.SubElement(root, "compiler", angle="radian")
+    gravity = numbers(0.0, 0.0, -exported.geometry.gravity_m_s2)
+    ET.SubElement(root, "option", gravity=gravity, timestep=number(TIMESTEP_S), integrator="implicitfast")
+    world = ET.SubElement(root, "worldbody")
+    names = unique(one_line(joint.name) for joint in exported.joints)
+    twists = unique([f"{name}_twist" for name in names], names)
+    parent = world
+    for name, twist, body in zip(names, twists, bodies(exported), strict=True):
+        parent = _body(parent, name, twist, body, exported)
+    springs = ET.Element("tendon")
+    actuators = ET.Element("actuator")
+    for name, twist, joint in zip(names, twists, exported.joints, strict=True):
+        _spring_across(springs, (name, twist), joint, exported)
+        _actuator(actuators, name, joint, exported)
+    root.extend([part for part in (springs, actuators) if len(part)])
+    masses = "Masses are nominal where X does not determine them: what joints feel is kept. Shapes are drawn only."
+    return {".xml": document(root, [*exported.heading(MJCF), "", masses])}
+
+
+def _body(parent: ET.Element, name: str, twist: str, body: Body, exported: Exported) -> ET.Element:
+    made = ET.SubElement(parent, "body", {"name": f"{name}_link"} | _frame(body))
+    hinge = {"type": "hinge" if body.joint.kind == "revolute" else "slide", "axis": numbers(*body.axis)}
+    soft = _twist(body.joint, exported)
+    at_link = {} if soft else _spring(body.joint, body.shift, exported)
+    ET.SubElement(made, "joint", {"name": name} | hinge | _joint(body, exported) | at_link)
+    if soft:
+        ET.SubElement(made, "joint", {"name": twist} | hinge | soft)
+    inertia = numbers(*[body.inertia] * 3)
+    centre = numbers(body.forward, 0.0, -body.down)
+    ET.SubElement(made, "inertial", pos=centre, mass=number(body.mass), diaginertia=inertia)
+    end = numbers(0.0, 0.0, 0.0, 0.0, 0.0, -exported.geometry.thigh_length_m)
+    ET.SubElement(made, "geom", type="capsule", size="0.03", fromto=end, contype="0", conaffinity="0")
+    return made
+
+
+def _frame(body: Body) -> dict[str, str]:
+    """Return where the joint is, set back by the shift: at angle zero the link is where its encoder says so."""
+    carried = {"gravcomp": number(body.carried)} if body.carried else {}
+    axis = np.array(body.axis)
+    if body.joint.kind == "prismatic":
+        return {"pos": numbers(*(-body.shift * axis))} | carried
+    quat = numbers(np.cos(0.5 * body.shift), *(-np.sin(0.5 * body.shift) * axis))
+    return {"pos": numbers(0.0, 0.0, -body.below), "quat": quat} | carried
+
+
+def _joint(body: Body, exported: Exported) -> dict[str, str]:
+    """Return what a drive does at its joint."""
+    name, says = body.joint.name, {}
+    damping = [0.0, 0.0]
+    friction, drag = exported.of("friction", name), exported.of("quadratic_drag", name)
+    if friction and _friction(friction).degree != "left out":
+        damping[0] = friction.values[1]
+        says["frictionloss"] = number(friction.values[0])
+        # Fast enough to hold within two steps, the fastest that MuJoCo allows.
+        says["solreffriction"] = numbers(2.0 * TIMESTEP_S, 1.0)
+    if drag:
+        damping[1] = drag.values[0]
+    if any(damping):
+        says["damping"] = numbers(*damping) if damping[1] else number(damping[0])
+    rotor, soft = exported.of("rotor_inertia", name), exported.of("joint_elasticity", name)
+    armature = (rotor.values[0] if rotor else 0.0) + (soft.effect.motor_inertia if soft else 0.0)
+    return says | ({"armature": number(armature)} if armature else {})
+
+
+def _spring(joint: Joint, shift: float, exported: Exported) -> dict[str, str]:
+    spring = exported.of("parallel_spring", joint.name)
+    if spring is None:
+        return {}
+    stiffness, rest = spring.effect.physical(spring.values)
+    return {"stiffness": number(stiffness), "springref": number(rest + shift)}
+
+
+def _twist(joint: Joint, exported: Exported) -> dict[str, str]:
+    """Return the joint between motor and link; it turns against the twist of the transmission."""
+    soft = exported.of("joint_elasticity", joint.name)
+    if soft is None:
+        return {}
+    stiffness, hardening = soft.values
+    says = numbers(stiffness, 0.0, stiffness * hardening) if hardening else number(stiffness)
+    damping = 2.0 * DAMPING_RATIO * np.sqrt(stiffness * soft.effect.motor_inertia)
+    return {"stiffness": says, "damping": number(damping)}
+
+
+def _spring_across(springs: ET.Element, names: tuple[str, str], joint: Joint, exported: Exported) -> None:
+    """Add the spring of a link that hangs behind a soft joint: its angle is the sum of two."""
+    if exported.of("joint_elasticity", joint.name) is None:
+        return
+    says = _spring(joint, exported.shift()[[j.name for j in exported.joints].index(joint.name)], exported)
+    if says:
+        across = ET.SubElement(springs, "fixed", name=f"{names[0]}_spring", stiffness=says["stiffness"])
+        across.set("springlength", says["springref"])
+        for part in names:
+            ET.SubElement(across, "joint", joint=part, coef="1")
+
+
+def _actuator(actuators: ET.Element, name: str, joint: Joint, exported: Exported) -> None:
+    gain, offset = exported.of("torque_gain", joint.name), exported.of("torque_offset", joint.name)
+    if gain is None and offset is None:
+        ET.SubElement(actuators, "motor", name=name, joint=name)
+        return
+    # The channel says g T where the drive delivers T, or g T + o; asked for u, the drive delivers what makes it say u.
+    per_unit = 1.0 / (gain.values[0] if gain else 1.0)
+    at_nought = -(offset.values[0] if offset else 0.0)
+    if gain and offset and _comes_before(exported, gain, offset):
+        at_nought *= per_unit
+    bias = numbers(at_nought, 0.0, 0.0)
+    ET.SubElement(
+        actuators, "general", name=name, joint=name, gainprm=number(per_unit), biastype="affine", biasprm=bias
+    )  # fmt: skip
+
+
+def _comes_before(exported: Exported, first: Term, second: Term) -> bool:
+    return next(term for term in exported.terms if term is first or term is second) is first
+
+
+MJCF = Format("mjcf", "MuJoCo model", ".xml", holding, write)

@@ -1,0 +1,89 @@
+"""URDF, as pinocchio, ROS and MATLAB's Robotics System Toolbox read it.
+
+A leg moves in the x-z plane, x forward and z up; its joints turn about -y, so that forward is positive. A joint's
+position is what its encoder gives. URDF tells neither gravity nor rotors.
+"""
+
+from collections.abc import Callable, Mapping
+from math import pi
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from pipelines.export.bodies import Body, bodies
+from pipelines.export.exported import Exported, shift_of
+from pipelines.export.format import Format, Holding, exact, left_out
+from pipelines.export.language import one_line, unique
+from pipelines.export.xml_text import document, number, numbers
+from pipelines.model import Term
+
+NO_ELEMENT = "URDF has no element for it"
+
+
+def _friction(term: Term) -> Holding:
+    if min(term.values) < 0.0:
+        return left_out("its Coulomb or viscous friction is negative, which would drive the joint")
+    return exact("dynamics of the joint: damping and friction; not every reader heeds them")
+
+
+HELD: Mapping[str, Callable[[Term], Holding]] = {
+    "rigid_body": lambda term: exact("links of nominal masses that have these X"),
+    "friction": _friction,
+    "mass_off_axis": lambda term: exact("place of the link's centre of mass"),
+}
+
+
+def holding(term: Term) -> Holding:
+    """Return what becomes of a term in URDF."""
+    if shift_of(term) is not None:
+        return exact("origin of the joint")
+    held = HELD.get(term.effect.name)
+    return held(term) if held else left_out(NO_ELEMENT)
+
+
+def write(exported: Exported, stem: str) -> Mapping[str, str]:
+    """Return the model."""
+    root = ET.Element("robot", name=one_line(stem))
+    joints = unique(one_line(joint.name) for joint in exported.joints)
+    links = unique([f"{name}_link" for name in joints], ["base", *joints])
+    ET.SubElement(root, "link", name="base")
+    parent = "base"
+    made = bodies(exported)
+    for name, link, body in zip(joints, links, made, strict=True):
+        _link(root, link, body)
+        _joint(root, name, parent, link, body, exported)
+        parent = link
+    # Of a lift, whose weight a counterweight carries in part, that part of gravity.
+    gravity = exported.geometry.gravity_m_s2 * (1.0 - made[0].carried)
+    said = [
+        "Masses are nominal where X does not determine them: what joints feel is kept. Limits are not the machine's.",
+        f"Gravity is the reader's to set: {gravity!r} m/s² along -z.",
+    ]
+    return {".urdf": document(root, [*exported.heading(URDF), "", *said])}
+
+
+def _link(root: ET.Element, name: str, body: Body) -> None:
+    inertial = ET.SubElement(ET.SubElement(root, "link", name=name), "inertial")
+    ET.SubElement(inertial, "origin", xyz=numbers(body.forward, 0.0, -body.down), rpy="0 0 0")
+    ET.SubElement(inertial, "mass", value=number(body.mass))
+    same, none = number(body.inertia), "0"
+    ET.SubElement(inertial, "inertia", ixx=same, iyy=same, izz=same, ixy=none, ixz=none, iyz=none)
+
+
+def _joint(root: ET.Element, name: str, parent: str, link: str, body: Body, exported: Exported) -> None:
+    joint = ET.SubElement(root, "joint", name=name, type=body.joint.kind)
+    # Set back by the shift: at angle zero the link is where its encoder says so.
+    back, turns = -body.shift * np.array(body.axis), body.joint.kind == "revolute"
+    place, turned = ([0.0, 0.0, -body.below], back) if turns else (back, np.zeros(3))
+    ET.SubElement(joint, "origin", xyz=numbers(*place), rpy=numbers(*turned))
+    ET.SubElement(joint, "parent", link=parent)
+    ET.SubElement(joint, "child", link=link)
+    ET.SubElement(joint, "axis", xyz=numbers(*body.axis))
+    ET.SubElement(joint, "limit", lower=number(-pi), upper=number(pi), effort="1e6", velocity="1e3")
+    friction = exported.of("friction", body.joint.name)
+    if friction and _friction(friction).degree == "exactly":
+        coulomb, viscous = friction.values
+        ET.SubElement(joint, "dynamics", damping=number(viscous), friction=number(coulomb))
+
+
+URDF = Format("urdf", "URDF model", ".urdf", holding, write)

@@ -1,0 +1,51 @@
+"""Exported functions, run by Octave."""
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+
+SCRIPT = """\
+states = dlmread('states.csv');
+names = {{{names}}};
+for i = 1:numel(names)
+    f = str2func(names{{i}});
+    out = [];
+    for k = 1:rows(states)
+        s = states(k, :)';
+        if k == 1
+            % As many numbers as the function says that it remembers.
+            [~, ~, ~, ~, rate] = f(s(2:3), s(4:5), s(6:7));
+            memory = {memory} * ones(numel(rate), 1);
+        end
+        [tau, M, C, G, rate, reading] = f(s(2:3), s(4:5), s(6:7), s(1), memory);
+        out(k, :) = [tau; reading; M(:); C(:); G; rate]';
+    end
+    file = fopen([names{{i}} '.out'], 'w');
+    fprintf(file, [repmat('%.17g,', 1, columns(out) - 1) '%.17g\\n'], out');
+    fclose(file);
+end
+"""
+
+
+def computed(folder: Path, stems, states, memory) -> dict[str, dict[str, np.ndarray]]:
+    """Run the functions of a folder at all instants."""
+    rows = np.column_stack([states.t, states.q, states.dq, states.ddq])
+    np.savetxt(folder / "states.csv", rows, fmt="%.17g", delimiter=",")
+    (folder / "run_all.m").write_text(SCRIPT.format(names=", ".join(f"'{s}'" for s in stems), memory=memory))
+    command = ["octave-cli", "--no-init-file", "--quiet", "run_all.m"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    found = {}
+    for stem in stems:
+        out = np.loadtxt(folder / f"{stem}.out", delimiter=",", ndmin=2)
+        found[stem] = {
+            "tau": out[:, :2],
+            "reading": out[:, 2:4],
+            # Octave's matrices go by columns.
+            "M": out[:, 4:8].reshape(-1, 2, 2).transpose(0, 2, 1),
+            "C": out[:, 8:12].reshape(-1, 2, 2).transpose(0, 2, 1),
+            "G": out[:, 12:14],
+            "rate": out[:, 14:],
+        }
+    return found
