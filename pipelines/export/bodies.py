@@ -10,7 +10,7 @@ is a leg with I2 > 0 and I1 > 0 if and only if (X3² + Y3²) / X2 < m2 < (X1 - X
 such an m2 exactly where the mass matrix is positive definite. Here m2 is the middle of that range, and m1 twice the
 least it may be, but no less than m2: a nominal leg, whose X are the identified ones to rounding.
 
-A single joint's body has X1 about the axis; a pendulum's mass is twice the least it may be. What slides has the mass X1.
+A single joint's body has X1 about the axis; a pendulum's mass is twice the least it may be. What slides weighs X1.
 """
 
 from collections.abc import Callable

@@ -23,7 +23,13 @@ def model(tmp_path):
 
 @pytest.mark.parametrize(
     ("to", "files"),
-    [("mjcf", ["leg.xml"]), ("urdf", ["leg.urdf"]), ("json", ["leg.json"]), ("matlab", ["leg.m"]), ("c", ["leg.c", "leg.h"])],
+    [
+        ("mjcf", ["leg.xml"]),
+        ("urdf", ["leg.urdf"]),
+        ("json", ["leg.json"]),
+        ("matlab", ["leg.m"]),
+        ("c", ["leg.c", "leg.h"]),
+    ],
 )
 def test_each_format_is_written_and_told(exoid, model, tmp_path, to, files):
     outcome = exoid("export", model(named("stribeck_friction@knee")), "--to", to, "-o", tmp_path / "out" / files[0])
@@ -71,5 +77,7 @@ def test_a_leg_that_cannot_be_is_refused_with_file_and_reason(exoid, model, tmp_
     table = table_of(Term(RigidBody(), np.array([1.0, 0.9, 2.0, 5.0])))
     PARAMETERS.write(path, table.frame, table.metadata)
     outcome = exoid("export", path, "--to", "mjcf")
-    assert outcome.code == 2 and "unreal.parquet: the with_human parameters are no real leg: X2 (X1 - X2)" in outcome.err
+    assert (
+        outcome.code == 2 and "unreal.parquet: the with_human parameters are no real leg: X2 (X1 - X2)" in outcome.err
+    )
     assert [p.name for p in tmp_path.iterdir()] == ["unreal.parquet"]

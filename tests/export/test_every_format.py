@@ -57,7 +57,8 @@ def test_a_format_that_holds_an_effect_shows_it():
 
 def bare(format, made):
     text = "\n".join(format.write(made, "leg").values())
-    return re.sub(r"<!--.*?-->|/\*.*?\*/|%[^\n]*", "", text, flags=re.DOTALL)
+    text = re.sub(r"<!--.*?-->|/\*.*?\*/|%[^\n]*", "", text, flags=re.DOTALL)
+    return [line for line in text.splitlines() if line.strip()]
 
 
 @hostile

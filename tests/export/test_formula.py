@@ -18,7 +18,7 @@ def _half(x):
 def _clipped(q, limit, out):
     excess = max(0.0, q[0] - limit)
     if q[1] != 0.0 and excess > 1.0:
-        out[0] += -_half(excess) ** 2 / (q[1] - 3.0)
+        out[0] += -(_half(excess) ** 2) / (q[1] - 3.0)
     else:
         out[0] += math.exp(-abs(q[0]))
 

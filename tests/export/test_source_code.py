@@ -76,7 +76,7 @@ def test_torque_in_octave_is_ours(stem, octave, models, states):
 
 def test_the_model_that_the_regression_fits_is_the_one_in_c(library, models, states):
     """The whole model's torque, by the regressor that identification and diagnosis use."""
-    from pipelines.ours.motion import Motion
+    from pipelines.mechanics.motion import Motion
 
     made, n = models["bare"], len(states.t)
     motion = Motion(
