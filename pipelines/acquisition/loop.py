@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipelines.acquisition.columns import columns_of
 from pipelines.acquisition.journal import Journal
-from pipelines.acquisition.machine import Machine, Row
+from pipelines.acquisition.machine import Machine, Row, all_answers
 from pipelines.acquisition.pace import Lockstep, PhaseLock
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.sampling import Sampling
@@ -99,6 +99,8 @@ class Loop:
         while not self.supervisor.has_followed(last):
             found = await pace.wait(last.sequence)
             self._heed_signals()
+            if self.supervisor.missed(found, time.monotonic()) and not await self._resume():
+                continue
             row = await self._exchange(self.supervisor.next(found, time.monotonic()))
             if not self.supervisor.judge(row, time.monotonic()):
                 continue
@@ -107,6 +109,16 @@ class Loop:
                 self._keep(whole)
             if time.monotonic() - self._reported >= REPORT_S:
                 self._tell()
+
+    async def _resume(self) -> bool:
+        """Ask the drives what they made of a silence; tell whether they answered."""
+        try:
+            readings = await all_answers(drive.look(in_motion=True) for drive in self.machine.drives)
+        except Unanswered:
+            return False
+        for joint, reading in enumerate(readings):
+            self.supervisor.resume(joint, reading, time.monotonic() - self.supervisor.sent_at)
+        return True
 
     async def _enable(self) -> Row:
         """Enable the drives where the leg stands; return the first sample at which they say that they are."""
@@ -170,7 +182,7 @@ class Loop:
 
     async def _stop(self) -> None:
         """Bring every drive to rest and take its torque away, whatever happens meanwhile."""
-        touched = [j for j, drive in enumerate(self.machine.drives) if drive.touched]
+        touched = [j for j, drive in enumerate(self.machine.drives) if drive.told_reference is not None]
         stops = [asyncio.ensure_future(self._stop_drive(j)) for j in touched]
         feeling = asyncio.ensure_future(self._feel())
         self._tell_stop()
@@ -195,15 +207,23 @@ class Loop:
     async def _stop_drive(self, joint: int) -> str | None:
         """Slow one drive down and disable it, whatever happens to the others; return why it could not be disabled."""
         drive, period = self.machine.drives[joint], 1.0 / self._rate
-        due, answered = self.supervisor.sent_at + period, time.monotonic()
+        told, answered = self.supervisor.sent_at, time.monotonic()
+        if drive.told_reference is not None:  # what was decided last may not have been sent
+            self.supervisor.begin_stop(joint, drive.told_reference)
+        stopping = self.supervisor.stopping(joint)
         try:
-            for reference, halt in self.supervisor.stopping(joint):
+            while True:
                 # On the host's clock: the device's counter may be what has failed. What is late is not caught up
                 # with, so that set-points never come faster than samples.
-                await asyncio.sleep(0.0 if drive.in_lockstep else max(0.0, due - time.monotonic()))
-                due = max(due, time.monotonic()) + period
+                await asyncio.sleep(0.0 if drive.in_lockstep else max(0.0, told + period - time.monotonic()))
                 try:
-                    self.supervisor.feel(joint, (await drive.exchange(reference, halt=halt)).torque)
+                    if self.supervisor.is_stale(told, time.monotonic()):
+                        reading = await drive.look(in_motion=True)
+                        self.supervisor.resume(joint, reading, time.monotonic() - told)
+                    if not (due := next(stopping, ())):
+                        break
+                    (reference, halt), told = due, time.monotonic()
+                    self.supervisor.feel(joint, await drive.exchange(reference, halt=halt))
                     answered = time.monotonic()
                 except Unanswered:  # a lost reply alone is no reason to take a moving leg's torque away
                     if time.monotonic() - answered > self.machine.rig.safety.watchdog_s:

@@ -65,6 +65,8 @@ class Reading:
     reference: float
     enabled: bool | None = None
     """Whether the drive says that it follows its set-point; None for one that does not say."""
+    fault: str | None = None
+    """The fault that it reports, in words; None for none."""
 
 
 class Drive:
@@ -93,8 +95,8 @@ class Drive:
         self._temperature = np.nan
         self._sent = np.nan
         self._counted = 0
-        self.touched = False
-        """Whether it has been told anything, so that it must be disabled."""
+        self.told_reference: float | None = None
+        """The last set-point on its way to it, rad; None while it has been told nothing, and need not be disabled."""
 
     def _its_ring(self) -> Ring | Queue:
         settings = self.map.ring
@@ -137,7 +139,7 @@ class Drive:
 
     async def exchange(self, reference: float, *, halt: bool = False) -> Reading:
         """Send a set-point (rad) and return the sample that is latched; ``halt`` where the leg is to stand there."""
-        self.touched = True
+        self.told_reference = reference
         control = self.map.enable if self.map.halt is None or not halt else self.map.halt
         words = self._words(reference, control)
         # Nobody knows which set-point a drive follows that did not answer.
@@ -207,12 +209,6 @@ class Drive:
     def _reading(self, words: list[int], sent: float) -> Reading:
         told = self._decoded(self.told, words)
         status = int(told.get("status", 0))
-        if fault := self.map.told_faults(status):
-            reset = "" if self.map.fault_reset is None else ", with --reset-faults where the drive is to clear it"
-            raise DeviceError(
-                f"{self.device.label}: reports a fault (status bits {fault}); see the drive's manual, "
-                f"clear the fault and start again{reset}"
-            )
         self._temperature = told.get("temperature", np.nan)
         return Reading(
             sequence=self._newest(told["sequence"], sent),
@@ -224,6 +220,17 @@ class Drive:
             temperature=self._temperature,
             reference=told.get("reference", self._sent),
             enabled=self._is_enabled(status) if self.map.enabled_mask else None,
+            fault=self._fault(status),
+        )
+
+    def _fault(self, status: int) -> str | None:
+        """Return in words the fault that a status word tells; None where it tells none."""
+        if not (bits := self.map.told_faults(status)):
+            return None
+        reset = "" if self.map.fault_reset is None else ", with --reset-faults where the drive is to clear it"
+        return (
+            f"{self.device.label}: reports a fault (status bits {bits}); see the drive's manual, "
+            f"clear the fault and start again{reset}"
         )
 
     def _of_ring(self, number: int, told: Mapping[str, float]) -> Reading:
@@ -333,6 +340,9 @@ class Machine:
         """Read every device once, moving nothing."""
         # Several looks: between two requests of one of them a drive may go on to its next sample.
         looks = [await asyncio.gather(*(drive.look() for drive in self.drives)) for _ in range(LOOKS)]
+        for reading in looks[-1]:
+            if reading.fault:
+                raise DeviceError(reading.fault)
         ahead = np.array([[reading.sequence - look[0].sequence for reading in look] for look in looks])
         self.leads = np.median(ahead, axis=0).astype(int).tolist()
         if self.rig.sampling == "recorder" and self.rig.clock == "real_time" and self.rig.clocks == "common":

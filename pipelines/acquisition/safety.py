@@ -63,6 +63,22 @@ class Limits:
             return f"{drive.joint} torque {found.torque:.1f} N·m is above its limit of {drive.torque_nm:g} N·m"
         return None
 
+    def straying(self, row: Row, in_force: NDArray, late: int = 0) -> str | None:
+        """Return which joint is too far from its set-point, (J,) rad, None if none is.
+
+        A drive that has been told nothing for so many samples ``late`` may have gone on meanwhile.
+        """
+        for drive, reading, reference in zip(self._rig.drive, row.drives, in_force, strict=True):
+            error = reading.angle - reference
+            allowed = self._rig.safety.following_error_rad + drive.speed_rad_s * late / self._rate
+            if not abs(error) <= allowed:
+                return (
+                    f"{drive.joint} angle {reading.angle:.3f} rad is {abs(error):.3f} rad from its set-point of "
+                    f"{reference:.3f} rad, allowed are {allowed:.3g} rad (safety.following_error_rad); is the leg "
+                    "blocked, or the drive without power?"
+                )
+        return None
+
     def _silence(self, row: Row) -> str | None:
         """Return which cuff sensor has told nothing for too long: its limit would be watched by nobody."""
         for cuff, sensor in self._sensors.items():
@@ -109,11 +125,9 @@ def refuse_leap(drives: Sequence[DriveSettings], last: NDArray, reference: NDArr
             )
 
 
-def slowing(
-    reference: float, speed: float, deceleration: float, sample_rate_hz: float, limits: tuple[float, float]
-) -> NDArray:
-    """Return set-points (n,) that slow down to rest and hold there, never beyond the limits, rad."""
-    moving = int(np.ceil(abs(speed) / deceleration * sample_rate_hz))
-    time = np.minimum(np.arange(1, moving + HOLD_SAMPLES + 1) / sample_rate_hz, abs(speed) / deceleration)
-    path = reference + np.sign(speed) * (abs(speed) * time - 0.5 * deceleration * time**2)
-    return np.clip(path, *limits)
+def slowed(reference: float, speed: float, deceleration: float, time_s: float) -> tuple[float, float]:
+    """Return set-point (rad) and speed (rad/s) a while later of one that slows down to rest."""
+    moving_s = min(time_s, abs(speed) / deceleration)
+    path = speed * moving_s - np.copysign(0.5 * deceleration * moving_s**2, speed)
+    left = speed - np.copysign(deceleration * moving_s, speed) if moving_s == time_s else 0.0
+    return float(reference + path), float(left)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pipelines.acquisition.machine import Reading, Row
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.plausibility import Plausibility
-from pipelines.acquisition.safety import Limits, refuse_leap, slowing
+from pipelines.acquisition.safety import HOLD_SAMPLES, Limits, refuse_leap, slowed
 from pipelines.acquisition.watch import RATE_TOLERANCE, Watch
 from pipelines.errors import DeviceError
 from pipelines.settings.rig import RigSettings, SensorSettings
@@ -71,6 +71,8 @@ class Supervisor:
         """Whether a drive may not have taken it that it was told to disable."""
         self.sent = np.zeros(len(rig.drive))
         """(J,) last set-points, rad; to begin with, where the leg stands."""
+        self.base = np.zeros_like(self.sent)
+        """(J,) set-points, rad, from which the next ones step: the last ones, or what drives made of a silence."""
         self.sent_at = 0.0
         """When they were sent, host's clock, s."""
         self.pressing = False
@@ -79,10 +81,17 @@ class Supervisor:
         self._plausibility = Plausibility(rig, sample_rate_hz)
         self._watch = Watch(rig, sample_rate_hz)
         self._speed = np.zeros_like(self.sent)
+        self._sample_s = np.full(len(rig.drive), 1.0 / sample_rate_hz)
+        self._step = np.array([drive.speed_rad_s for drive in rig.drive]) * self._sample_s
+        """(J,) how far each speed limit leads in a sample, rad."""
+        self._in_force = self.sent
+        """(J,) set-points, rad, that are reached at the sample which is latched when the last ones are sent."""
         self._lead = np.zeros_like(self.sent)
         """By how much the set-points are ahead of what the speed limits allow, s; never more than the slack."""
+        self._enabled: list[bool | None] = [None for _ in rig.drive]
+        """What each drive said last of being enabled."""
         self._start = self.sent
-        self._first = 0
+        self._first = self._found = 0
 
     def check(self) -> None:
         """Begin to look at the devices."""
@@ -92,7 +101,7 @@ class Supervisor:
         """Take the plan, and where the leg stood when it was made, (J,) rad."""
         self._plan = plan
         self._start = start
-        self.sent = start.copy()
+        self.sent, self.base = start.copy(), start.copy()
 
     def check_rest(self, row: Row) -> None:
         """Refuse to enable drives whose leg no longer stands where the plan begins, or breaks a limit."""
@@ -103,7 +112,7 @@ class Supervisor:
                     f"the {drive.joint} moved from {planned:.3f} to {found:.3f} rad before its drive was enabled; keep "
                     "the leg still and start again"
                 )
-        if why := self._limits.violation(row):
+        if why := self._dropped(row) or self._limits.violation(row):
             raise DeviceError(why)
 
     def rest(self, now: float) -> NDArray:
@@ -114,26 +123,60 @@ class Supervisor:
 
     def enabled(self, row: Row, waited_s: float) -> bool:
         """Tell whether every drive says that it is enabled, as far as it tells; refuse to wait too long for it."""
-        idle = [drive for drive, found in zip(self.rig.drive, row.drives, strict=True) if found.enabled is False]
+        if why := self._dropped(row):
+            raise DeviceError(why)
+        idle = [drive for drive, enabled in zip(self.rig.drive, self._enabled, strict=True) if enabled is False]
         if idle and waited_s > self.rig.safety.watchdog_s:
             raise DeviceError(
                 f"drive {idle[0].joint}: was told to enable, but its status word does not say that it is after "
                 f"{self.rig.safety.watchdog_s:g} s; see the drive's manual, or correct enabled_mask and enabled_value "
                 "in the rig file"
             )
-        if why := self._limits.violation(row):
+        if why := self._limits.violation(row) or self._limits.straying(row, self._start):
             raise DeviceError(why)
         return not idle
 
     def begin(self, row: Row, now: float) -> None:
         """Follow the plan from the first sample on at which the drives are enabled."""
         self._refuse_after_abort()
-        self._first = row.sequence
+        self._first = self._found = row.sequence
         self._watch.begin(row, now)
         self._go(State.RAMP)
 
+    def missed(self, found: int, now: float) -> bool:
+        """Tell whether drives were told nothing for longer than a sample, now that sample ``found`` is latched."""
+        self._refuse_after_abort()
+        self._watch.look(found, now)
+        return found - self._found > 1
+
+    def is_stale(self, told: float, now: float) -> bool:
+        """Tell whether a set-point that was told then is so old that nobody knows what its drive has made of it."""
+        return self.rig.clock == "real_time" and now - told > SLACK_SAMPLES / self.rate
+
+    def resume(self, joint: int, reading: Reading, silent_s: float) -> None:
+        """Go on from where a drive is that was told nothing for a while: some hold meanwhile, others go on.
+
+        Raises
+        ------
+        DeviceError
+            The drive is no longer enabled.
+        """
+        if why := self._heed_enabled(joint, reading):
+            raise DeviceError(why)
+        drive, sent = self.rig.drive[joint], self.sent[joint]
+        if self.rig.map.drive[drive.map].read.reference is not None:
+            reach = drive.speed_rad_s * silent_s
+            place = np.clip(reading.reference, sent - reach, sent + reach)
+        else:  # its leg lags behind one that holds, and is ahead with one that goes on
+            place = np.clip(reading.angle, *sorted((sent, sent + self._speed[joint] * silent_s)))
+        speed = (place - sent) / silent_s if np.isnan(reading.velocity) else reading.velocity
+        self.base[joint] = place
+        self._speed[joint] = np.clip(speed, *sorted((0.0, self._speed[joint])))
+
     def next(self, found: int, now: float) -> NDArray:
         """Return the set-points (J,) rad to be sent now that sample ``found`` is latched.
+
+        They are the plan's. Where samples were missed they walk back to it, no step larger than the speed limit.
 
         Raises
         ------
@@ -145,36 +188,42 @@ class Supervisor:
         index = min(found - self._first, len(self._plan.reference))
         while self.state is not self._due(index):
             self._go(FOLLOWING[FOLLOWING.index(self.state) + 1])
-        reference = self._path(index)
-        step = reference - self._path(max(index - 1, 0))
-        self._send(reference, step * self.rate, now)
+        due = self._path(index)
+        refuse_leap(self.rig.drive, self._path(max(index - 1, 0)), due, self._sample_s)
+        step = self._step if found > self._found else 0.0  # one step a sample
+        reference = np.clip(due, self.base - step, self.base + step)
+        self._refuse_to_lag(due, reference)
+        self._send(reference, (reference - self.base) * self.rate, now)
+        self._found = found
         return self.sent
 
     def judge(self, row: Row, now: float) -> bool:
         """Tell whether a sample is a new one; raise DeviceError where it is reason to stop."""
         self._refuse_after_abort()
+        if why := self._dropped(row):
+            raise DeviceError(why)
         if not self._watch.take(row, now):
             return False
-        for drive, reading in zip(self.rig.drive, row.drives, strict=True):
-            if reading.enabled is False:
-                raise DeviceError(
-                    f"drive {drive.joint}: its status word says that it is no longer enabled; was the emergency stop "
-                    "pressed?"
-                )
-        if why := self._limits.violation(row) or self._plausibility.doubt(row, self.sent):
+        if why := (
+            self._limits.violation(row)
+            or self._limits.straying(row, self._in_force, row.sequence - self._found)
+            or self._plausibility.doubt(row, self.sent)
+        ):
             raise DeviceError(why)
         return True
 
     def judge_records(self, records: Sequence[Sequence[Reading]]) -> None:
         """Raise DeviceError where a sample that a drive recorded itself is reason to stop."""
         self._refuse_after_abort()
-        if why := self._limits.record_violation(records):
+        heeded = [self._heed_enabled(joint, found) for joint, samples in enumerate(records) for found in samples]
+        if why := next(filter(None, heeded), None) or self._limits.record_violation(records):
             raise DeviceError(why)
 
     def has_followed(self, row: Row) -> bool:
-        """Tell whether the plan is at its end with a sample."""
+        """Tell whether the plan is at its end with a sample, and the set-points have walked there."""
         # What is sent while a sample is latched is reached at the end of the next one.
-        return row.sequence - self._first > len(self._plan.reference)
+        end = len(self._plan.reference)
+        return row.sequence - self._first > end and np.array_equal(self.sent, self._path(end))
 
     def index(self, row: Row) -> int:
         """Return which set-point of the plan a sample carries; outside the plan before and after it."""
@@ -200,24 +249,36 @@ class Supervisor:
         if State.ABORT in TRANSITIONS[self.state]:
             self._go(State.ABORT)
 
+    def begin_stop(self, joint: int, reference: float) -> None:
+        """Begin to stop a drive; ``reference`` is the last set-point, rad, that went out to it."""
+        if reference != self.sent[joint]:
+            self.sent[joint] = self.base[joint] = reference
+
     def stopping(self, joint: int) -> Iterator[tuple[float, bool]]:
         """Yield the set-points, rad, that bring one drive to rest and hold it there, and whether it is to halt there.
 
-        One a sample; no more as soon as holding on would go on pressing.
+        One a sample; no more as soon as holding on would go on pressing, or the drive says that it is not enabled: it
+        must not be told to enable with its leg anywhere.
         """
-        drive, speed = self.rig.drive[joint], float(self._speed[joint])
+        drive, one, held = self.rig.drive[joint], slice(joint, joint + 1), 0
         deceleration = self.rig.safety.deceleration_rad_s2
-        of_joint = slice(joint, joint + 1)
-        for reference in slowing(self.sent[joint], speed, deceleration, self.rate, drive.angle_rad):
-            if self.pressing:
-                return
-            refuse_leap([drive], self.sent[of_joint], np.array([reference]), np.array([1.0 / self.rate]))
-            halt, self.sent[joint] = reference == self.sent[joint], reference
-            yield float(reference), halt
+        while held < HOLD_SAMPLES and not self.pressing and self._enabled[joint] is not False:
+            base = float(self.base[joint])
+            path, self._speed[joint] = slowed(base, self._speed[joint], deceleration, 1.0 / self.rate)
+            reference = float(np.clip(path, *drive.angle_rad))
+            refuse_leap([drive], self.base[one], np.array([reference]), self._sample_s[one])
+            halt = reference == base
+            held += halt
+            self.sent[joint] = self.base[joint] = reference
+            yield reference, halt
 
-    def feel(self, joint: int, torque: float) -> None:
-        """Heed the torque (N·m) of a drive that is being stopped."""
-        self.pressing |= not abs(torque) <= self.rig.drive[joint].torque_nm
+    def feel(self, joint: int, reading: Reading) -> None:
+        """Heed what a drive tells that is being stopped; raise DeviceError where it is no longer enabled."""
+        drive, error = self.rig.drive[joint], reading.angle - self.base[joint]
+        self.pressing |= not abs(reading.torque) <= drive.torque_nm
+        self.pressing |= not abs(error) <= self.rig.safety.following_error_rad
+        if why := self._heed_enabled(joint, reading):
+            raise DeviceError(why)
 
     def feel_cuffs(self, forces: NDArray) -> None:
         """Heed the cuff forces (4, 3) N while the drives are being stopped."""
@@ -250,13 +311,45 @@ class Supervisor:
         """Return the set-points (J,) rad of the path, whose first is where the leg stood."""
         return self._plan.reference[index - 1] if index else self._start
 
+    def _heed_enabled(self, joint: int, reading: Reading) -> str | None:
+        """Note what a drive says of being enabled; return why to stop where it no longer is, and was, or has a fault.
+
+        A drive with a fault counts as not enabled: it may be again as soon as the fault is cleared.
+        """
+        was, now = self._enabled[joint], reading.enabled and reading.fault is None
+        if reading.fault or now is not None:
+            self._enabled[joint] = bool(now)
+        if reading.fault or not was or now is not False:
+            return reading.fault
+        return (
+            f"drive {self.rig.drive[joint].joint}: its status word says that it is no longer enabled; was the "
+            "emergency stop pressed?"
+        )
+
+    def _dropped(self, row: Row) -> str | None:
+        """Return why to stop where a drive is no longer enabled; note what each of them says."""
+        found = [self._heed_enabled(joint, reading) for joint, reading in enumerate(row.drives)]
+        return next(filter(None, found), None)
+
+    def _refuse_to_lag(self, due: NDArray, reference: NDArray) -> None:
+        """Refuse to go on where what was missed cannot be walked back to in reasonable time."""
+        for drive, lag in zip(self.rig.drive, np.abs(due - reference), strict=True):
+            allowed = drive.speed_rad_s * self.rig.safety.watchdog_s
+            if not lag <= allowed:
+                raise DeviceError(
+                    f"{drive.joint}: its set-points are {lag:.3f} rad behind the plan after missed samples, allowed "
+                    f"are {allowed:.3f} rad (speed_rad_s x watchdog_s); its answers are lost too often, or this "
+                    "computer is too busy"
+                )
+
     def _refuse_after_abort(self) -> None:
         if self.why is not None:
             raise DeviceError(self.why)
 
     def _send(self, reference: NDArray, speed: NDArray, now: float) -> None:
         """Let set-points pass, and remember how they move, in case they must be slowed down."""
-        # By the host's clock, or by cycles in lockstep: a counter that leaps does not make time go by.
+        refuse_leap(self.rig.drive, self.base, reference, self._sample_s)
+        # By the host's clock, or by cycles in lockstep: a counter that runs too fast does not make time go by.
         elapsed = (now - self.sent_at) * (1.0 + RATE_TOLERANCE)
         if self.rig.clock == "lockstep":
             elapsed = 1.0 / self.rate
@@ -264,7 +357,8 @@ class Supervisor:
         refuse_leap(self.rig.drive, self.sent, reference, elapsed + slack - self._lead)
         taken = np.abs(reference - self.sent) / [drive.speed_rad_s for drive in self.rig.drive]
         self._lead = np.clip(self._lead + taken - elapsed, 0.0, slack)
-        self.sent, self._speed, self.sent_at = reference.copy(), speed, now
+        self._in_force, self.sent, self.base = self.base, reference.copy(), reference.copy()
+        self._speed, self.sent_at = speed, now
 
 
 def _reason(error: BaseException) -> str:

@@ -317,6 +317,7 @@ class HumanSafetySettings(Settings):
     """What stops a run with somebody in the machine; what is left out is as without."""
 
     cuff_force_n: float | None = Field(None, gt=0.0, description="Highest force on any axis of any cuff sensor.")
+    following_error_rad: float | None = Field(None, gt=0.0, description="Farthest an angle may be from its set-point.")
 
 
 class DriveSettings(DeviceSettings):
@@ -385,6 +386,7 @@ class SafetySettings(Settings):
 
     angle_margin_rad: float = Field(0.02, ge=0.0, description="Set-points keep this far from each angle limit.")
     cuff_force_n: float = Field(400.0, gt=0.0, description="Highest force on any axis of any cuff sensor.")
+    following_error_rad: float = Field(0.15, gt=0.0, description="Farthest an angle may be from its set-point.")
     watchdog_s: float = Field(0.1, gt=0.0, description="Longest a cycle or a device's next sample may take.")
     reply_s: float | None = Field(
         None, gt=0.0, description="Longest wait for one reply in motion, then it is a gap; else 0.3 of watchdog_s."
@@ -396,7 +398,7 @@ class SafetySettings(Settings):
 
     @model_validator(mode="after")
     def _limits_with_human_are_tighter(self) -> Self:
-        _refuse_looser(self, "cuff_force_n")
+        _refuse_looser(self, "cuff_force_n", "following_error_rad")
         return self
 
     @model_validator(mode="after")
@@ -468,7 +470,18 @@ class RigSettings(Settings):
         if self.plant is None and (self.embedded or self.clock == "lockstep"):
             raise ValueError("plant: missing; a virtual rig (embedded, or in lockstep) needs the machine it plays")
         self._refuse_impossible_sampling()
+        self._refuse_torque_that_is_never_told()
         return self
+
+    def _refuse_torque_that_is_never_told(self) -> None:
+        """Refuse limits that a drive never tells more than, since it saturates: they would be watched in vain."""
+        for drive in self.drive:
+            loop = self.controller.get(drive.joint)
+            if loop and loop.limit_nm is not None and drive.torque_nm >= loop.limit_nm:
+                raise ValueError(
+                    f"torque_nm: found {drive.torque_nm:g} of the {drive.joint}, expected less than its "
+                    f"controller.limit_nm ({loop.limit_nm:g}), which the drive never goes beyond; lower it"
+                )
 
     def _refuse_bad_lines(self) -> None:
         devices = (*self.drive, *self.sensor)

@@ -66,11 +66,13 @@ class Told:
     reference: float
     control: int
     arrived: bool
+    after_idle: bool
+    """Whether the drive had said before that it is no longer enabled."""
 
 
 @dataclass
 class SimulatedDrive:
-    """Registers of a drive that follows its set-point at once."""
+    """Registers of a drive that follows its set-point at once, and whose control word works by its level."""
 
     joint: int
     settings: object
@@ -83,6 +85,8 @@ class SimulatedDrive:
     clock_ahead: float = 0.0
     wrong: dict = field(default_factory=dict)
     fault: bool = False
+    unpowered: bool = False
+    """Whether the emergency stop is pressed."""
     stuck_status: bool = False
     """Whether the status word tells the opposite of what is."""
 
@@ -92,18 +96,34 @@ class SimulatedDrive:
     """Counter, angle and speed of the sample that is latched."""
 
     def __post_init__(self):
-        self.seen = self.angle
+        self.seen = self.told = self.angle
+        self.told_at, self.pace = self.rig.count(), 0.0
+        self.largest_leap, self.was_enabled, self.said_idle = 0.0, False, False
         self.read, self.write = Block(registers_of(self.map.read)), Block(registers_of(self.map.write))
 
     @property
     def enabled(self):
-        return not self.fault and self.control in (self.map.enable, self.map.halt)
+        return not (self.fault or self.unpowered) and self.control in (self.map.enable, self.map.halt)
 
     def take(self, words):
         told = self.write.decode(words)
-        self.control = int(told["control"])
+        self.go_on()
+        was, self.control = self.enabled, int(told["control"])
+        samples = max(self.count - self.told_at, 1)
+        self.pace = (told["reference"] - self.told) / samples if was and self.enabled else 0.0
+        self.told, self.told_at = told["reference"], self.count
         if self.enabled:
-            self.angle = told["reference"]
+            self.largest_leap = max(self.largest_leap, abs(self.told - self.angle))
+            self.angle = self.told
+
+    def go_on(self):
+        """Be where the drive is by now that goes on at its set-points' pace for some samples while none comes."""
+        if self.rig.goes_on and self.enabled:
+            self.angle = self.told + self.pace * min(max(self.count - self.told_at - 1, 0), 5)
+
+    @property
+    def says_enabled(self):
+        return self.enabled != self.stuck_status
 
     @property
     def count(self):
@@ -111,15 +131,18 @@ class SimulatedDrive:
 
     def latch(self):
         """Take a sample, where a new one is due."""
+        self.go_on()
         if self.count != self.latched:
             self.velocity = (self.angle - self.seen) * RATE / (self.count - self.latched)
             self.latched, self.seen = self.count, self.angle
 
     def words(self):
+        self.said_idle |= self.was_enabled and not self.says_enabled
+        self.was_enabled |= self.says_enabled
         values = {
             "sequence": max(self.count + self.ahead, 0), "time": max(self.count / RATE + self.clock_ahead, 0.0),
             "angle": self.seen, "velocity": self.velocity, "current": 0.1 * sin(self.count), "temperature": 20.0,
-            "reference": self.angle, "status": (self.enabled != self.stuck_status) | 8 * self.fault,
+            "reference": self.angle, "status": self.says_enabled | 8 * self.fault,
         }  # fmt: skip
         return self.read.encode(values | self.wrong)
 
@@ -127,17 +150,16 @@ class SimulatedDrive:
 class SimulatedRig:
     """Drives and sensors behind every line that acquisition opens."""
 
-    def __init__(self, rig, events, clock, stopped_by, rest):
-        self.rig, self.clock, self.stopped_by = rig, clock, stopped_by
+    def __init__(self, rig, events, clock, stopped_by, rest, goes_on):
+        self.rig, self.clock, self.stopped_by, self.goes_on = rig, clock, stopped_by, goes_on
+        self.requests, self.samples, self.began = 0, 0, clock.now
         self.events = sorted(events, key=lambda event: event.at)
         self.drives = [SimulatedDrive(j, d, rig.map.drive[d.map], self, angle=rest[j]) for j, d in enumerate(rig.drive)]
         self.sensor_block = Block(registers_of(rig.map.sensor["force"].read))
-        self.force = 0.0
-        self.requests, self.samples = 0, 0
+        self.force, self.lost_any = 0.0, False
         self.exchanged, self.dead = set(), {}
         self.told: list[Told] = []
         self.raised: list[tuple[float, BaseException]] = []
-        self.began = clock.now
         self.failed_to_disable = [0, 0]
 
     def count(self):
@@ -181,6 +203,8 @@ class SimulatedRig:
                 drive.wrong = dict([event.what])
             case "fault":
                 drive.fault = True
+            case "power":
+                drive.unpowered = not drive.unpowered
             case "status":
                 drive.stuck_status = True
             case "force":
@@ -202,11 +226,14 @@ class SimulatedRig:
         kind = event.kind if event else ""
         if self.dead.get(device.label):
             kind = self.dead[device.label].pop()
+        self.lost_any |= kind != ""
         arrived = kind in ("", "late", "no answer")
         if write is not None and drive:
             block, words = write
             told = block.decode(words)
-            self.told.append(Told(self.clock.now, drive.joint, told["reference"], int(told["control"]), arrived))
+            self.told.append(
+                Told(self.clock.now, drive.joint, told["reference"], int(told["control"]), arrived, drive.said_idle)
+            )
             if told["control"] == drive.map.disable and kind:
                 self.failed_to_disable[drive.joint] += 1
         if kind == "raise":
@@ -255,8 +282,8 @@ class Run:
     states: list
 
 
-def simulate(rig, settings, trajectory, path, events, rest, *, plan=None, own=None):
-    """Record one run on a simulated rig.
+def simulate(rig, settings, trajectory, path, events, rest, *, plan=None, own=None, goes_on=False):
+    """Record one run on a simulated rig, whose drives hold while they are told nothing, or go on for a while.
 
     Parameters
     ----------
@@ -270,7 +297,7 @@ def simulate(rig, settings, trajectory, path, events, rest, *, plan=None, own=No
     """
     time = SimulatedTime()
     stopped_by = []
-    simulated = SimulatedRig(rig, events, time, stopped_by, rest)
+    simulated = SimulatedRig(rig, events, time, stopped_by, rest, goes_on)
     sensors = rig.sensor if settings.run == "with_human" else ()
     supervisor = Supervisor(rig, RATE, sensors)
     run = Run(simulated, supervisor, None, None, None, [supervisor.state])

@@ -90,7 +90,7 @@ wild = st.sampled_from([np.nan, np.inf, -np.inf, 1e9, -50.0, 2.0])
 happenings = st.one_of(
     st.tuples(st.just("raise"), anything),
     st.tuples(st.just("late"), st.floats(0.0, 0.06)),
-    st.tuples(st.sampled_from(["lost", "no answer", "freeze", "fault", "status"]), st.none()),
+    st.tuples(st.sampled_from(["lost", "no answer", "freeze", "fault", "status", "power"]), st.none()),
     st.tuples(st.sampled_from(["signal", "cancel", "interrupt"]), st.none()),
     st.tuples(st.sampled_from(["dead", "broken"]), st.integers(1, 30)),
     st.tuples(st.just("counter"), st.integers(-12, 12) | st.integers(-200, 200)),
@@ -127,13 +127,15 @@ def bad_plans(draw):
     return spoil
 
 
-def check_every_invariant(clock, reads_back, human, happens, plan, own):
+def check_every_invariant(clock, reads_back, goes_on, human, happens, plan, own):
     rig = RIGS[clock, reads_back]
     run = RunSettings(name="x", run="with_human" if human else "exo_alone", purpose="train", duration_s=0.5)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "x.parquet"
-        simulated = simulate(rig, run, TRAJECTORY, path, happens, REST_RAD, plan=plan, own=own)
+        simulated = simulate(rig, run, TRAJECTORY, path, happens, REST_RAD, plan=plan, own=own, goes_on=goes_on)
         sent_is_within_limits(simulated)
+        no_drive_leaps(simulated)
+        a_drive_that_says_it_is_not_enabled_is_told_to_disable_and_nothing_else(simulated)
         motion_stops_within_the_stated_number_of_cycles(simulated)
         the_abort_is_told(simulated, folder)
         drives_are_disabled_or_it_is_said_that_they_are_not(simulated)
@@ -155,6 +157,20 @@ def sent_is_within_limits(run):
         allowed_s = np.abs(time_s - time_s[:, np.newaxis]) + 2.0 / RATE
         assert (np.abs(sent - sent[:, np.newaxis]) <= drive.speed_rad_s * allowed_s + ROUNDING_RAD).all()
         assert abs(sent[0] - REST_RAD[j]) <= drive.speed_rad_s / RATE
+        if not run.rig.goes_on:
+            assert (np.abs(np.diff(sent)) <= drive.speed_rad_s / RATE + ROUNDING_RAD).all()
+
+
+def no_drive_leaps(run):
+    """As docs/safety.md states it: from where a drive is, whatever it made of a silence and of what never arrived."""
+    for drive in run.rig.drives:
+        assert drive.largest_leap <= 3.0 * drive.settings.speed_rad_s / RATE + ROUNDING_RAD
+
+
+def a_drive_that_says_it_is_not_enabled_is_told_to_disable_and_nothing_else(run):
+    """It may be enabled by the very level of its control word, once the emergency stop is released."""
+    if run.rig.rig.map.drive["servo"].enabled_mask and not run.rig.lost_any:
+        assert all(told.control == 0 for told in run.rig.told if told.after_idle)
 
 
 def motion_stops_within_the_stated_number_of_cycles(run):
@@ -217,8 +233,8 @@ def only_drawn_transitions_were_made(run):
 
 
 sequences = given(
-    clock=st.sampled_from(["real_time", "lockstep"]), reads_back=st.booleans(), human=st.booleans(),
-    happens=sequences_of_events(), plan=st.none() | bad_plans(), own=own_errors,
+    clock=st.sampled_from(["real_time", "lockstep"]), reads_back=st.booleans(), goes_on=st.booleans(),
+    human=st.booleans(), happens=sequences_of_events(), plan=st.none() | bad_plans(), own=own_errors,
 )  # fmt: skip
 relaxed = dict(deadline=None, suppress_health_check=list(HealthCheck))
 
@@ -226,18 +242,18 @@ relaxed = dict(deadline=None, suppress_health_check=list(HealthCheck))
 @sequences
 @settings(max_examples=60, derandomize=True, **relaxed)
 def test_whatever_happens_the_leg_is_stopped_within_its_limits_and_it_is_said_why(
-    clock, reads_back, human, happens, plan, own
+    clock, reads_back, goes_on, human, happens, plan, own
 ):
-    check_every_invariant(clock, reads_back, human, happens, plan, own)
+    check_every_invariant(clock, reads_back, goes_on, human, happens, plan, own)
 
 
 @pytest.mark.slow
 @sequences
 @settings(max_examples=10_000, database=None, **relaxed)
 def test_ten_thousand_times_the_leg_is_stopped_within_its_limits_and_it_is_said_why(
-    clock, reads_back, human, happens, plan, own
+    clock, reads_back, goes_on, human, happens, plan, own
 ):
-    check_every_invariant(clock, reads_back, human, happens, plan, own)
+    check_every_invariant(clock, reads_back, goes_on, human, happens, plan, own)
 
 
 def test_a_simulated_run_to_which_nothing_happens_is_complete(tmp_path):

@@ -43,8 +43,8 @@ def supervisor():
     return supervisor
 
 
-def row(sequence):
-    at_rest = Reading(sequence, sequence / RATE, 0.0, 0.0, 0.0, 0.0, 20.0, 0.0, enabled=True)
+def row(sequence, angle=0.0):
+    at_rest = Reading(sequence, sequence / RATE, angle, angle, angle, angle, 20.0, np.nan, enabled=True)
     return Row((at_rest, at_rest), np.full((4, 3), np.nan))
 
 
@@ -71,11 +71,83 @@ def test_many_small_leaps_of_a_counter_do_not_add_up_to_a_speed_above_the_limit(
     supervisor.rest(10.0)
     supervisor.begin(row(100), 10.0)
     with pytest.raises(DeviceError, match=r"faster than its limit of 3 rad/s; it was not sent"):
-        for k in range(1, 100):  # each cycle the counter goes on by two
-            supervisor.next(100 + 2 * k, 10.0 + k / RATE)
-            supervisor._watch._last = row(100 + 2 * k)
-            supervisor._watch._fresh = 10.0 + k / RATE
+        for k in range(1, 100):  # the counter goes on twice as fast as the time
+            supervisor.next(100 + k, 10.0 + 0.5 * k / RATE)
+            supervisor._watch._last = row(100 + k)
+            supervisor._watch._fresh = 10.0 + 0.5 * k / RATE
     assert supervisor.sent[0] < 0.1
+
+
+def follow(supervisor, k):
+    """Send what is due at a sample, and take the sample; return the hip's set-point."""
+    now = 10.0 + (k - 100) / RATE
+    sent = float(supervisor.next(k, now)[0])
+    supervisor._watch.take(row(k), now)
+    return sent
+
+
+def told(reference, velocity=np.nan, enabled=True):
+    return Reading(0, 0.0, reference, 0.0, 0.0, velocity, 20.0, reference, enabled=enabled)
+
+
+@pytest.mark.parametrize("gone_on", [0.0, 0.01, 0.03])
+def test_after_missed_samples_set_points_walk_back_to_the_plan_from_where_the_drive_is(supervisor, gone_on):
+    supervisor.take(Plan(np.arange(1, 129)[:, np.newaxis] * [2.5 / RATE, 0.0], 50, 100), np.zeros(2))
+    supervisor.rest(10.0)
+    supervisor.begin(row(100), 10.0)
+    before = follow(supervisor, 101)
+    assert supervisor.missed(111, 10.0 + 11 / RATE)
+    supervisor.resume(0, told(before + gone_on), 10 / RATE)
+    sent = [before + gone_on, *(follow(supervisor, k) for k in range(111, 180))]
+    steps = np.diff(sent)
+    assert steps[0] == pytest.approx(3.0 / RATE)  # the speed limit
+    assert steps.max() <= 3.0 / RATE + 1e-12
+    assert sent[-1] == pytest.approx(79 * 2.5 / RATE)  # the plan again
+    assert steps[-1] == pytest.approx(2.5 / RATE)
+
+
+def test_a_run_that_lags_too_far_behind_its_plan_is_stopped(supervisor):
+    supervisor.take(Plan(np.arange(1, 129)[:, np.newaxis] * [2.9 / RATE, 0.0], 50, 100), np.zeros(2))
+    supervisor.rest(10.0)
+    supervisor.begin(row(100), 10.0)
+    with pytest.raises(DeviceError, match=r"hip: its set-points are 0\.\d+ rad behind .* allowed are 0\.750 rad"):
+        for k in range(110, 300, 10):
+            follow(supervisor, k)
+
+
+@pytest.mark.parametrize(("velocity", "moves"), [(0.0, False), (1.5, True), (np.nan, True)])
+def test_a_stop_after_a_silence_begins_where_the_drive_is_and_as_fast_as_it_is(supervisor, velocity, moves):
+    supervisor.rest(10.0)
+    supervisor.begin(row(100), 10.0)
+    supervisor.sent[:], supervisor.base[:], supervisor._speed = 0.2, 0.2, np.array([2.0, 0.0])
+    supervisor.abort(DeviceError("silent"))
+    supervisor.resume(0, told(0.4, velocity), 0.25)
+    path = [reference for reference, _ in supervisor.stopping(0)]
+    fastest = 0.8 if np.isnan(velocity) else velocity  # as fast as it went meanwhile
+    assert path[0] - 0.4 == pytest.approx(max(fastest - 0.5 * 8.0 / RATE, 0.0) / RATE)
+    assert path[-1] - 0.4 == pytest.approx(fastest**2 / 2 / 8.0)
+    assert (path[-1] > 0.4) == moves
+
+
+def test_a_leg_that_does_not_follow_stops_the_run(supervisor):
+    supervisor.rest(10.0)
+    supervisor.begin(row(100), 10.0)
+    with pytest.raises(DeviceError, match=r"hip angle 0\.000 rad is 0\.15\d rad from its set-point of 0\.15\d rad"):
+        for k in range(101, 200):  # the leg hangs and trembles, the plan goes on
+            supervisor.next(k, 10.0 + (k - 100) / RATE)
+            supervisor.judge(row(k, 1e-4 * (k % 2)), 10.0 + (k - 100) / RATE)
+    assert supervisor.sent[0] < 0.16
+
+
+def test_a_drive_that_is_not_enabled_is_told_nothing_on_the_way_to_rest(supervisor):
+    supervisor.rest(10.0)
+    supervisor.begin(row(100), 10.0)
+    stopping = supervisor.stopping(0)
+    next(stopping)
+    with pytest.raises(DeviceError, match="is no longer enabled"):
+        supervisor._enabled = [True, True]
+        supervisor.feel(0, told(0.0, 0.0, enabled=False))
+    assert list(stopping) == []
 
 
 @pytest.mark.parametrize(

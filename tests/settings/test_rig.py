@@ -49,6 +49,10 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
          "the lowest angle first; swap them"),
         ('map = "servo"', 'map = "servo"\nline = "leg"', "line: found 'leg' at unit 1, expected a table below [line]: "
          "there is none"),
+        ("[plant]\n", "[controller.knee]\nlimit_nm = 110.0\n[plant]\n", "torque_nm: found 110 of the knee, expected "
+         "less than its controller.limit_nm (110), which the drive never goes beyond; lower it"),
+        ("following_error_rad = 0.1\n", "following_error_rad = 0.2\n", "safety: with_human.following_error_rad: found "
+         "0.2, expected at most following_error_rad (0.15); with somebody in the machine a limit may only be tighter"),
         ("[map.drive.servo]\n", "[line.leg]\ntransport = 'tcp'\n[map.drive.servo]\n", "line.leg: no device is on it; "
          'remove it, or give one line = "leg"'),
         ("[map.drive.servo]\n", "[line.leg]\ntransport = 'rs485'\n[map.drive.servo]\n", "line.leg.transport: found "
