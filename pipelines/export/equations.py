@@ -101,8 +101,6 @@ def holding(term: Term) -> Holding:
     if effect.reading is not None:
         is_shift = shift_of(term) is not None
         return exact("a constant between angles") if is_shift else left_out("its reading is more than a shift")
-    if effect.reaction is None and effect.torque_reading is None:
-        return left_out("a machine of this kind cannot have it")
     try:
         for kernel in (effect.reaction, effect.derivative, effect.torque_reading):
             if kernel is not None:

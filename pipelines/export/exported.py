@@ -147,6 +147,8 @@ def exported(table: Table, run: str | None = None, default_geometry: Geometry | 
 
 def _why_absent(term: Term, run: str, has_cuffs: bool) -> str:
     effect = term.effect
+    if not any((effect.reaction, effect.spring, effect.reading, effect.torque_reading)):
+        return "a machine of this kind cannot have it"
     if run != HUMAN:
         return "" if run in effect.acts_in and effect.run in (None, run) else f"it does not act in {run} runs"
     # Where machine and limb move apart, each has a body; elsewhere the one there is, is the wearer's.

@@ -45,7 +45,7 @@ def pointer(array):
 
 def in_c(library, stem, states, memory=0.3):
     """Return torque, reading and mass matrix as the C library gives them."""
-    tau, reading, M = np.empty_like(states.q), np.empty_like(states.q), np.empty((len(states.t), 2, 2))
+    tau, reading, M = np.empty_like(states.q), np.empty_like(states.q), np.empty((*states.q.shape, states.q.shape[1]))
     state = np.full(64, memory)
     for k in range(len(states.t)):
         t = ctypes.c_double(states.t[k])

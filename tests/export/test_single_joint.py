@@ -1,0 +1,130 @@
+"""Machines of one joint, turning or sliding, with gravity and without, in every format."""
+
+import json
+from dataclasses import replace
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pipelines.contracts.table import Table
+from pipelines.export import FORMATS, JSON, MJCF, URDF, exported
+from pipelines.mechanics.machine import MECHANISMS
+from pipelines.mechanics.single import LIFT, PENDULUM, SLIDE, TURNTABLE
+from pipelines.model import model_from_parameters
+from tests.export.machines import States, acceleration, torque
+from tests.export.test_mjcf import simulated
+from tests.export.test_source_code import in_c
+
+SINGLES = {"pendulum": PENDULUM, "turntable": TURNTABLE, "lift": LIFT, "slide": SLIDE}
+X = {"pendulum": (0.17, 0.34), "turntable": (0.4,), "lift": (12.0, 70.0), "slide": (95.0,)}
+CAUSES = {
+    "friction": {"coulomb": 0.5, "viscous": 0.3},
+    "parallel_spring": {"stiffness": 3.0, "rest_angle": 0.2},
+    "quadratic_drag": {"drag": 0.4},
+    "encoder_offset": {"offset": 0.07},
+}
+ONLY_OF = {"pendulum": {"mass_off_axis": {"mass_moment": 0.05}}}
+NAME = "my axis"
+
+each = pytest.mark.parametrize("kind", SINGLES)
+
+
+def single(kind, *, causes=CAUSES):
+    """Return a machine as its file tells of it, every cause in it that MJCF holds."""
+    mechanism = SINGLES[kind]
+    given = {"rigid_body": dict(zip([p.name for p in mechanism.parameters], X[kind], strict=True))}
+    given |= causes | (ONLY_OF.get(kind, {}) if causes is CAUSES else {})
+    rows = [
+        {"name": name, "symbol": name, "joint": None if effect == "rigid_body" else NAME, "value": value, "unit": "1",
+         "run": "exo_alone" if effect == "rigid_body" else None, "effect": effect}
+        for effect, values in given.items()
+        for name, value in values.items()
+    ]  # fmt: skip
+    metadata = {
+        "joints": [{"name": NAME, "kind": mechanism.kinds[0]}],
+        "geometry": {"gravity_m_s2": 9.81 if mechanism.has_gravity else 0.0},
+    }
+    return exported(Table(pd.DataFrame(rows), metadata))
+
+
+@pytest.fixture(scope="module")
+def instants():
+    random = np.random.default_rng(8)
+    speed = random.uniform(0.5, 2.0, (30, 1)) * random.choice([-1.0, 1.0], (30, 1))
+    return States(random.uniform(0, 9, 30), random.uniform(-1, 1, (30, 1)), speed, random.uniform(-8, 8, (30, 1)))
+
+
+def agree(found, expected, relative):
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=relative * np.abs(expected).max())
+
+
+def test_every_mechanism_is_tried():
+    assert {*SINGLES.values()} == {mechanism for mechanism in MECHANISMS if len(mechanism.kinds) == 1}
+
+
+@each
+def test_mujoco_moves_it_as_ours_does(kind, instants):
+    made = single(kind)
+    drive = torque(made, instants)
+    agree(simulated(made, instants, drive), acceleration(made, instants, drive)[0], 1e-6)
+    agree(acceleration(made, instants, drive)[0], instants.ddq, 1e-9)
+
+
+@each
+def test_pinocchio_asks_for_the_same_torque(kind, instants):
+    pinocchio = pytest.importorskip("pinocchio", reason="pinocchio is not installed; `make install` brings it")
+    made = single(kind, causes={"encoder_offset": {"offset": 0.07}})
+    text = URDF.write(made, "machine")[".urdf"]
+    model = pinocchio.buildModelFromXML(text)
+    told = float(text.split("Gravity is the reader's to set: ")[1].split()[0])
+    model.gravity.linear = np.array([0.0, 0.0, -told])
+    data = model.createData()
+    found = [pinocchio.rnea(model, data, *row) for row in zip(instants.q, instants.dq, instants.ddq, strict=True)]
+    agree(np.array(found), torque(made, instants), 1e-12)
+
+
+def test_torque_in_c_is_ours(compiled, instants):
+    library = compiled({kind: single(kind) for kind in SINGLES})
+    for kind in SINGLES:
+        tau, _, M = in_c(library, kind, instants)
+        agree(tau, torque(single(kind), instants), 1e-12)
+        agree(M[:, 0, 0], np.full(30, X[kind][0]), 1e-12)
+
+
+def test_torque_in_octave_is_ours(in_octave, instants):
+    for kind, found in in_octave({kind: single(kind) for kind in SINGLES}, instants).items():
+        agree(found["tau"], torque(single(kind), instants), 1e-12)
+
+
+@each
+def test_torque_from_json_is_that_of_the_model(kind, instants):
+    made = single(kind)
+    said = json.loads(JSON.write(made, "machine")[".json"])
+    model = model_from_parameters(pd.DataFrame(said["parameters"]), said["run"], made.machine)
+    np.testing.assert_array_equal(torque(replace(made, model=model), instants), torque(made, instants))
+
+
+@each
+def test_units_are_those_of_the_joint(kind):
+    """A slide's friction is in newtons, wherever a file tells it."""
+    said = json.loads(JSON.write(single(kind), "machine")[".json"])
+    (friction,) = (effect for effect in said["effects"] if effect["effect"] == "friction")
+    unit = {"revolute": "N·m", "prismatic": "N"}[said["joints"][0]["kind"]]
+    assert friction["values"][0]["unit"] == said["joints"][0]["torque_unit"] == unit
+
+
+def test_what_slides_is_no_hinge():
+    for kind, joint, urdf in (("lift", "slide", "prismatic"), ("pendulum", "hinge", "revolute")):
+        made = single(kind)
+        assert ET.fromstring(MJCF.write(made, "m")[".xml"].encode()).find(".//joint").get("type") == joint
+        assert ET.fromstring(URDF.write(made, "m")[".urdf"].encode()).find(".//joint").get("type") == urdf
+
+
+def test_a_cause_that_such_a_machine_cannot_have_is_said_to_be_left_out():
+    """A turntable's mass off its axis weighs nothing: no equation holds it, and no format claims to."""
+    made = single("turntable", causes={"mass_off_axis": {"mass_moment": 0.05}})
+    for format in FORMATS:
+        ((_, holding),) = [(t, h) for t, h in made.holdings(format) if t.effect.name == "mass_off_axis"]
+        assert holding.degree == "left out" and holding.how == "a machine of this kind cannot have it"
