@@ -86,6 +86,7 @@ def _column(table: pa.Table, name: str) -> dict[str, Any]:
 
 DOCUMENTS = {
     "verdict/1": "the answer of `exoid diagnose`",
+    "model/1": "a model, as `exoid export --to json` writes it",
     "detectability/1": "the smallest size of each cause that would be seen",
 }
 """What is written as JSON, for people and programs that have no Parquet."""

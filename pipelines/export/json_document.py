@@ -6,7 +6,6 @@ from typing import Any
 
 import pandas as pd
 
-from pipelines import __version__
 from pipelines.contracts.provenance import describe
 from pipelines.effects.reference import facts
 from pipelines.export.exported import Exported
@@ -35,8 +34,7 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
     said = {
         "contract": CONTRACT,
         "name": stem,
-        "created_by": f"exoid {__version__}",
-        "inputs": describe([table.path] if table.path else [])["inputs"],
+        "provenance": describe([table.path] if table.path else []),
         "run": exported.run,
         "mechanism": {"name": exported.machine.mechanism.name, "title": exported.machine.mechanism.title},
         "method": table.metadata.get("method"),

@@ -51,6 +51,13 @@ def test_what_is_left_out_is_warned_of_with_its_parameters_and_told_to_programs(
     assert left["parameters"]["stribeck_velocity"] == {"value": 0.15, "unit": "rad/s"}
 
 
+def test_show_knows_the_json_document(exoid, model, tmp_path):
+    exoid("export", model(), "--to", "json", "-o", tmp_path / "leg.json")
+    outcome = exoid("show", tmp_path / "leg.json")
+    assert outcome.code == 0 and "model/1, a model, as `exoid export --to json` writes it" in outcome.out
+    assert "parameters.parquet" in outcome.out
+
+
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
