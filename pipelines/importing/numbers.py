@@ -16,7 +16,7 @@ def numbers(values: NDArray, where: str, findings: list[Finding]) -> NDArray:
     words = np.isnan(found) & text.notna().to_numpy()
     if words.any():
         row = int(np.argmax(words))
-        seen = f"{counted(int(words.sum()), 'row')} with text, the first {values[row]!r} in row {row}"
+        seen = f"{counted(int(words.sum()), 'row')} with text, the first {str(values[row])!r} in row {row}"
         findings.append(Finding(where, seen, "taken for missing"))
     return found
 

@@ -23,6 +23,9 @@ def look_at(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Fin
         yield from _still(columns, joint)
         yield from _velocity(columns, joint)
     yield from _power(columns, settings.joint)
+    if len(settings.joint) > 1 and settings.geometry.thigh_length_m is None:
+        why = "later stages take that of exoid.toml, or of the paper's leg"
+        yield Finding("geometry", "no thigh_length_m, from the first joint's axis to the second's", why)
 
 
 def _still(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:

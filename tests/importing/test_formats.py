@@ -67,6 +67,14 @@ def test_columns_without_a_header_can_be_named_or_numbered(imported, pendulum, w
     assert_is_the_pendulum(imported(path, map_text=numbered), pendulum)
 
 
+def test_names_in_quotes_may_hold_the_delimiter(imported, pendulum, write_csv):
+    columns = {f'"{name}, measured"': values for name, values in pendulum.columns().items()}
+    text = MAP
+    for name in pendulum.columns():
+        text = text.replace(f'column = "{name}"', f'column = "{name}, measured"')
+    assert_is_the_pendulum(imported(write_csv(columns), map_text=text), pendulum)
+
+
 def test_dates_are_time(imported, pendulum, write_csv):
     dates = pd.Timestamp("2025-03-30 01:59:58.000123") + pd.to_timedelta(pendulum.time, unit="s")
     path = write_csv(pendulum.columns() | {"time": dates.strftime("%Y-%m-%d %H:%M:%S.%f")})

@@ -198,3 +198,27 @@ def test_a_register_without_its_sign_is_known_by_the_hole_in_its_middle():
     assert lost_sign(current % 2**32) == 32
     assert lost_sign(np.abs(current)) is None
     assert lost_sign(np.round(rng.uniform(0.0, 65535.0, 5000))) is None
+
+
+def test_a_slip_in_a_column_does_not_hide_it(guessed, pendulum, write_csv):
+    columns = swinging(pendulum)
+    angle = columns["angle"].astype(object)
+    angle[77] = "ERR"
+    text, _ = guessed(write_csv(columns | {"angle": angle}))
+    assert tomllib.loads(text)["joint"][0]["angle"]["column"] == "angle"
+
+
+def test_a_single_sine_is_not_taken_for_its_own_velocity(guessed, pendulum, write_csv):
+    """The integral of a sine is a cosine, but a negative one."""
+    time = pendulum.time
+    angle, velocity = np.sin(2.0 * time), 2.0 * np.cos(2.0 * time)
+    text, _ = guessed(write_csv({"a": time, "b": velocity, "c": angle, "d": np.sin(angle) + 0.2 * np.sign(velocity)}))
+    joint = tomllib.loads(text)["joint"][0]
+    assert (joint["angle"]["column"], joint["velocity"]["column"]) == ("c", "b")
+
+
+def test_rows_without_a_clock_get_no_guess(pendulum, write_csv, capsys):
+    columns = pendulum.columns()
+    del columns["time"]
+    assert run(["import", str(write_csv(columns)), "--guess"]) == 2
+    assert "with time.rate_hz where rows are uniform" in capsys.readouterr().err

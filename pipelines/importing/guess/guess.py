@@ -17,6 +17,7 @@ from pipelines.importing.guess.proposal import Proposal
 from pipelines.importing.guess.register import lost_sign
 from pipelines.importing.guess.time import guess_time, write_time
 from pipelines.importing.guess.torque import TorqueFit, fit_torque
+from pipelines.importing.numbers import numbers
 from pipelines.importing.sources.open import open_source
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.settings.import_map import SourceSettings
@@ -41,7 +42,14 @@ def propose(paths: Sequence[Path]) -> Proposal:
     """
     with about(paths[0]):
         source = open_source(paths[0], SourceSettings())
-        columns = source.load(source.names)
+        columns = {name: _numeric(values) for name, values in source.load(source.names).items()}
+        found = meanings(source.names)
+        time = guess_time(found, columns)
+        if time is None:
+            raise InputError(
+                f"none of {', '.join(source.names)} goes forward as a clock does, over ten rows or more; write the map "
+                "by hand, with time.rate_hz where rows are uniform: docs/import.md tells how"
+            )
     for path in paths[1:]:
         _refuse_other_columns(path, source)
     proposal = Proposal()
@@ -49,27 +57,22 @@ def propose(paths: Sequence[Path]) -> Proposal:
     proposal.remark("What is UNSURE was chosen among several; look at it. FILL IN what no log can tell.")
     for note in source.notes:
         proposal.remark(f"Read as {source.format}: {note}.")
-    found = meanings(source.names)
-    time = guess_time(found, columns)
     write_time(proposal, time)
-    unused = set(source.names)
-    if time is not None:
-        unused.discard(time.column)
-        rows = _longest_run(columns[time.column], time.unit)
-        time_s = (columns[time.column][rows] - columns[time.column][rows[0]]).astype(float) * UNITS[time.unit].factor
-        whole = len(columns[time.column])
-        here = {name: values[rows] for name, values in columns.items() if len(values) == whole}
-        joints = group_joints([m for m in found if m.column in here], here, time_s, time.column)
-        for number, joint in enumerate(joints):
-            unused -= set(_write_joint(proposal, number, joint, here, time_s, alone=len(joints) == 1))
-        _write_geometry(proposal, len(joints))
+    run = _longest_run(columns[time.column], time.unit)
+    here = {name: values[run.rows] for name, values in columns.items() if len(values) == len(columns[time.column])}
+    with about(paths[0]):
+        joints = group_joints([m for m in found if m.column in here], here, run.time_s, time.column)
         if not joints:
             raise InputError(
-                f"{paths[0]}: no name says angle or position, and no column integrates to another among "
-                f"{', '.join(source.names)}; write the map by hand, docs/import.md tells how"
+                f"no name says angle or position, and no column integrates to another among {', '.join(source.names)}; "
+                "write the map by hand, docs/import.md tells how"
             )
+    used = {time.column}
+    for number, joint in enumerate(joints):
+        used |= set(_write_joint(proposal, number, joint, here, run.time_s, alone=len(joints) == 1))
+    _write_geometry(proposal, len(joints))
     _write_recordings(proposal, paths)
-    _remark_on_the_rest(proposal, sorted(unused), columns)
+    _remark_on_the_rest(proposal, [name for name in source.names if name not in used], columns)
     return proposal
 
 
@@ -82,9 +85,17 @@ def _refuse_other_columns(path: Path, first: Source) -> None:
             )
 
 
-def _longest_run(stamps: NDArray, unit: str) -> NDArray:
+def _numeric(values: NDArray) -> NDArray:
+    """Return a column as numbers where it holds some, whatever stands between them."""
+    if values.dtype.kind in "biuf":
+        return values
+    found = numbers(values, "", [])
+    return found if np.isfinite(found).any() else values
+
+
+def _longest_run(stamps: NDArray, unit: str) -> clock.Run:
     runs = clock.runs((stamps - stamps[0]).astype(float) * UNITS[unit].factor, stamps, [])
-    return max(runs, key=len).rows
+    return max(runs, key=len)
 
 
 def _write_joint(
@@ -262,7 +273,7 @@ def _write_recordings(proposal: Proposal, paths: Sequence[Path]) -> None:
 
 def _remark_on_the_rest(proposal: Proposal, unused: Sequence[str], columns: Mapping[str, NDArray]) -> None:
     """Name the columns and constants that are in no table."""
-    rest = [f"{name} = {columns[name][0]}" if len(columns[name]) == 1 else name for name in unused if name in columns]
+    rest = [f"{name} = {columns[name][0]}" if len(columns[name]) == 1 else name for name in unused]
     if rest:
         proposal.lines.append("")
         proposal.remark(f"Not used: {', '.join(rest)}.")

@@ -67,12 +67,14 @@ def _joint(key: str, members: Sequence[Meaning], number: int, joints: int) -> Jo
 
 def _by_behaviour(usable: Sequence[Meaning], columns: Mapping[str, NDArray], time_s: NDArray) -> list[JointColumns]:
     """Return one joint of columns whose names tell nothing: what integrates to what, what follows the motion."""
+    # Of a single sine the angle integrates to the velocity too, but with the other sign.
     pairs = [
         (agreement.explained, angle, velocity)
         for angle in usable
         for velocity in usable
         if angle is not velocity
         and (agreement := integral_agreement(time_s, _float(columns, angle), _float(columns, velocity))) is not None
+        and agreement.slope > 0.0
     ]
     best = max(pairs, key=lambda pair: pair[0], default=None)
     if best is None or best[0] < OBVIOUS:

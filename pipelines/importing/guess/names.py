@@ -68,7 +68,11 @@ def meaning(name: str) -> Meaning:
     """Return what a name says."""
     plain, unit = _unit(name)
     words = [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+", plain)]
-    unit = unit or next((UNIT_WORDS[word] for word in reversed(words) if word in UNIT_WORDS), None)
+    unit = (
+        unit
+        or ("deg" if "°" in plain else None)
+        or next((UNIT_WORDS[word] for word in reversed(words) if word in UNIT_WORDS), None)
+    )
     commanded = any(word in COMMANDED for word in words)
     quantity = next((quantity for quantity, known in WORDS.items() if known & set(words)), "")
     if set(words) & SOMETHING_ELSE:

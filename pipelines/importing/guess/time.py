@@ -55,12 +55,9 @@ def guess_time(meanings: Sequence[Meaning], columns: Mapping[str, NDArray]) -> T
     return None
 
 
-def write_time(proposal: Proposal, found: TimeGuess | None) -> None:
+def write_time(proposal: Proposal, found: TimeGuess) -> None:
     """Write the clock's table."""
     proposal.table("[time]", "time")
-    if found is None:
-        proposal.unknown("column", "no column goes forward as a clock does; or set rate_hz where rows are uniform")
-        return
     proposal.key("column", found.column, "goes forward" + ("" if found.sure else ", as no other does"), found.sure)
     proposal.key("unit", found.unit, found.why, found.sure)
     if found.wraps_at:

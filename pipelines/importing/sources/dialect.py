@@ -1,5 +1,6 @@
 """How a text file is written: encoding, delimiter, decimal point, comments, and where its header stands."""
 
+import csv
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -164,8 +165,9 @@ class _Table:
 
 
 def _fields(line: str, delimiter: str) -> list[str]:
-    fields = line.split() if delimiter == " " else line.rstrip("\r\n").split(delimiter)
-    return [field.strip().strip('"').strip() for field in fields]
+    if delimiter == " ":
+        return line.split()
+    return [field.strip() for field in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])]
 
 
 def _is_comment(line: str) -> bool:
