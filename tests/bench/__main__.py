@@ -10,6 +10,7 @@ from tests.bench import (
     bench_all,
     bench_design,
     bench_diagnose,
+    bench_import,
     bench_operator_view,
     bench_simulate,
     bench_stream,
@@ -22,4 +23,5 @@ show("exoid diagnose", bench_diagnose.rows())
 show("exoid acquire", bench_acquire.rows())
 show("the operator's view", bench_operator_view.rows())
 show("exoid filter and identify", bench_stream.rows())
+show("exoid import", bench_import.rows())
 show("make all", bench_all.rows())

@@ -10,7 +10,7 @@ from pathlib import Path
 from pipelines.errors import InputError
 from pipelines.settings.import_map import SourceSettings
 
-LOOKED_AT = 2**18
+LOOKED_AT = 2**16
 """Bytes at the beginning of a file that tell how it is written."""
 DELIMITERS = (",", ";", "\t", "|", " ")
 COMMENTS = ("#", "%")
