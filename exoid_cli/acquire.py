@@ -42,6 +42,7 @@ def acquire(
     from pipelines.settings.rig import load_rig
 
     experiment = Experiment.load(config)
+    experiment.mechanism.refuse_all_but_the_leg("`exoid acquire`")
     settings, rig = experiment.run_named(run), experiment.file(experiment.acquire.rig)
     limited, rate = load_rig(rig).in_force(settings.run), experiment.acquire.sample_rate_hz
     if settings.run == "with_human" and not limited.embedded and not yes:

@@ -32,11 +32,13 @@ def design(
     """
     from pipelines.errors import InputError
     from pipelines.mechanics.geometry import Geometry
+    from pipelines.mechanics.read import geometry_from
     from pipelines.settings import Experiment
 
     experiment = Experiment.load(config) if config else Experiment()
     settings = experiment.design.changed(criterion=criterion, harmonics=harmonics, seed=seed)
-    geometry = Geometry(**experiment.mechanism.model_dump())
+    experiment.mechanism.refuse_all_but_the_leg("`exoid design`")
+    geometry = geometry_from(experiment.mechanism) or Geometry()
     if (evaluate is None) == (output is None):
         raise InputError("give either --output FILE, to design an excitation, or --evaluate FILE, to judge one")
     if evaluate:

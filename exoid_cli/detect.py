@@ -78,10 +78,9 @@ def _planned(files: Sequence[Path], experiment: Any, rig: Path | None, runs: str
     from pipelines.diagnosis.session import refuse_unfit
     from pipelines.errors import InputError, about
     from pipelines.mechanics.trajectory import read_trajectory
-    from pipelines.settings.plant import PlantSettings
     from pipelines.settings.rig import load_rig
 
-    plant = load_rig(rig).plant if rig else PlantSettings(**experiment.mechanism.model_dump())
+    plant = load_rig(rig).plant if rig else _default_plant(experiment)
     if plant is None:
         raise InputError(
             f"{rig}: has no [plant], expected the file of a virtual rig; name one that has, or leave it out"
@@ -96,17 +95,27 @@ def _planned(files: Sequence[Path], experiment: Any, rig: Path | None, runs: str
     return detectability(observed, baseline_of(observed), noise, power, report)
 
 
+def _default_plant(experiment: Any) -> Any:
+    """Return the virtual rig's leg, of the lengths that exoid.toml says."""
+    from pipelines.settings.plant import PlantSettings
+
+    experiment.mechanism.refuse_all_but_the_leg("`exoid detect` of an excitation")
+    return PlantSettings(**experiment.mechanism.geometry)
+
+
 def _recorded(files: Sequence[Path], experiment: Any, power: float, report: Any) -> list:
     from pipelines.diagnosis.detect import detectability_of_recorded
-    from pipelines.mechanics.read import geometry_from, read_motions
+    from pipelines.mechanics.read import geometry_from, read_motions, refuse_another_mechanism
 
     motions = read_motions(files, experiment.filter, geometry_from(experiment.mechanism))
+    refuse_another_mechanism(experiment.mechanism, motions)
     return detectability_of_recorded(motions, power, report)
 
 
 def _show(found: Sequence["Detectable"]) -> None:
-    headings = ("cause", "joint", "seen from", "rms N·m", "of torque")
-    console.table(headings, [_row(one) for one in found], numbers="seen from, rms N·m, of torque")
+    rms = f"rms {found[0].unit}"
+    headings = ("cause", "joint", "seen from", rms, "of torque")
+    console.table(headings, [_row(one) for one in found], numbers=f"seen from, {rms}, of torque")
     console.say("")
     tied = [(one.effect.label, ", ".join(one.tied_with)) for one in found if one.tied_with]
     console.table(("at that size", "could also be"), tied)
@@ -116,8 +125,11 @@ def _show(found: Sequence["Detectable"]) -> None:
 
 
 def _row(one: "Detectable") -> tuple[str, ...]:
-    name = (one.effect.name, one.effect.joint or "whole leg")
+    from pipelines.diagnosis.label import number
+
+    machine = one.effect.on
+    name = (one.effect.name, one.effect.joint or ("whole leg" if machine.is_exoskeleton else "whole machine"))
     share = one.smallest_rms_nm / one.torque_rms_nm
     if share >= 1.0:
         return (*name, "not to be seen", "", "")
-    return (*name, one.size_in_words(), f"{one.smallest_rms_nm:.2f}", f"{100 * share:.1f} %")
+    return (*name, one.size_in_words(), number(machine, one.smallest_rms_nm), f"{100 * share:.1f} %")

@@ -2,11 +2,14 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from exoid_cli.console import console
+
+if TYPE_CHECKING:
+    from pipelines.mechanics.machine import Machine
 
 
 def diagnose(
@@ -28,7 +31,7 @@ def diagnose(
     from pipelines.diagnosis.diagnose import diagnose as find
     from pipelines.diagnosis.figures import FIGURES, draw
     from pipelines.diagnosis.verdict import verdict
-    from pipelines.mechanics.read import geometry_from, read_motions
+    from pipelines.mechanics.read import geometry_from, read_motions, refuse_another_mechanism
     from pipelines.settings import Experiment
 
     settings = Experiment.load(config) if config else Experiment()
@@ -36,6 +39,7 @@ def diagnose(
     for name, contract in tables.items():
         contract.refuse_place(output / f"{name}.parquet")
     motions = read_motions(files, settings.filter, geometry_from(settings.mechanism))
+    refuse_another_mechanism(settings.mechanism, motions)
     open_folder(output)
     with console.progress("diagnosing", 1.0) as report:
         found = find(motions, report)
@@ -44,7 +48,7 @@ def diagnose(
     shared = {"joints": motions[0].joint_metadata} | describe(inputs=files, config=used)
     model = {
         "covariance": found.covariance.tolist(),
-        "mechanism": "leg",
+        "mechanism": motions[0].machine.mechanism.name,
         "geometry": motions[0].geometry.metadata(),
         "method": {"name": "joint fit of baseline and named causes", "status": found.status},
     }
@@ -63,25 +67,26 @@ def diagnose(
         draw(found, said, output)
     write_text(output / "verdict.json", json.dumps(said | {"provenance": shared}, indent=1, ensure_ascii=False) + "\n")
     console.emit(said)
-    _show(said, output)
+    _show(said, motions[0].machine, output)
     if figures:
         console.say(f"figures: {', '.join(f'{name}.png' for name in FIGURES)}")
 
 
-def _show(said: dict[str, Any], output: Path) -> None:
+def _show(said: dict[str, Any], machine: "Machine", output: Path) -> None:
     console.say(said["summary"])
     for caveat in said["caveats"]:
         console.say(f"But {caveat}.")
     console.say("")
-    joints = list(said["noise_floor_nm"])
+    unit, digits = machine.joints[0].unit("torque"), ".3f" if machine.is_exoskeleton else ".4g"
+    told = ("noise_floor_nm", "baseline_rmse_nm", "extended_rmse_nm")
     console.table(
         ("joint", "noise floor", "rigid + friction", "with the causes", "excess left"),
         [
-            (joint, *(f"{said[key][joint]:.3f}" for key in ("noise_floor_nm", "baseline_rmse_nm", "extended_rmse_nm")),
+            (joint, *(f"{said[key][joint]:{digits}}" for key in told),
              "at the floor" if said["unexplained"][joint] is None else f"{said['unexplained'][joint]:.0%}")
-            for joint in joints
+            for joint in machine.names
         ],
-        title="torque error on runs no fit has seen, N·m",
+        title=f"{'force' if unit == 'N' else 'torque'} error on runs no fit has seen, {unit}",
         numbers="noise floor, rigid + friction, with the causes, excess left",
     )  # fmt: skip
     if said["causes"]:

@@ -10,6 +10,7 @@ from exoid_cli.console import console
 
 if TYPE_CHECKING:
     from pipelines.identification import Identified
+    from pipelines.mechanics.machine import Machine
 
 
 def identify(
@@ -31,12 +32,13 @@ def identify(
     from pipelines.estimation.estimators import estimator_named
     from pipelines.identification import identify as fit
     from pipelines.identification.validation import residuals
-    from pipelines.mechanics.read import geometry_from, read_runs
+    from pipelines.mechanics.read import geometry_from, read_runs, refuse_another_mechanism
     from pipelines.settings import Experiment
 
     settings = Experiment.load(config) if config else Experiment()
     estimator = estimator_named(method or settings.identify.method)
     runs = read_runs(files, settings.filter, geometry_from(settings.mechanism))
+    refuse_another_mechanism(settings.mechanism, runs)
     found = fit(runs, estimator)
     config_used = {
         "mechanism": settings.mechanism.model_dump(mode="json"),
@@ -46,7 +48,7 @@ def identify(
     shared = {"joints": runs[0].joint_metadata} | describe(inputs=files, config=config_used)
     described = {
         "covariance": found.covariance.tolist(),
-        "mechanism": "leg",
+        "mechanism": runs[0].machine.mechanism.name,
         "geometry": runs[0].geometry.metadata(),
         "method": found.method,
         "one_step": found.one_step.tolist(),
@@ -61,7 +63,7 @@ def identify(
         from pipelines.identification.figures import draw
 
         draw(RESIDUALS.scan(left), output)
-    _report(found)
+    _report(found, runs[0].machine)
 
 
 def _named(row: Mapping[Any, Any]) -> str:
@@ -69,8 +71,13 @@ def _named(row: Mapping[Any, Any]) -> str:
     return " ".join(filter(None, (joint, row["symbol"], run)))
 
 
-def _report(found: "Identified") -> None:
-    rows = found.parameters
+def _report(found: "Identified", machine: "Machine") -> None:
+    rows, unit = found.parameters, machine.joints[0].unit("torque")
+
+    def said(value: float, decimals: int = 4) -> str:
+        # So many decimals do for a leg; a servo's inertia would be nought by them.
+        return f"{value:.{decimals}f}" if machine.is_exoskeleton else f"{value:.5g}"
+
     console.emit(
         {
             "parameters": rows.to_dict("records"),
@@ -86,10 +93,10 @@ def _report(found: "Identified") -> None:
         [
             (
                 _named(row),
-                f"{row['value']:.4f}",
-                f"{row['ci95_low']:.4f} … {row['ci95_high']:.4f}",
+                said(row["value"]),
+                f"{said(row['ci95_low'])} … {said(row['ci95_high'])}",
                 row["unit"],
-                f"{one:.4f}",
+                said(one),
                 row["step"],
             )
             for row, one in zip(rows.to_dict("records"), found.one_step, strict=True)
@@ -99,15 +106,18 @@ def _report(found: "Identified") -> None:
     console.say("")
     scores = {**found.validation.by_run, "all": found.validation.pooled}
     console.table(
-        ("validation run", "joint", "RMSE N·m", "with reversals", "torque rms N·m"),
+        ("validation run", "joint", f"RMSE {unit}", "with reversals", f"torque rms {unit}"),
         [
-            (run, joint, f"{score.rmse[j]:.3f}", f"{score.rmse_unmasked[j]:.3f}", f"{score.torque_rms[j]:.2f}")
+            (run, joint, said(score.rmse[j], 3), said(score.rmse_unmasked[j], 3), said(score.torque_rms[j], 2))
             for run, score in scores.items()
             for j, joint in enumerate(found.validation.joints)
         ],
-        numbers="RMSE N·m, with reversals, torque rms N·m",
+        numbers=f"RMSE {unit}, with reversals, torque rms {unit}",
     )
     for sentence in found.remarks:
         console.say(f"{sentence}.")
-    for sentence in [*found.collinear, *(f"not a real leg: {s}" for s in found.unrealizable)]:
+    for sentence in [
+        *found.collinear,
+        *(f"not a real {'leg' if machine.is_exoskeleton else 'machine'}: {s}" for s in found.unrealizable),
+    ]:
         console.warn(sentence)

@@ -8,7 +8,7 @@ import typer
 from exoid_cli.console import console
 
 if TYPE_CHECKING:
-    from pipelines.contracts import Table
+    from pipelines.contracts import Joint, Table
     from pipelines.settings import Experiment
 
 
@@ -61,6 +61,11 @@ def _track(table: "Table", run: str, reference: Path | None, settings: "Experime
 
     chosen = settings.simulate
     plant = plant_from_table(table, run, geometry_from(settings.mechanism))
+    if not reference and not plant.machine.is_exoskeleton:
+        raise InputError(
+            f"{table.path} is of {', '.join(plant.machine.names)}, expected hip and knee: the gait is a leg's; "
+            "name what to follow with --reference"
+        )
     wanted = read_trajectory(reference) if reference else gait()
     loop = track(plant, chosen, wanted)
     if loop.ran_away:
@@ -97,11 +102,13 @@ def _track(table: "Table", run: str, reference: Path | None, settings: "Experime
             "sweep": gains.to_dict("records"),
         }
     )
-    settled = f"largest error after {chosen.settled_after_s:g} s (rad)"
+    first = plant.joints[0]
+    settled = f"largest error after {chosen.settled_after_s:g} s ({first.unit('angle')})"
+    strongest = f"peak torque ({first.unit('torque')})"
     console.table(
-        ("joint", settled, "peak torque (N·m)"),
+        ("joint", settled, strongest),
         [(name, f"{e:.4f}", f"{t:.1f}") for name, e, t in zip(names, worst, peak, strict=True)],
-        numbers=f"{settled}, peak torque (N·m)",
+        numbers=f"{settled}, {strongest}",
     )
     console.say(f"{output}: rbf.parquet" + (", kv-sweep.csv" if len(gains) else "") + (", figures" * chosen.figures))
 
@@ -141,7 +148,7 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
         from pipelines.simulation.figures import draw_replay
 
         draw_replay(open_loop, closed_loop, plant.joints, output.with_suffix(""), f"{recording.stem}, simulated again")
-    _report_replay(result, names, lacks)
+    _report_replay(result, plant.joints, lacks)
     for label, own in plant.model.of_one_run.items():
         console.warn(
             f"{label}: each run has its own {' and '.join(own)}, and {table.path} holds those of one run; "
@@ -149,17 +156,17 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
         )
 
 
-def _report_replay(result: dict[str, Any], names: list[str], lacks: str) -> None:
+def _report_replay(result: dict[str, Any], joints: "tuple[Joint, ...]", lacks: str) -> None:
     console.emit(result | ({"no_closed_loop": lacks} if lacks else {}))
     headings = {
-        "simulation_rmse_rad": "1 s windows (rad)",
-        "closed_loop_rmse_rad": "closed loop (rad)",
-        "closed_loop_rmse_nm": "closed loop (N·m)",
+        "simulation_rmse_rad": f"1 s windows ({joints[0].unit('angle')})",
+        "closed_loop_rmse_rad": f"closed loop ({joints[0].unit('angle')})",
+        "closed_loop_rmse_nm": f"closed loop ({joints[0].unit('torque')})",
     }
     shown = [key for key in headings if key in result]
     console.table(
         ("RMSE", *(headings[key] for key in shown)),
-        [(name, *(f"{result[key][name]:.5f}" for key in shown)) for name in names],
+        [(joint.name, *(f"{result[key][joint.name]:.5f}" for key in shown)) for joint in joints],
         numbers=", ".join(headings[key] for key in shown),
     )
     if lacks:

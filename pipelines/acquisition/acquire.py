@@ -205,7 +205,7 @@ def _metadata(
         "sample_rate_hz": sample_rate_hz,
         "rig": rig.name,
         "controller": rig.known_controllers(),
-        "geometry": mechanism.model_dump() | rig.known_geometry(),
+        "geometry": mechanism.geometry | rig.known_geometry(),
     }
     if trajectory.period_s:
         metadata["period_s"] = trajectory.period_s

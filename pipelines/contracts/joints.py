@@ -26,6 +26,7 @@ QUANTITIES: dict[str, Quantity] = {
     "velocity_measured": Quantity("{joint}_velocity_measured_rad_s", "rad/s", "{joint}_velocity_measured_m_s", "m/s"),
     "acceleration": Quantity("{joint}_acceleration_rad_s2", "rad/s²", "{joint}_acceleration_m_s2", "m/s²"),
     "torque": Quantity("{joint}_torque_nm", "N·m", "{joint}_force_n", "N"),
+    "torque_measured": Quantity("{joint}_torque_measured_nm", "N·m", "{joint}_force_measured_n", "N"),
     "predicted": Quantity("{joint}_predicted_nm", "N·m", "{joint}_predicted_n", "N"),
     "residual": Quantity("{joint}_residual_nm", "N·m", "{joint}_residual_n", "N"),
     "network": Quantity("{joint}_network_nm", "N·m", "{joint}_network_n", "N"),

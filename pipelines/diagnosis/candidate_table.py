@@ -9,7 +9,8 @@ from pipelines.diagnosis.choice import NEEDED, Ranked
 from pipelines.diagnosis.diagnose import Diagnosis
 from pipelines.diagnosis.examined import Extended
 from pipelines.diagnosis.gain import gain
-from pipelines.effects import EFFECTS
+from pipelines.effects import EFFECTS, Effect
+from pipelines.mechanics.machine import Machine
 
 
 def candidates(d: Diagnosis) -> pd.DataFrame:
@@ -20,8 +21,8 @@ def candidates(d: Diagnosis) -> pd.DataFrame:
         for labels, scored in level.items()
         if np.isfinite(scored.score) and len(set(labels)) == len(labels)
     ]
-    rows += [_absorbed(d, effect.name, joint, into) for effect in EFFECTS for joint, into in effect.absorbed.items()
-             if joint in d.baseline.joints]  # fmt: skip
+    rows += [_absorbed(d, effect.name, joint, into) for effect in EFFECTS
+             for joint, into in _taken_up(effect, d.baseline.machine).items()]  # fmt: skip
     order = {"named": 0, "indistinguishable": 1, "rejected": 2, "absorbed": 3}
     rows.sort(key=lambda r: (order[r["verdict"]], -(r["train_score"] or 0.0)))
     frame = pd.DataFrame(rows)
@@ -40,9 +41,9 @@ def _row(d: Diagnosis, labels: tuple[str, ...], score: float, ranked: Ranked | N
         "gain_high_nm": None,
         "probability": _probability(d, labels),
     }
-    for j, joint in enumerate(d.baseline.joints):
-        row[f"rmse_before_{joint}_nm"] = float(d.before.errors.rms[j])
-        row[f"rmse_after_{joint}_nm"] = float(extended.errors.rms[j]) if extended else None
+    for j, joint in enumerate(d.baseline.machine.joints):
+        row[joint.column("rmse_before")] = float(d.before.errors.rms[j])
+        row[joint.column("rmse_after")] = float(extended.errors.rms[j]) if extended else None
     if extended:
         worth = gain(d.before.errors, extended.errors)
         row |= {"gain_nm": worth.value, "gain_low_nm": worth.low, "gain_high_nm": worth.high}
@@ -114,8 +115,15 @@ def _judged(d: Diagnosis, labels: tuple[str, ...], score: float) -> tuple[str, s
     )
 
 
+def _taken_up(effect: type[Effect], machine: Machine) -> dict[str, str]:
+    """Return the joints of a machine at which other parameters take an effect up whole, and which."""
+    everywhere = machine.mechanism.absorbs.get(effect.name)
+    by_joint = {joint: everywhere or effect.absorbed.get(machine.place(joint)) for joint in machine.names}
+    return {joint: into for joint, into in by_joint.items() if into}
+
+
 def _absorbed(d: Diagnosis, name: str, joint: str, into: str) -> dict[str, Any]:
-    blank = {f"rmse_{when}_{j}_nm": None for j in d.baseline.joints for when in ("before", "after")}
+    blank = {j.column(f"rmse_{when}"): None for j in d.baseline.machine.joints for when in ("before", "after")}
     return {
         "causes": [f"{name}@{joint}"], "parameters": [], "train_score": None, "gain_nm": None, "gain_low_nm": None,
         "gain_high_nm": None, "probability": None, **blank, "verdict": "absorbed",

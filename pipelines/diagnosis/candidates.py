@@ -15,11 +15,14 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.gram import Gram, gram_of, solve
 from pipelines.diagnosis.observations import FOLDS, Baseline, Run
 from pipelines.effects import EFFECTS, Effect, Parameter, Side
+from pipelines.mechanics.machine import Machine
 from pipelines.model import Model, Term
 
 WORN = ("mass_off_axis", "payload_change")
 """Effects of the structure that the person may carry instead: then in their runs only, and felt by the cuffs."""
 BASELINE = ("rigid_body", "friction")
+TURNS = ("1/turn", "rad/m")
+"""Units of what is counted along a joint's way."""
 WAVES = 1.5
 """Of a ripple within the angles that are swept: with fewer it is not seen to repeat, and beside a spring it could
 imitate any function of the angle."""
@@ -69,27 +72,22 @@ def bends_motion(effect: Effect) -> bool:
 
 def lowest(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> float:
     """Return the value below which runs cannot tell a shape parameter of an effect."""
-    if parameter.unit != "1/turn" or effect.joint is None:
+    if parameter.unit not in TURNS or effect.joint is None:
         return -np.inf
     j = runs[0].motion.joints.index(effect.joint)
     swept = max(float(np.ptp(run.state[0][:, j])) for run in runs)
     return WAVES * 2.0 * np.pi / swept
 
 
-def proposals(joints: Sequence[str], kinds: Sequence[str]) -> Iterator[Effect]:
-    """Yield every effect at every place it can be in the kinds of run at hand."""
+def proposals(machine: Machine, kinds: Sequence[str]) -> Iterator[Effect]:
+    """Yield every effect at every place of a machine where it can be, in the kinds of run at hand."""
     for effect in EFFECTS:
         if effect.name in BASELINE or not set(effect.acts_in) & set(kinds):
             continue
-        if effect.whole_leg:
-            yield effect()
-            continue
-        for joint in effect.joints or joints:
-            if joint in effect.absorbed:
-                continue
-            yield effect(joint=joint)
+        for joint in effect.possible(machine):
+            yield effect(joint=joint, on=machine)
             if effect.name in WORN and "with_human" in kinds:
-                yield effect(joint=joint, run="with_human")
+                yield effect(joint=joint, run="with_human", on=machine)
 
 
 def columns_under(terms: Sequence[Term], run: Run, baseline: Baseline) -> tuple[NDArray, NDArray]:

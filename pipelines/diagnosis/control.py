@@ -38,6 +38,8 @@ def control(d: Diagnosis) -> dict[str, Any]:
         "with": None,
         "reason": None,
     }
+    if not d.baseline.machine.is_exoskeleton:
+        return told | {"reason": "the reference case is a leg's gait, with its gains and limits"}
     if d.spoilt:
         return told | {"reason": "acquisition is at fault: no model of these recordings can be trusted"}
     fits = {"without": d.before.fit, "with": d.after.fit} if d.causes else {"without": d.before.fit}

@@ -53,8 +53,13 @@ class Variable:
     """Inner knots of its curve; few where a fold leaves a gap as long as what a knot spans."""
 
 
-def _other(j: int) -> int:
-    return 1 - j
+def _of_other(run: Run, order: int, j: int) -> NDArray | None:
+    """Return angle, speed or acceleration of the other of two joints."""
+    return run.state[order][:, 1 - j] if len(run.motion.joints) == 2 else None
+
+
+def _load_of_other(run: Run, j: int) -> NDArray | None:
+    return _load(run, 1 - j) if len(run.motion.joints) == 2 else None
 
 
 def _since_reversal(run: Run, j: int) -> NDArray:
@@ -90,9 +95,9 @@ VARIABLES = (
         "reversals", "the {joint}'s direction and the time since it reversed", "s", _since_reversal, by_direction=True
     ),
     Variable("load", "the torque that the {joint} passes on", "N·m", _load, by_direction=True),
-    Variable("other_angle", "the {other}'s angle", "rad", lambda run, j: run.state[0][:, _other(j)]),
-    Variable("other_speed", "the {other}'s speed", "rad/s", lambda run, j: run.state[1][:, _other(j)]),
-    Variable("other_load", "the torque that the {other} passes on", "N·m", lambda run, j: _load(run, _other(j))),
+    Variable("other_angle", "the {other}'s angle", "rad", lambda run, j: _of_other(run, 0, j)),
+    Variable("other_speed", "the {other}'s speed", "rad/s", lambda run, j: _of_other(run, 1, j)),
+    Variable("other_load", "the torque that the {other} passes on", "N·m", _load_of_other),
     Variable("cuff_force", "the cuffs' torque about the {joint}", "N·m", _cuff),
     Variable("temperature", "the {joint} motor's temperature", "°C", _temperature),
     Variable("time", "the time since the run began", "s", lambda run, j: run.time, lasting=False, knots=2),
@@ -164,7 +169,8 @@ def _sentence(joint: str, joints: Sequence[str], words: str, share: float) -> st
 
 
 def _words(joint: str, joints: Sequence[str], words: str) -> str:
-    return words.format(joint=joint, other=joints[_other(joints.index(joint))])
+    others = [name for name in joints if name != joint]
+    return words.format(joint=joint, other=" and ".join(others))
 
 
 def by_kind(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Iterable[tuple[list[Run], list[NDArray]]]:

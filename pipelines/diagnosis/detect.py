@@ -43,6 +43,7 @@ from pipelines.diagnosis.session import refuse_unfit
 from pipelines.diagnosis.thinned import thinned
 from pipelines.effects import Effect, Parameter
 from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.scale import on_one_scale
 
 POWER = 0.9
 """Chance that an effect of the smallest visible size is found."""
@@ -70,7 +71,7 @@ class Detectable:
 
     effect: Effect
     smallest_rms_nm: float
-    """Rms of its torque at its joint (a whole leg's: the hip), before the baseline takes its share; inf: never seen."""
+    """Rms of its torque at its joint (else the first), before the baseline takes its share; inf: never seen."""
     smallest: float
     """The magnitude in the unit of ``parameter``."""
     shape: tuple[tuple[str, float], ...]
@@ -90,6 +91,11 @@ class Detectable:
     def parameter(self) -> Parameter:
         """Return the parameter that says how large the effect is."""
         return self.effect.parameters[0]
+
+    @property
+    def unit(self) -> str:
+        """Return the unit of its torque, N where the machine slides."""
+        return self.effect.on.joints[0].unit("torque")
 
     def size_in_words(self) -> str:
         """Write the smallest size with its unit, as tables and figures have it."""
@@ -171,7 +177,7 @@ class Sight:
         return rows
 
     def joint(self, effect: Effect) -> int:
-        """Return the joint at which an effect's size is told: a whole leg's at the hip."""
+        """Return the joint at which an effect's size is told: a whole machine's at its first."""
         return max(effect.column(self.runs[0].motion), 0)
 
     def rms(self, effect: Effect, column: Sequence[NDArray]) -> float:
@@ -220,7 +226,7 @@ def detectability(
     """
     sight = Sight.of(runs, baseline, floor)
     # What the wearer may carry instead of the machine goes by the same name; the machine's is reported.
-    effects = [e for e in proposals(baseline.joints, baseline.kinds) if e.run is None]
+    effects = [e for e in proposals(baseline.machine, baseline.kinds) if e.run is None]
     looks: dict[Effect, list[Look]] = {}
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
@@ -241,6 +247,7 @@ def detectability_of_recorded(
 
     Training runs count, as they do for a diagnosis; where there is none, all do.
     """
+    motions = on_one_scale(motions)
     refuse_unfit(motions)
     motions = [thinned(m) for m in motions]
     runs = [observe(m) for m in motions if m.purpose == "train"] or [observe(m) for m in motions]

@@ -44,12 +44,13 @@ def _bars(axis: Axes, joint: str, group: list[Detectable]) -> None:
     axis.invert_yaxis()
     axis.set_xscale("log")
     # Room for the notes to the right of the longest bar.
-    axis.set_xlim(0.6 * min(min(one.best_rms_nm for one in group), 0.1), 30 * limit)
+    least = 0.1 if group[0].effect.on.is_exoskeleton else 0.005 * limit
+    axis.set_xlim(0.6 * min(min(one.best_rms_nm for one in group), least), 30 * limit)
     axis.axvline(limit, color=ORANGE, lw=1)
     axis.annotate("the joint's own torque", (limit, -0.8), fontsize=7, color=ORANGE, ha="center", va="bottom",
                   annotation_clip=False)  # fmt: skip
     axis.grid(axis="y", visible=False)
-    axis.set_xlabel("smallest effect that would be seen, N·m rms (white tick: at its best shape)")
+    axis.set_xlabel(f"smallest effect that would be seen, {group[0].unit} rms (white tick: at its best shape)")
     axis.set_title(joint, loc="left")
 
 

@@ -37,6 +37,7 @@ from pipelines.diagnosis.uncertainty import Uncertainty, uncertainty
 from pipelines.dynamics.replay import replay
 from pipelines.errors import ExoidError, InputError
 from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.scale import on_one_scale
 
 SEARCH_SHARE = 0.75
 """Of the progress bar that filling the bank takes."""
@@ -112,6 +113,7 @@ def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = s
     InputError
         Where there is no run to train or none to validate on.
     """
+    motions = on_one_scale(motions)
     refuse_unfit(motions)
     faults = tuple(find_faults(motions))
     sound = [thinned(motion) for motion in excluding(motions, faults)]

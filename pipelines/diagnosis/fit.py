@@ -19,8 +19,9 @@ STEPS_ON, AT_AN_END = 3, 0.05
 """How often a search that ended at an end of its range goes on from there, and what share of the range is its end."""
 CLOSER = 0.25
 """Of its reach the second sweep looks, and so much more finely."""
-MAXIMA_APART = {"Hz": 0.01, "1/turn": 1.0}
-"""How far apart the maxima of an oscillating effect are, by its parameter's unit: the scan has found the right one."""
+MAXIMA_APART = {"Hz": 0.01, "1/turn": 1.0, "rad/m": 1.0}
+"""How far apart the maxima of an oscillating effect are, in its parameter's grain, by its unit: the scan has found
+the right one."""
 ONSETS_APART_S = 2.0
 """How far apart the onsets are that the scan has tried."""
 BEYOND = 5.0
@@ -202,7 +203,7 @@ def _scale(
     """
     low, high = parameter.typical
     if parameter.unit in MAXIMA_APART or parameter.per_run:
-        reach = share * MAXIMA_APART.get(parameter.unit, ONSETS_APART_S)
+        reach = share * parameter.grain * MAXIMA_APART.get(parameter.unit, ONSETS_APART_S)
         return float, max(now - reach, least), now + reach
     if low > 0 and high / low > 4:
         reach = share * 2 * float(np.log(REACH))

@@ -1,6 +1,7 @@
 """A cause's label, ``effect@joint`` (see ``Effect.label``): whose it is, and how sentences say it."""
 
 from pipelines.effects import Effect
+from pipelines.mechanics.machine import Machine
 from pipelines.model import effect_named
 
 NAMES = ("Coulomb", "Stribeck")
@@ -11,6 +12,21 @@ def effect_labelled(label: str) -> Effect:
     """Return the effect that ``cogging@knee`` is the label of."""
     name, _, joint = label.partition("@")
     return effect_named(name)(joint=joint or None)
+
+
+def number(machine: Machine, torque: float) -> str:
+    """Return a torque or force at a joint of a machine as text: hundredths of a newton metre do for an exoskeleton."""
+    return f"{torque:.2f}" if machine.is_exoskeleton else f"{torque:.3g}"
+
+
+def amount(machine: Machine, joint: str, torque: float) -> str:
+    """Return a torque or force at a joint with its unit."""
+    return f"{number(machine, torque)} {machine.joint(joint).unit('torque')}"
+
+
+def quantity(machine: Machine, joint: str) -> str:
+    """Return what a drive exerts at a joint: a torque, or a force."""
+    return "force" if machine.joint(joint).kind == "prismatic" else "torque"
 
 
 def title_in_words(effect: Effect) -> str:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.candidates import Candidate, bends_motion, expanded_columns, lowest
+from pipelines.diagnosis.candidates import TURNS, Candidate, bends_motion, expanded_columns, lowest
 from pipelines.diagnosis.observations import Run
 from pipelines.effects import Effect, Parameter
 from pipelines.mechanics.motion import Motion
@@ -21,9 +21,11 @@ KEPT = 3
 FEW, BENDING, SPRINGS = 16, 3, 8
 """Values of a shape parameter; of one that bends the motion, for its effect is nearly in proportion to it; of a
 stiffness, for a load that swings on it does so at another frequency."""
+HARDENING = ("1/rad²", "1/m²")
+"""Units of a form that only bends a spring."""
 ONSETS = 40
 """Instants tried for what begins at a time of its own in each run."""
-OSCILLATING = {"Hz", "1/turn"}
+OSCILLATING = {"Hz", *TURNS}
 """Units of parameters whose effect has many maxima along them."""
 NEVER, ALWAYS = 1e6, -1e6
 """s: onsets after every run's end and before every run's begin."""
@@ -112,8 +114,8 @@ def _grid(effect: Effect, bends: bool, runs: Sequence[Run]) -> Iterator[tuple[fl
     """Yield the shapes to try; where each is dear, forms that only bend a spring are left to the refinement."""
     few = FEW if not bends else SPRINGS if effect.swings else BENDING
     yield from itertools.product(*(
-        (tried := values_of(p, few))[tried >= lowest(effect, p, runs)] if not (effect.swings and p.unit == "1/rad²")
-        else (p.default,) for p in effect.shape
+        (tried := values_of(p, few))[tried >= lowest(effect, p, runs)]
+        if not (effect.swings and p.unit in HARDENING) else (p.default,) for p in effect.shape
     ))  # fmt: skip
 
 
@@ -126,8 +128,8 @@ def values_of(parameter: Parameter, count: int) -> NDArray:
     low, high = parameter.typical
     if parameter.unit == "Hz":
         return np.arange(low, high, 0.01)
-    if parameter.unit == "1/turn":
-        return np.arange(low, high, 1.0)
+    if parameter.unit in TURNS:
+        return np.arange(low, high, parameter.grain)
     if low > 0 and high / low > 4:
         # Away from the ends, where an effect that bends the motion does nothing or tears it apart.
         return np.geomspace(low, high, count + 2)[1:-1] if count < FEW else np.geomspace(low, high, count)

@@ -12,12 +12,12 @@ from pipelines.diagnosis.error_budget import error_budget
 from pipelines.diagnosis.examined import PERCEIVED
 from pipelines.diagnosis.faults import Fault
 from pipelines.diagnosis.gain import gain
-from pipelines.diagnosis.label import effect_labelled, in_words
+from pipelines.diagnosis.label import amount, effect_labelled, in_words, number, quantity
 from pipelines.diagnosis.status import AT_FLOOR, EXPLAINED
 from pipelines.diagnosis.ties import tie_between
 from pipelines.diagnosis.unknown import Unknown, unknown
 from pipelines.effects import Effect
-from pipelines.estimation.regression import MASK
+from pipelines.estimation.regression import mask_in_words
 from pipelines.model import effect_named
 
 HIGHEST = 0.96
@@ -46,13 +46,17 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "caveats": _caveats(d),
         "scoring": {
             "bandwidth_hz": first.block.cutoff_hz(first.motion.sample_rate_hz),
-            "mask": MASK,
+            "mask": mask_in_words(d.baseline.machine),
             "samples": int(d.after.errors.counts.sum()),
         },
         **summary_numbers(d),
         "control": control(d),
         "error_budget": error_budget(d),
         "depends_on": _depends_on(before, after),
+        "units": {
+            joint.name: {"torque": joint.unit("torque"), "angle": joint.unit("angle")}
+            for joint in d.baseline.machine.joints
+        },
         "causes": causes,
         "data_faults": [{"file": f.file, "channel": f.channel, "what": f.what} for f in d.faults],
         "residual": left.as_json() if left else None,
@@ -147,7 +151,11 @@ def _tie(effect: Effect, other: str, probability: float, d: Diagnosis) -> dict[s
 
 def _evidence(d: Diagnosis, label: str, effect: Effect, worth: float, joint: str, alike: dict[str, float]) -> list[str]:
     before = d.without[label].errors.rms[d.baseline.joints.index(joint)]
-    sentences = [f"it takes {worth:.2f} of {before:.2f} N·m of torque error at the {joint} on runs no fit has seen"]
+    machine = d.baseline.machine
+    sentences = [
+        f"it takes {number(machine, worth)} of {amount(machine, joint, before)} of {quantity(machine, joint)} error "
+        f"at the {joint} on runs no fit has seen"
+    ]
     if label in d.perceived:
         sentences.append(PERCEIVED[effect.name])
     others = {k: p for k, p in d.likely[label].items() if k not in alike}
@@ -179,6 +187,8 @@ def _summary(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -
 def _caveats(d: Diagnosis) -> list[str]:
     """Return what the runs at hand could not show whatever is missing."""
     kinds = {run.motion.run for run in d.train}
+    if not d.baseline.machine.is_exoskeleton and kinds == {"exo_alone"}:
+        return []  # nobody is meant to be in any other machine
     if kinds == {"exo_alone"}:
         return [
             "every run is without a person: what a person adds cannot be seen, and a shifted zero cannot be told from "
@@ -203,21 +213,24 @@ def _finding(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -
     floor, before, after = d.standing.floor, d.standing.baseline, d.standing.extended
     worst = int((before / floor).argmax())
     joint = d.baseline.joints[worst]
-    size = f"{before[worst]:.2f} N·m, {before[worst] / floor[worst]:.2f} times the noise floor"
+    machine, exerted = d.baseline.machine, quantity(d.baseline.machine, joint)
+    size = f"{amount(machine, joint, before[worst])}, {before[worst] / floor[worst]:.2f} times the noise floor"
     if d.status == "nothing_missing":
-        return f"Nothing is missing that these data could show: the largest torque error, at the {joint}, is {size}."
+        return f"Nothing is missing that these data could show: the largest {exerted} error, at the {joint}, is {size}."
     if d.status == "unknown_cause":
         described = f" {left.description}" if left else ""
         return (
             "Something is missing, and no cause that exoid knows explains it well enough to be named: "
-            f"the {joint}'s torque error is {size}.{described}"
+            f"the {joint}'s {exerted} error is {size}.{described}"
         )
     named = "; and ".join(_in_words(cause) for cause in causes)
     most = int(((before**2 - after**2) / floor**2).argmax())
+    joint = d.baseline.joints[most]
     return (
         f"Missing from the simulation: {named}. With {'it' if len(causes) == 1 else 'them'} the "
-        f"{d.baseline.joints[most]}'s torque error falls from {before[most]:.2f} N·m, "
-        f"{before[most] / floor[most]:.2f} times the noise floor, to {after[most]:.2f} N·m, {_remains(d, most)}."
+        f"{joint}'s {quantity(machine, joint)} error falls from {amount(machine, joint, before[most])}, "
+        f"{before[most] / floor[most]:.2f} times the noise floor, to {amount(machine, joint, after[most])}, "
+        f"{_remains(d, most)}."
     )
 
 
@@ -226,9 +239,10 @@ def _remains(d: Diagnosis, told: int) -> str:
     ratio = d.standing.extended / d.standing.floor
     left = [share is not None and share > EXPLAINED for share in d.standing.unexplained]
     said = f"{'still ' if left[told] else ''}{ratio[told]:.2f} times the floor"
+    machine = d.baseline.machine
     others = [
-        f"; the {d.baseline.joints[j]}'s is then {d.standing.extended[j]:.2f} N·m, {times:.2f} times its floor"
-        for j, times in enumerate(ratio)
+        f"; the {joint}'s is then {amount(machine, joint, d.standing.extended[j])}, {times:.2f} times its floor"
+        for j, (joint, times) in enumerate(zip(d.baseline.joints, ratio, strict=True))
         if left[j] and j != told
     ]
     return (said if ratio[told] > AT_FLOOR else "which is noise") + "".join(others)

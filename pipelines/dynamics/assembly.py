@@ -7,10 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.effects import Effect, Side
+from pipelines.effects.backlash import Backlash
 from pipelines.effects.kernel import address, derivative, reaction, reading, spring, torque_reading
+from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.model import Model, Term
+
+MOTOR_SHARE = 0.04
+"""Of a joint's inertia that stays with its motor behind a spring, where the machine is no exoskeleton: as of a leg."""
 
 
 @reaction
@@ -93,7 +98,7 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
             )
         if sprung[joint[i]] >= 0:
             raise InputError(f"{effect.joint}: {effect.name} is a second transmission; a joint has one at most")
-        sprung[joint[i]], motor_inertia[joint[i]] = i, effect.motor_inertia
+        sprung[joint[i]], motor_inertia[joint[i]] = i, _motor_inertia(effect, model, geometry)
     return Assembly(
         joints=len(joints),
         bounds=np.searchsorted([_group(e, cuffed(effects)) for e in effects], np.arange(5)).astype(np.int64),
@@ -112,6 +117,21 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
         cuffed=cuffed(effects),
         geometry=geometry.array(),
     )
+
+
+def _motor_inertia(effect: Effect, model: Model, geometry: Geometry) -> float:
+    """Return what stays with the motor where its joint is not rigid, kg·m²; kg at a prismatic joint."""
+    if effect.on.is_exoskeleton:
+        return effect.motor_inertia
+    if isinstance(effect, Backlash):
+        raise InputError(
+            f"{effect.label}: the teeth that a simulation has are those of an exoskeleton's gear, too hard for a "
+            "machine of another size; leave the play out"
+        )
+    mechanism = effect.on.mechanism
+    X = np.sum([term.values for term in model if isinstance(term.effect, RigidBody)], axis=0)
+    j = effect.on.names.index(str(effect.joint))
+    return float(MOTOR_SHARE * mechanism.mass_matrix(np.zeros(len(mechanism.kinds)), X, geometry)[j, j])
 
 
 def in_order(model: Model) -> list[Term]:

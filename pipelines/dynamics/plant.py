@@ -12,7 +12,7 @@ from pipelines.dynamics.mobility import masses
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.machine import machine_of
+from pipelines.mechanics.machine import Machine, machine_of
 from pipelines.mechanics.motion import geometry_of
 from pipelines.model import Model, model_from_parameters
 
@@ -26,6 +26,11 @@ class Plant:
     joints: tuple[Joint, ...]
     run: str
     assembly: Assembly
+
+    @property
+    def machine(self) -> Machine:
+        """The machine it is a model of."""
+        return machine_of(self.joints, self.geometry)
 
     def metadata(self) -> dict:
         """Return what a file says of the plant: run, geometry and every parameter of every effect."""

@@ -70,6 +70,7 @@ def track(
 
     ``feedback_gain`` is Kv in N·m·s/rad, the settings' unless given.
     """
+    _refuse_other_joints(reference, plant)
     _refuse_short(reference, settings)
     if feedback_gain is None:
         feedback_gain = settings.feedback_gain_nm_s_rad
@@ -114,6 +115,14 @@ def _encoder(settings: SimulateSettings, samples: int, joints: int) -> Encoder:
         rad_per_count=2.0 * np.pi / counts if counts else 0.0,
         speed_share=float(1.0 - np.exp(-2.0 * np.pi * settings.speed_cutoff_hz * settings.step_s)),
     )
+
+
+def _refuse_other_joints(reference: Trajectory, plant: Plant) -> None:
+    if reference.joints != plant.joints:
+        told, expected = (
+            ", ".join(f"{joint.name} ({joint.kind})" for joint in joints) for joints in (reference.joints, plant.joints)
+        )
+        raise InputError(f"the reference moves {told}, expected the model's joints, {expected}; give one for these")
 
 
 def _refuse_short(reference: Trajectory, settings: SimulateSettings) -> None:

@@ -19,6 +19,7 @@ from pipelines.effects.payload_change import PayloadChange
 from pipelines.effects.presliding_hysteresis import PreslidingHysteresis
 from pipelines.effects.quadratic_drag import QuadraticDrag
 from pipelines.effects.rigid_body import RigidBody
+from pipelines.effects.rotor_coupling import RotorCoupling
 from pipelines.effects.rotor_inertia import RotorInertia
 from pipelines.effects.spasticity import Spasticity
 from pipelines.effects.stribeck_friction import StribeckFriction
@@ -41,6 +42,7 @@ EFFECTS: tuple[type[Effect], ...] = (
     FrictionWarmup,
     Cogging,
     RotorInertia,
+    RotorCoupling,
     Backlash,
     JointElasticity,
     ParallelSpring,

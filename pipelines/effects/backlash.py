@@ -30,6 +30,7 @@ class Backlash(Effect):
     source = "Nordin, Gutman (2002), Automatica 38(10): controlling mechanical systems with backlash, sec. 2"
     looks_like = "bursts of torque at 4 to 25 Hz wherever the load changes sign, and gravity that jumps there"
     confirm = "hold the motor and shake the link by hand: it moves freely by the play"
+    by_angle = True
     shape = (Parameter("play", "rad", "free travel from stop to stop", "p", (0.003, 0.06)),)
     motor_inertia = MOTOR_INERTIA
     known_to = 0.2
@@ -53,5 +54,5 @@ class Backlash(Effect):
         """
         j = self.column(motion)
         q = motion.q.copy()
-        q[:, j] -= 0.5 * shape[0] * np.tanh(motion.transmitted[0][:, j] / CROSSING_TORQUE)
+        q[:, j] -= 0.5 * shape[0] * np.tanh(motion.transmitted[0][:, j] / (CROSSING_TORQUE * self.scale.torque))
         return motion.with_state(q, motion.dq, motion.ddq)

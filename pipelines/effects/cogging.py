@@ -27,7 +27,7 @@ class Cogging(Effect):
     reported = (
         Parameter("amplitude", "N·m", "half of peak to peak", "A", (0.3, 4.0)),
         *shape,
-        Parameter("phase", "rad", "of the wave at angle zero", "phi", (-np.pi, np.pi)),
+        Parameter("phase", "rad", "of the wave at angle zero", "phi", (-np.pi, np.pi), of_joint=False),
     )
     parity = Parity.EVEN
 

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from pipelines.effects.kernel import columns_along, columns_along_with_memory, read_along
 from pipelines.mechanics.machine import THE_LEG, Machine
 from pipelines.mechanics.motion import Motion
-from pipelines.mechanics.units import unit_at
+from pipelines.mechanics.units import Scale, unit_at
 
 RUNS = ("exo_alone", "with_human")
 
@@ -67,12 +67,21 @@ class Parameter:
     """What it is where nobody says; a shape parameter that has one may be held in a fit."""
     forms: tuple[float, ...] = ()
     """Values that stand for the known members of a family of shapes; empty where the range is all there is."""
+    grain: float = 1.0
+    """Step of a search along what an effect oscillates with."""
     of_joint: bool = True
     """False where its unit is not the joint's: the phase of a rhythm is an angle at a prismatic joint too."""
 
     def at(self, machine: Machine, joint: str) -> "Parameter":
         """Return the parameter as it is at a joint of a machine."""
-        return replace(self, unit=unit_at(machine.joint(joint).kind, self.unit)) if self.of_joint else self
+        if not self.of_joint:
+            return self
+        scale, (low, high) = machine.scale(joint).of(self.unit), self.typical
+        return replace(
+            self, unit=unit_at(machine.joint(joint).kind, self.unit), typical=(scale * low, scale * high),
+            default=None if self.default is None else scale * self.default,
+            forms=tuple(scale * form for form in self.forms), grain=scale * self.grain,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -99,6 +108,8 @@ class Effect(ABC):
     """The only joints that can have it, by their place in the mechanism; None for any."""
     absorbed: ClassVar[Mapping[str, str]] = {}
     """Places of joints at which another parameter takes it up whole, and which."""
+    by_angle: ClassVar[bool] = False
+    """True where it shows only in a torque that depends on where the joints stand, as gravity's does."""
     whole_leg: ClassVar[bool] = False
     acts_in: ClassVar[tuple[str, ...]] = RUNS
     linear: ClassVar[tuple[Parameter, ...]] = ()
@@ -141,6 +152,29 @@ class Effect(ABC):
                 object.__setattr__(self, role, made)
         if self.name in THE_LEG.mechanism.reactions:
             object.__setattr__(self, "reaction", self.on.mechanism.reactions.get(self.name))
+
+    @classmethod
+    def possible(cls, machine: Machine) -> list[str | None]:
+        """Return the joints of a machine that can have it and show it; ``[None]`` where it is the whole machine's."""
+        mechanism = machine.mechanism
+        if cls.name in mechanism.absorbs or (cls.by_angle and not mechanism.bends):
+            return []
+        if cls.name in THE_LEG.mechanism.reactions and cls.name not in mechanism.reactions:
+            return []
+        if cls.joints is not None and not set(cls.joints) & set(mechanism.places):
+            return []
+        if cls.whole_leg:
+            return [None]
+        places = dict(zip(machine.names, mechanism.places, strict=True))
+        return [
+            name for name, place in places.items()
+            if (cls.joints is None or place in cls.joints) and place not in cls.absorbed
+        ]  # fmt: skip
+
+    @property
+    def scale(self) -> Scale:
+        """The scale of its joint, beside an exoskeleton's."""
+        return self.on.scale(self.joint) if self.joint else Scale()
 
     @property
     def fitted(self) -> tuple[Parameter, ...]:

@@ -104,7 +104,7 @@ _READ_ALONG = void(
     types.Array(float64, 3, "A"),
 )  # fmt: skip
 
-_SWING_ALONG = void(types.FunctionType(SPRING), vector, float64, float64, *(vector,) * 4, vector)
+_SWING_ALONG = void(types.FunctionType(SPRING), vector, float64, float64, float64, *(vector,) * 4, vector)
 
 MEMORY_SUBSTEPS = 8
 """Steps per sample along a measured motion: a presliding state turns over within a few milliseconds."""
@@ -118,9 +118,6 @@ SWING_SUBSTEPS = 4
 
 WIDEST_TWIST = 1.0
 """rad within which a swinging load begins at rest."""
-
-LEAST_INERTIA = 0.02
-"""kg·m² that any load has: a fit may make it negative where a light link hardly shows."""
 
 NUDGE = 1e-7
 """rad and rad/s of the difference quotients of a spring."""
@@ -241,11 +238,12 @@ def _twist_at_rest(kernel, values, torque, stiffness):
 
 
 @njit(_SWING_ALONG, **ALLOCATING_NOTHING)
-def swing_along(kernel, values, ratio, h, torque, inertia, damping, stiffness, out):
+def swing_along(kernel, values, ratio, least, h, torque, inertia, damping, stiffness, out):
     """Let a load swing on a spring along one unbroken stretch, from rest, the twist (n,) rad into ``out``.
 
     inertia twist'' + damping twist' + stiffness twist + spring(twist, twist') = torque, each but the spring given
-    by sample and linear between samples; ``ratio`` is that of damping added to what the spring has. The midpoint
+    by sample and linear between samples; ``ratio`` is that of damping added to what the spring has, ``least`` the
+    inertia that any load has: a fit may make it negative where a light link hardly shows. The midpoint
     rule, linearised at each step's begin, neither damps nor excites, and is stable however stiff the spring.
     """
     twist, rate = _twist_at_rest(kernel, values, torque[0], stiffness[0]), 0.0
@@ -255,7 +253,7 @@ def swing_along(kernel, values, ratio, h, torque, inertia, damping, stiffness, o
         for i in range(SWING_SUBSTEPS):
             share = (i + 0.5) / SWING_SUBSTEPS
             load = torque[n - 1] + share * (torque[n] - torque[n - 1])
-            mass = max(LEAST_INERTIA, inertia[n - 1] + share * (inertia[n] - inertia[n - 1]))
+            mass = max(least, inertia[n - 1] + share * (inertia[n] - inertia[n - 1]))
             drag = damping[n - 1] + share * (damping[n] - damping[n - 1])
             slope = stiffness[n - 1] + share * (stiffness[n] - stiffness[n - 1])
             passed = kernel(twist, rate, values)

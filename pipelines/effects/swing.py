@@ -13,6 +13,9 @@ from pipelines.mechanics.load import Load
 from pipelines.mechanics.motion import Motion
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 
+LEAST_INERTIA = 0.02
+"""kg·m² that any load of an exoskeleton has."""
+
 
 def behind_spring(
     motion: Motion, load: Load, direction: NDArray, effect: Effect, values: NDArray | tuple[float, ...], ratio: float
@@ -36,12 +39,13 @@ def behind_spring(
         swing on with every error of the load for ever.
     """
     along = [np.ascontiguousarray(part) for part in load.along(direction)]
+    least = LEAST_INERTIA * effect.scale.of("kg·m²")
     h, twist = 1.0 / motion.sample_rate_hz, np.zeros(len(motion))
     joints = np.flatnonzero(direction.any(axis=0))
     moved = [state.copy() for state in (motion.q, motion.dq, motion.ddq)]
     for stretch in motion.segments():
         parts = (part[stretch] for part in along)
-        swing_along(effect.spring, np.array(values, dtype=float), ratio, h, *parts, twist[stretch])
+        swing_along(effect.spring, np.array(values, dtype=float), ratio, least, h, *parts, twist[stretch])
         if stretch.stop - stretch.start < shortest(motion.sample_rate_hz, motion.cutoff_hz):
             continue
         turned = twist[stretch, np.newaxis] * direction[stretch, :][:, joints]

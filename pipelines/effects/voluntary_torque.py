@@ -30,7 +30,9 @@ class VoluntaryTorque(Effect):
     reported = (
         Parameter("amplitude", "N·m", "half of peak to peak", "A", (0.5, 10.0)),
         *shape,
-        Parameter("phase", "rad", "of the rhythm when the run begins", "phi", (-np.pi, np.pi), True, default=0.0),
+        Parameter(
+            "phase", "rad", "of the rhythm when the run begins", "phi", (-np.pi, np.pi), True, 0.0, of_joint=False
+        ),
         replace(linear[2], default=0.0),
     )
     parity = Parity.EVEN

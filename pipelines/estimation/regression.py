@@ -7,18 +7,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.errors import InputError
+from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.motion import Motion, Piece
 from pipelines.mechanics.run import Run
 from pipelines.model import Model
 from pipelines.signals.blocks import BlockAverage, dilate
 
 REVERSAL_SPEED = 0.04
-"""rad/s (m/s) below which the sign of the speed, and so friction, is not known."""
+"""rad/s below which the sign of an exoskeleton's speed, and so friction, is not known; others go slower or faster."""
 TURN_S = 0.075
 """Beside a turn, where measured forces and the filtered acceleration are not of the same moment."""
 REVERSAL_PADDING_S = 0.08
 """What a joint that stuck still does after it has come free."""
-MASK = f"|v| < {REVERSAL_SPEED:g} rad/s, padded {REVERSAL_PADDING_S:g} s"
 
 
 @dataclass(frozen=True)
@@ -73,9 +73,23 @@ def block_average(motion: Run) -> BlockAverage:
     return BlockAverage.lasting(0.025, motion.sample_rate_hz)
 
 
+def reversal_speeds(machine: Machine) -> NDArray:
+    """Return the speed of each joint below which its sign is not known, (J,) rad/s, m/s at a prismatic joint."""
+    return np.array([REVERSAL_SPEED * machine.scale(joint).speed for joint in machine.names])
+
+
+def mask_in_words(machine: Machine) -> str:
+    """Say which samples are left out for being near a reversal."""
+    speeds = reversal_speeds(machine)
+    units = [joint.unit("velocity") for joint in machine.joints]
+    said = [f"{v:.2g} {unit}" for v, unit in zip(speeds, units, strict=True)]
+    alike = said[:1] if len(set(said)) == 1 else [f"{s} ({name})" for s, name in zip(said, machine.names, strict=True)]
+    return f"|v| < {', '.join(alike)}, padded {REVERSAL_PADDING_S:g} s"
+
+
 def away_from_reversals(motion: Motion) -> NDArray:
     """Tell for each sample and joint whether it moves, and has moved for a while: (n, J) bool."""
-    slow = np.abs(motion.dq) < REVERSAL_SPEED
+    slow = np.abs(motion.dq) < reversal_speeds(motion.machine)
     return ~np.column_stack([dilate(column, _padding(motion)) for column in slow.T])
 
 

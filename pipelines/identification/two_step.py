@@ -22,6 +22,7 @@ from pipelines.estimation.problem import Problem, Training
 from pipelines.identification.runs import Runs, checked
 from pipelines.identification.validation import Validation, validate
 from pipelines.mechanics.run import Run
+from pipelines.mechanics.scale import on_one_scale
 from pipelines.model import Model, Term, baseline
 
 
@@ -76,7 +77,7 @@ def identify(motions: Sequence[Run], estimator: Estimator | None = None) -> Iden
         Where the motion cannot separate the parameters.
     """
     estimator = estimator or WeightedLeastSquares()
-    runs = checked(motions)
+    runs = checked(on_one_scale(motions))
     model = _model(runs)
     columns = model.linear_parameters
     training = Training(tuple(runs.of("train")), model)

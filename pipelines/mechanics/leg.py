@@ -133,6 +133,7 @@ LEG = Mechanism(
         Inertial("X4", "kg·m", "first moment of the thigh, shank's mass at the knee, about the hip", (1.0, 8.0)),
     ),
     along=_along,
+    bends=True,
     reactions={"rigid_body": _rigid_body, "mass_off_axis": _mass_off_axis, "payload_change": _payload_change},
     broken=_broken,
     inertia_forms=_inertia_forms,

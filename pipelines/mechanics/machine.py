@@ -10,6 +10,7 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.leg import LEG
 from pipelines.mechanics.mechanism import Mechanism
 from pipelines.mechanics.single import LIFT, PENDULUM, SLIDE, TURNTABLE
+from pipelines.mechanics.units import Scale
 
 MECHANISMS = (LEG, PENDULUM, TURNTABLE, LIFT, SLIDE)
 """All that there are, in plain sight. Adding one is a file and a line here."""
@@ -21,6 +22,8 @@ class Machine:
 
     mechanism: Mechanism = LEG
     joints: tuple[Joint, ...] = HIP_AND_KNEE
+    scales: tuple[Scale, ...] = ()
+    """Of each joint; empty where they are an exoskeleton's, or nobody has asked."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -30,6 +33,10 @@ class Machine:
     def joint(self, name: str) -> Joint:
         """Return the joint of a name."""
         return self.joints[self.names.index(name)]
+
+    def scale(self, name: str) -> Scale:
+        """Return the scale of the joint of a name."""
+        return self.scales[self.names.index(name)] if self.scales else Scale()
 
     def place(self, name: str) -> str:
         """Return what effects call the joint of a name: ``hip`` for a leg's first, whatever it is called."""
@@ -44,12 +51,14 @@ class Machine:
 THE_LEG = Machine()
 
 
-def machine_of(joints: Sequence[Joint], geometry: Geometry, source: Any = "") -> Machine:
+def machine_of(
+    joints: Sequence[Joint], geometry: Geometry, source: Any = "", scales: tuple[Scale, ...] = ()
+) -> Machine:
     """Return the machine with these joints; ``source`` begins the message where there is none."""
     kinds = tuple(joint.kind for joint in joints)
     for mechanism in MECHANISMS:
         if mechanism.kinds == kinds and mechanism.has_gravity in (None, geometry.gravity_m_s2 != 0.0):
-            return Machine(mechanism, tuple(joints))
+            return Machine(mechanism, tuple(joints), scales)
     found = ", ".join(f"{joint.name} ({joint.kind})" for joint in joints)
     raise InputError(
         f"{source or 'the machine'} has joints {found}, expected two revolute joints in series or a single "

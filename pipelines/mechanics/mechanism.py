@@ -42,6 +42,8 @@ class Mechanism:
     parameters: tuple[Inertial, ...]
     along: Callable[[NDArray, NDArray, NDArray, NDArray], NDArray]
     """Compiled: q, dq, ddq, each (n, J), and the geometry's array to the regressor, (n, J, p)."""
+    bends: bool
+    """Whether its torque depends on where the joints stand, and not on acceleration alone."""
     reactions: Mapping[str, Any] = field(hash=False, compare=False)
     """Compiled equations of effects that differ from mechanism to mechanism, by the effect's name, ``rigid_body``
     among them; an effect that is not listed cannot be there."""
@@ -50,6 +52,8 @@ class Mechanism:
     inertia_forms: Callable[[Geometry], NDArray] = field(hash=False, compare=False)
     """Symmetric B, (p, m, m): M(q) > 0 at every q if and only if the sum of X_i B_i is, the same conditions as a convex
     program wants them."""
+    absorbs: Mapping[str, str] = field(default_factory=dict, hash=False, compare=False)
+    """Effects that its own parameters take up whole, by name, and which parameters those are."""
 
     def regressor(self, q: NDArray, dq: NDArray, ddq: NDArray, geometry: Geometry) -> NDArray:
         """Return A along a motion, (n, J, p): torque (N·m, at a prismatic joint N) per unit of each parameter.

@@ -15,6 +15,7 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.leg import cuff_torque
 from pipelines.mechanics.load import Load, load_along
 from pipelines.mechanics.machine import Machine, machine_of
+from pipelines.mechanics.units import Scale
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 
 LOAD_CUTOFF_HZ = 5.0
@@ -66,6 +67,8 @@ class Motion:
     """(p,) inertial parameters of all that hangs behind the drive trains, where a fit has estimated them."""
     limb_body: NDArray | None = None
     """(p,) the same of the wearer's limb alone."""
+    scales: tuple[Scale, ...] = ()
+    """Of each joint beside an exoskeleton's (``mechanics/scale.py``); empty for an exoskeleton's."""
     file: str = ""
     metadata: dict[str, Any] = field(default_factory=dict)
 
@@ -76,7 +79,7 @@ class Motion:
     @cached_property
     def machine(self) -> Machine:
         """The machine that moved: its joints tell."""
-        return machine_of(joints_of(self.metadata), self.geometry, self.file)
+        return machine_of(joints_of(self.metadata), self.geometry, self.file, self.scales)
 
     @property
     def joint_metadata(self) -> list[dict[str, str]]:

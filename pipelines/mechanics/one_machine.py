@@ -10,10 +10,9 @@ def refuse_several_machines(motions: Sequence[Run]) -> None:
     """Refuse motions whose joints or geometry differ from the first one's."""
     first = motions[0]
     for other in motions[1:]:
-        if other.joints != first.joints:
+        if other.machine.joints != first.machine.joints:
             raise InputError(
-                f"{other.file} has joints {', '.join(other.joints)}, {first.file} has {', '.join(first.joints)}; "
-                "give runs of one machine"
+                f"{other.file} has joints {_named(other)}, {first.file} has {_named(first)}; give runs of one machine"
             )
         for key in ("thigh_length_m", "gravity_m_s2"):
             ours, theirs = getattr(first.geometry, key), getattr(other.geometry, key)
@@ -22,3 +21,9 @@ def refuse_several_machines(motions: Sequence[Run]) -> None:
                     f"{other.file} has {key} {theirs:g}, {first.file} has {ours:g}; give runs of one machine, "
                     "or correct the metadata"
                 )
+
+
+def _named(run: Run) -> str:
+    joints = run.machine.joints
+    alike = all(joint.kind == "revolute" for joint in joints)
+    return ", ".join(joint.name if alike else f"{joint.name} ({joint.kind})" for joint in joints)

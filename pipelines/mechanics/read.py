@@ -11,14 +11,29 @@ from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.kinematics import filtered, motion_table
 from pipelines.mechanics.motion import Motion, motion_from_table
-from pipelines.mechanics.run import StoredRun
+from pipelines.mechanics.run import Run, StoredRun
+from pipelines.mechanics.scale import on_one_scale
 from pipelines.settings.filter import FilterSettings
 from pipelines.settings.mechanism import MechanismSettings
 
 
-def geometry_from(settings: MechanismSettings) -> Geometry:
-    """Return the geometry that exoid.toml gives where a recording is silent."""
-    return Geometry(thigh_length_m=settings.thigh_length_m, gravity_m_s2=settings.gravity_m_s2)
+def geometry_from(settings: MechanismSettings) -> Geometry | None:
+    """Return the geometry that exoid.toml gives where a recording is silent; None where it gives none."""
+    if not settings.model_fields_set:
+        return None
+    return Geometry(**settings.geometry)
+
+
+def refuse_another_mechanism(settings: MechanismSettings, runs: Sequence[Run]) -> None:
+    """Refuse runs of another mechanism than exoid.toml speaks of, if it speaks of one."""
+    for run in runs if settings.model_fields_set else ():
+        if run.machine.mechanism.kinds != settings.kinds:
+            found = ", ".join(f"{joint.name} ({joint.kind})" for joint in run.machine.joints)
+            raise InputError(
+                f"{run.file} has joints {found}, expected those of exoid.toml's [mechanism]: "
+                f"{', '.join(settings.kinds)}; correct its name and joints, or give no exoid.toml: "
+                "files say themselves what they are of"
+            )
 
 
 def read_motion(path: Path, settings: FilterSettings | None = None, default_geometry: Geometry | None = None) -> Motion:
@@ -39,16 +54,18 @@ def read_motions(
     """
     _refuse_twins(paths)
     motions = [read_motion(path, settings, default_geometry) for path in paths]
-    return [replace(motion, file=name) for motion, name in zip(motions, _told_apart(paths), strict=True)]
+    named = [replace(motion, file=name) for motion, name in zip(motions, _told_apart(paths), strict=True)]
+    return on_one_scale(named)
 
 
-def read_runs(paths: Sequence[Path], settings: FilterSettings, default_geometry: Geometry) -> list[StoredRun]:
+def read_runs(paths: Sequence[Path], settings: FilterSettings, default_geometry: Geometry | None) -> list[StoredRun]:
     """Return the runs in several files as ``read_motions`` does, but read, and filtered, piece by piece."""
     _refuse_twins(paths)
-    return [
+    runs = [
         StoredRun(_motion_rows(path, settings), default_geometry, name)
         for path, name in zip(paths, _told_apart(paths), strict=True)
     ]
+    return on_one_scale(runs)
 
 
 def _motion_rows(path: Path, settings: FilterSettings) -> Rows:

@@ -1,7 +1,7 @@
 """A run to fit or to judge: all of it in memory, or read piece by piece from where it is stored."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol
@@ -14,6 +14,7 @@ from pipelines.contracts.windows import windows
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.motion import Motion, Piece, motion_from_table
+from pipelines.mechanics.units import Scale
 
 WINDOW = 2**16
 """Samples of a piece."""
@@ -33,6 +34,8 @@ class Run(Protocol):
     def joints(self) -> tuple[str, ...]: ...  # noqa: D102
     @property
     def machine(self) -> Machine: ...  # noqa: D102
+    @property
+    def scales(self) -> tuple[Scale, ...]: ...  # noqa: D102
     @property
     def geometry(self) -> Geometry: ...  # noqa: D102
     @property
@@ -57,8 +60,10 @@ class StoredRun:
 
     rows: Rows
     """``motion/1``."""
-    default_geometry: Geometry
+    default_geometry: Geometry | None
     file: str
+    scales: tuple[Scale, ...] = ()
+    """As a motion's."""
 
     @cached_property
     def _facts(self) -> Motion:
@@ -113,7 +118,7 @@ class StoredRun:
 
     def _motion(self, rows: Any) -> Motion:
         table = Table(rows.to_pandas(), self.rows.metadata, Path(self.file))
-        return motion_from_table(table, self.default_geometry)
+        return replace(motion_from_table(table, self.default_geometry), scales=self.scales)
 
     def pieces(self, margin: int) -> Iterator[Piece]:
         """Yield the run in its order, each piece with ``margin`` samples to both sides."""

@@ -93,6 +93,9 @@ def _inertia_forms_under_gravity(geometry: Geometry) -> NDArray:
     return np.array([[[1.0]], [[0.0]]])
 
 
+_ABSORBED = {"rotor_inertia": "X1", "torque_gain": "all parameters together"}
+"""What nothing but another joint, which carries the same links, could tell."""
+
 _INERTIA = Inertial("X1", "kg·m²", "inertia about the joint's axis, the drive's rotor included", (0.001, 10.0))
 _MASS = Inertial("X1", "kg", "mass along the axis, the drive's rotor included", (0.1, 200.0))
 
@@ -104,9 +107,11 @@ PENDULUM = Mechanism(
     has_gravity=True,
     parameters=(_INERTIA, Inertial("X2", "kg·m", "first moment of mass about the joint's axis", (0.01, 10.0))),
     along=_pendulum_along,
+    bends=True,
     reactions={"rigid_body": _pendulum, "mass_off_axis": _mass_off_axis, "payload_change": _payload_change},
     broken=_broken_inertia,
     inertia_forms=_inertia_forms_under_gravity,
+    absorbs=_ABSORBED,
 )
 
 TURNTABLE = Mechanism(
@@ -117,9 +122,11 @@ TURNTABLE = Mechanism(
     has_gravity=False,
     parameters=(_INERTIA,),
     along=_inertia_along,
+    bends=False,
     reactions={"rigid_body": _inertia},
     broken=_broken_inertia,
     inertia_forms=_inertia_forms,
+    absorbs=_ABSORBED,
 )
 
 LIFT = Mechanism(
@@ -133,9 +140,11 @@ LIFT = Mechanism(
         Inertial("X2", "N", "force that holds it still: its weight less a counterweight's", (-500.0, 500.0)),
     ),
     along=_lift_along,
+    bends=False,
     reactions={"rigid_body": _lift},
     broken=_broken_mass,
     inertia_forms=_inertia_forms_under_gravity,
+    absorbs=_ABSORBED | dict.fromkeys(("torque_offset", "coulomb_asymmetry"), "X2"),
 )
 
 SLIDE = Mechanism(
@@ -146,7 +155,9 @@ SLIDE = Mechanism(
     has_gravity=False,
     parameters=(_MASS,),
     along=_inertia_along,
+    bends=False,
     reactions={"rigid_body": _inertia},
     broken=_broken_mass,
     inertia_forms=_inertia_forms,
+    absorbs=_ABSORBED,
 )

@@ -1,4 +1,7 @@
-"""Units at a joint: what an effect says in radians and newton metres is metres and newtons at a prismatic joint."""
+"""Units at a joint: what an effect says in radians and newton metres is metres and newtons at a prismatic joint.
+
+And how a quantity of a unit grows with the machine: of twice the torque, a spring is twice as stiff.
+"""
 
 from typing import NamedTuple
 
@@ -11,9 +14,9 @@ class Unit(NamedTuple):
     prismatic: str
     """The same at a prismatic joint."""
     torque: int
-    displacement: int
+    travel: int
     speed: int
-    """Powers of the joint's torque, displacement and speed that a quantity of this unit grows with."""
+    """Powers of the joint's torque, travel and speed with which a quantity of this unit grows."""
 
 
 UNITS = {
@@ -26,10 +29,26 @@ UNITS = {
     "kg·m": Unit("kg", 1, 0, 0),
     "rad": Unit("m", 0, 1, 0),
     "rad/s": Unit("m/s", 0, 0, 1),
+    "rad/s²": Unit("m/s²", 0, -1, 2),
     "1/rad²": Unit("1/m²", 0, -2, 0),
     "1/turn": Unit("rad/m", 0, -1, 0),
 }
 """Others are the same at every joint: s, Hz, 1, °C."""
+
+
+class Scale(NamedTuple):
+    """How many times an exoskeleton's torque, speed and travel a joint has."""
+
+    torque: float = 1.0
+    speed: float = 1.0
+    travel: float = 1.0
+
+    def of(self, unit: str) -> float:
+        """Return how many times an exoskeleton's a quantity is, by its unit at a revolute joint."""
+        if unit not in UNITS:
+            return 1.0
+        power = UNITS[unit]
+        return float(self.torque**power.torque * self.travel**power.travel * self.speed**power.speed)
 
 
 def unit_at(kind: Kind, unit: str) -> str:

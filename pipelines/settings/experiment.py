@@ -29,7 +29,7 @@ def _four_runs() -> tuple[RunSettings, ...]:
 class Experiment(Settings):
     """All settings of one experiment; every key has a default."""
 
-    mechanism: MechanismSettings = Field(MechanismSettings(), description="The leg's geometry.")
+    mechanism: MechanismSettings = Field(MechanismSettings(), description="The machine's joints and geometry.")
     design: DesignSettings = Field(DesignSettings(), description="The excitation.")
     acquire: AcquireSettings = Field(AcquireSettings(), description="Recording.")
     run: tuple[RunSettings, ...] = Field(default_factory=_four_runs, description="The runs, in order.")

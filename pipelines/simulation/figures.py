@@ -8,6 +8,7 @@ import pandas as pd
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
 from pipelines.plots import BLUE, GREY, ORANGE, STYLE, save
@@ -30,7 +31,7 @@ def draw_sweep(sweep: pd.DataFrame, joints: tuple[Joint, ...], folder: Path, cho
     with plt.rc_context(STYLE):
         figure, axis = plt.subplots(figsize=(6, 3.6))
         gains = sweep["feedback_gain_nm_s_rad"]
-        for joint, colour in zip(joints, JOINT_COLOURS, strict=True):
+        for joint, colour in zip(joints, JOINT_COLOURS, strict=False):
             axis.plot(gains, 1e3 * sweep[joint.column("error")], "o-", ms=3.5, color=colour, label=joint.name)
         axis.axvline(chosen, color=GREY, lw=0.9, ls=":")
         axis.annotate(
@@ -50,7 +51,12 @@ def draw_replay(
     with plt.rc_context(STYLE):
         columns = 1 if closed_loop is None else 2
         figure, axes = plt.subplots(
-            4, columns, figsize=(6 * columns, 8), sharex="col", squeeze=False, height_ratios=[2, 1, 2, 1]
+            2 * len(joints),
+            columns,
+            figsize=(6 * columns, 4 * len(joints)),
+            sharex="col",
+            squeeze=False,
+            height_ratios=[2, 1] * len(joints),
         )
         for j, joint in enumerate(joints):
             _windows(axes[2 * j, 0], axes[2 * j + 1, 0], open_loop, joint)
@@ -68,8 +74,13 @@ def draw_replay(
         save(figure, stem)
 
 
-def _tracking(frame: pd.DataFrame, joints: Iterable[Joint]) -> Figure:
-    figure, axes = plt.subplots(2, 1, figsize=(8, 4.6), sharex=True)
+def _panels(joints: tuple[Joint, ...]) -> tuple[Figure, NDArray]:
+    figure, axes = plt.subplots(len(joints), 1, figsize=(8, 2.3 * len(joints)), sharex=True, squeeze=False)
+    return figure, axes[:, 0]
+
+
+def _tracking(frame: pd.DataFrame, joints: tuple[Joint, ...]) -> Figure:
+    figure, axes = _panels(joints)
     for axis, joint in zip(axes, joints, strict=True):
         axis.plot(frame["time_s"], frame[joint.column("reference")], color=GREY, lw=2.6, label="wanted")
         axis.plot(frame["time_s"], frame[joint.column("angle")], color=ORANGE, lw=1.0, label="simulated")
@@ -77,9 +88,9 @@ def _tracking(frame: pd.DataFrame, joints: Iterable[Joint]) -> Figure:
     return _finished(figure, axes, "The leg follows its reference")
 
 
-def _error(frame: pd.DataFrame, joints: Iterable[Joint], settled_after_s: float) -> Figure:
+def _error(frame: pd.DataFrame, joints: tuple[Joint, ...], settled_after_s: float) -> Figure:
     """Draw the error from where it has settled on; how it began is told in words, or it would flatten the rest."""
-    figure, axes = plt.subplots(2, 1, figsize=(8, 4.6), sharex=True)
+    figure, axes = _panels(joints)
     for axis, joint in zip(axes, joints, strict=True):
         error = 1e3 * frame[joint.column("error")]
         worst = error[frame["time_s"] >= settled_after_s].abs().max()
@@ -87,13 +98,14 @@ def _error(frame: pd.DataFrame, joints: Iterable[Joint], settled_after_s: float)
         axis.axhline(0, color="black", lw=0.6)
         axis.plot(frame["time_s"], error, color=BLUE, lw=1.0, label="error")
         axis.set_ylim(-4 * worst, 4 * worst)
-        axis.set_ylabel(f"{joint.name} error, mrad")
-        axis.set_title(f"settled within ± {worst:.1f} mrad", loc="left", fontsize=9)
+        unit = f"m{joint.unit('angle')}"
+        axis.set_ylabel(f"{joint.name} error, {unit}")
+        axis.set_title(f"settled within ± {worst:.1f} {unit}", loc="left", fontsize=9)
     return _finished(figure, axes, "What is left between reference and leg")
 
 
-def _torque(frame: pd.DataFrame, joints: Iterable[Joint], limit_nm: float) -> Figure:
-    figure, axes = plt.subplots(2, 1, figsize=(8, 4.6), sharex=True)
+def _torque(frame: pd.DataFrame, joints: tuple[Joint, ...], limit_nm: float) -> Figure:
+    figure, axes = _panels(joints)
     for axis, joint in zip(axes, joints, strict=True):
         torque = frame[joint.column("torque")]
         axis.plot(frame["time_s"], torque, color=ORANGE, lw=1.0, label="torque")
@@ -126,11 +138,11 @@ def _windows(angles: Axes, errors: Axes, frame: pd.DataFrame, joint: Joint) -> N
     errors.axhline(0, color="black", lw=0.6)
     errors.plot(time, 1e3 * frame[joint.column("error")], color=BLUE, lw=0.9)
     angles.set_ylabel(f"{joint.name} angle, {joint.unit('angle')}")
-    errors.set_ylabel("error, mrad")
+    errors.set_ylabel(f"error, m{joint.unit('angle')}")
 
 
 def _torques(torques: Axes, errors: Axes, frame: pd.DataFrame, joint: Joint) -> None:
-    measured = frame[joint.column("torque").replace("torque", "torque_measured")]
+    measured = frame[joint.column("torque_measured")]
     torques.plot(frame["time_s"], measured, color=GREY, lw=1.8)
     torques.plot(frame["time_s"], frame[joint.column("torque")], color=ORANGE, lw=0.9)
     errors.axhline(0, color="black", lw=0.6)

@@ -151,5 +151,5 @@ def closed_loop_frame(made: UnderReferences, motion: Motion, joints: tuple[Joint
         columns[joint.column("torque")] = made.torque[:, j]
         columns[joint.column("network")] = np.nan
         columns[joint.column("angle_measured")] = motion.q[:, j]
-        columns[joint.column("torque").replace("torque", "torque_measured")] = motion.torque[:, j]
+        columns[joint.column("torque_measured")] = motion.torque[:, j]
     return pd.DataFrame(columns)

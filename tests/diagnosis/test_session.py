@@ -58,9 +58,16 @@ def test_joints_that_take_turns_are_never_scored_and_refused(motions):
         diagnose(taking_turns)
 
 
-def test_machines_whose_causes_are_not_written_are_refused(motions):
+def test_mechanisms_that_exoid_does_not_know_are_refused(motions):
+    telescope = {"joints": [{"name": "hip", "kind": "revolute"}, {"name": "knee", "kind": "prismatic"}]}
+    strange = [replace(m, metadata=m.metadata | telescope) for m in motions]
+    with pytest.raises(InputError, match=r"has joints hip \(revolute\), knee \(prismatic\), expected two"):
+        diagnose(strange)
+
+
+def test_runs_whose_joints_have_other_names_are_of_several_machines(motions):
     ankle = {"joints": [{"name": "hip", "kind": "revolute"}, {"name": "ankle", "kind": "revolute"}]}
-    with pytest.raises(InputError, match=r"run_1.parquet has joints hip \(revolute\), ankle \(revolute\), expected"):
+    with pytest.raises(InputError, match=r"run_1.parquet has joints hip, ankle, run_0.parquet has hip, knee"):
         diagnose([motions[0], replace(motions[1], metadata=motions[1].metadata | ankle), *motions[2:]])
 
 

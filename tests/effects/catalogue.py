@@ -17,6 +17,7 @@ SIZES = {
     "friction_warmup": (3.0, 1.5, 10.0),
     "cogging": (1.5, 11.0, 0.6),
     "rotor_inertia": (0.3,),
+    "rotor_coupling": (0.04,),
     "backlash": (0.02,),
     "joint_elasticity": (600.0,),
     "parallel_spring": (10.0, -0.3),

@@ -25,7 +25,7 @@ def swung(stiffness, torque, inertia, ratio=0.0, h=0.005):
     """Return the twist of a constant inertia on an elastic joint's spring."""
     twist, zero = np.empty(len(torque)), np.zeros(len(torque))
     spring = JointElasticity("hip").spring
-    swing_along(spring, np.array([stiffness]), ratio, h, torque, zero + inertia, zero, zero, twist)
+    swing_along(spring, np.array([stiffness]), ratio, 0.02, h, torque, zero + inertia, zero, zero, twist)
     return twist
 
 

@@ -55,8 +55,8 @@ class Averages:
 
 
 def averages(motion: Motion) -> Averages | None:
-    """Average over blocks that can be trusted; None where the machine is no hip and knee, or too few are left."""
-    if motion.joints != ("hip", "knee"):
+    """Average over blocks that can be trusted; None where the machine has no second joint, or too few are left."""
+    if motion.machine.mechanism is not LEG:
         return None
     block = BlockAverage.lasting(BLOCK_S, motion.sample_rate_hz)
     starts = block.starts(motion.segment)

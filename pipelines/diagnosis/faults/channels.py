@@ -26,7 +26,8 @@ STUCK_ANGLE_S = 0.25
 JUMP = 3.0
 """Times the largest step of the moving joint: no joint catches up like that."""
 HELD_S, HELD_RAD = 1.0, 0.1
-"""A joint that friction holds for longer than this, while its set-point goes as far, is not held by friction."""
+"""A joint that friction holds for longer than this, while its set-point goes as far, is not held by friction. At a
+prismatic joint the way is in proportion to the joint's."""
 ALONE_S, ALONE = 2.0, 3.0
 """Without a set-point: this long, and so many times the longest other standstill."""
 STUCK_TORQUE_S = 0.15
@@ -115,11 +116,16 @@ def _impossible(motion: Motion, joint: int, angle: NDArray, stretch: NDArray, ot
         return True
     seconds = (stop - start) / motion.sample_rate_hz
     if motion.reference is not None and np.isfinite(motion.reference[start:stop, joint]).all():
-        return seconds > HELD_S and np.ptp(motion.reference[start:stop, joint]) > HELD_RAD
+        return seconds > HELD_S and np.ptp(motion.reference[start:stop, joint]) > _held(motion, joint)
     rest = [j for j in range(motion.q.shape[1]) if j != joint]
-    moved = max((np.ptp(motion.q[start:stop, j]) for j in rest), default=0.0)
+    moved = max((np.ptp(motion.q[start:stop, j]) / _held(motion, j) for j in rest), default=0.0)
     longest = others.max(initial=0) / motion.sample_rate_hz
-    return 0 < start and seconds > max(ALONE_S, ALONE * longest) and moved > HELD_RAD
+    return 0 < start and seconds > max(ALONE_S, ALONE * longest) and moved > 1.0
+
+
+def _held(motion: Motion, joint: int) -> float:
+    """Return how far a set-point, or another joint, must go for a standstill to be impossible."""
+    return HELD_RAD * motion.machine.scale(motion.joints[joint]).travel
 
 
 def _torque(motion: Motion, joint: int) -> Iterator[Fault]:
@@ -133,7 +139,8 @@ def _torque(motion: Motion, joint: int) -> Iterator[Fault]:
     tops, stuck = flat[at_top], flat[~at_top & lasts & moving]
     samples = mask_of(tops, len(torque))
     if len(tops) > 1 and samples.sum() >= SATURATED:
-        limits = " and ".join(f"{value:.4g} N·m" for value in sorted({torque[a] for a, _ in tops}))
+        unit = motion.machine.joints[joint].unit("torque")
+        limits = " and ".join(f"{value:.4g} {unit}" for value in sorted({torque[a] for a, _ in tops}))
         yield Fault(
             motion.file,
             channel,

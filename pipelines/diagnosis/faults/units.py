@@ -29,7 +29,7 @@ NOTHING = 1e-4
 LAW_HOLDS = 0.8
 """Of the torque's power that a position loop must explain before its gain is compared."""
 LARGEST_ANGLE_RAD = np.pi
-"""No joint of a leg goes further from its zero."""
+"""No joint of a leg goes further from its zero; a pendulum may turn over."""
 TORQUE_UNITS = {
     "N·mm": 1e3, "N·cm": 1e2, "kgf·cm": 10.197, "lbf·in": 8.851, "ozf·in": 141.6, "kgf·m": 0.10197, "kN·m": 1e-3,
 }  # fmt: skip
@@ -50,7 +50,7 @@ def angle_unit_faults(motion: Motion) -> Iterator[Fault]:
                 f"{channel} is in {unit}: it moves {factor:.3g} times as far as its set-point, all along; "
                 "set the channel's scale in the rig file",
             )
-        elif len(q) and column(motion, j, "angle").endswith("_rad") and np.abs(q).max() > LARGEST_ANGLE_RAD:
+        elif len(q) and motion.machine.is_exoskeleton and np.abs(q).max() > LARGEST_ANGLE_RAD:
             yield Fault(
                 motion.file,
                 channel,
@@ -118,7 +118,9 @@ def drive_law(motion: Motion, joint: int) -> float | None:
 def _against_the_other_joint(run: Averages) -> dict[int, tuple[float, str]]:
     """Return the joints whose torque is in another unit, judged by the shank, which both drives carry."""
     moment, scale = shank(run)
-    typical = SHANK_KG_M[run.motion.run]
+    of_a_leg = run.motion.machine.is_exoskeleton
+    # What another machine's second link weighs, nobody knows beforehand: then the first joint's torque is the measure.
+    typical = SHANK_KG_M[run.motion.run] if of_a_leg else moment
     if min(moment, scale) < NOTHING or any(
         fit(run.joint_columns(j), run.torque[:, j])[0] > 1.0 - EXPLAINED for j in range(2)
     ):
@@ -128,9 +130,11 @@ def _against_the_other_joint(run: Averages) -> dict[int, tuple[float, str]]:
         if 1 / IMPOSSIBLE < by_knee < IMPOSSIBLE:
             return {}
         return {j: (by_knee, "the weight of a leg") for j in range(2)}
+    first, second = run.motion.joints
+    link = "shank" if of_a_leg else "link"
     if abs(np.log(by_knee)) > abs(np.log(by_hip)):
-        return {1: (1 / scale, "the hip, which carries the same shank")}
-    return {0: (scale, "the knee, which carries the same shank")}
+        return {1: (1 / scale, f"the {first}, which carries the same {link}")}
+    return {0: (scale, f"the {second}, which carries the same {link}")}
 
 
 def shank(run: Averages) -> tuple[float, float]:
@@ -154,7 +158,8 @@ def _between_runs(runs: Sequence[Averages]) -> Iterator[Fault]:
                 continue
             odd, like = (second, first) if _less_plausible(second, first) else (first, second)
             times = factor if odd is second else 1 / max(factor, 1e-6)
-            yield _torque_fault(odd, j, times, f"{like.motion.file}, another run of the same leg")
+            whose = "leg" if odd.motion.machine.is_exoskeleton else "machine"
+            yield _torque_fault(odd, j, times, f"{like.motion.file}, another run of the same {whose}")
 
 
 def _times_predicted(run: Averages, multiples: NDArray, joint: int) -> float:
@@ -164,6 +169,9 @@ def _times_predicted(run: Averages, multiples: NDArray, joint: int) -> float:
 
 
 def _less_plausible(run: Averages, than: Averages) -> bool:
+    if not run.motion.machine.is_exoskeleton:
+        return True  # one of the two, and nothing tells which
+
     def distance(one: Averages) -> float:
         return abs(float(np.log(max(shank(one)[0], 1e-6) / SHANK_KG_M[one.motion.run])))
 

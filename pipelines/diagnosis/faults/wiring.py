@@ -96,6 +96,7 @@ def wiring_faults(run: Averages) -> Iterator[Fault]:
         f"{_percent(misfit(as_recorded))} as recorded"
     )
     if best[4] == SIGN and (mirror := MIRROR_IMAGES.get(best[3])):
+        mirror = mirror.replace("hip", run.motion.joints[HIP])
         why += f" (so they would with {mirror} reversed instead: a mirror image)"
     say = _reversed if best[4] == SIGN else _exchanged
     yield say(run.motion, best[3], why)

@@ -12,6 +12,7 @@ from pipelines.diagnosis.dependence import VARIABLES, Variable, knows, pooled, t
 from pipelines.diagnosis.diagnose import Diagnosis
 from pipelines.diagnosis.figures.palette import AFTER, BEFORE, NOISE
 from pipelines.diagnosis.observations import Run
+from pipelines.mechanics.units import unit_at
 
 BINS, FEWEST = 40, 8
 """Of a running mean, and the blocks that a bin needs to have one."""
@@ -49,7 +50,7 @@ def against(name: str, d: Diagnosis, joint: str, kinds: Sequence[str]) -> Agains
     if variable is None:
         label, x = _along_tone(runs, [b - a if d.causes else b for b, a in zip(before, after, strict=True)], j)
     else:
-        label = f"{_title(variable, d.baseline.joints, j)}, {variable.unit}"
+        label = f"{_title(variable, d.baseline.joints, j)}, {unit_at(d.baseline.machine.joints[j].kind, variable.unit)}"
         x = [np.asarray(variable.of(run, j)) for run in runs]
     return Against(
         label=label,

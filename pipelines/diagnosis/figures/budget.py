@@ -24,13 +24,15 @@ COLOURS = {FLOOR: NOISE, REPEATS: AFTER, WANDERS: "#93b4f5", LEFT: AFTER}
 CAUSES = (CAUSE, "#f59e0b", "#7c2d12")
 ROOM = 0.07
 """Share of a bar that a number needs to stand in it."""
+SMALL = 0.095
+"""Root mean square below which two digits are written, not two decimals."""
 NEGLIGIBLE = 0.005
 """Share of a bar that is not worth a line."""
 
 
 def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
-    """Draw a bar for each joint, and beside it every share in N·m."""
-    budget = said["error_budget"]
+    """Draw a bar for each joint, and beside it every share in N·m, at a prismatic joint in N."""
+    budget, units = said["error_budget"], {joint: of["torque"] for joint, of in said["units"].items()}
     drawn, axes = plt.subplots(len(budget), 1, figsize=(9, 0.6 + 1.5 * len(budget)), squeeze=False)
     colours = colours_of(budget)
     for axis, (joint, shares) in zip(axes[:, 0], budget.items(), strict=True):
@@ -38,13 +40,17 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
         stack(axis, 0.0, shares, colours)
         axis.set_yticks([])
         axis.set_xlim(min(lowest(shares), 0.0) * 1.05, 1.02 * highest(shares))
-        axis.set_title(f"{joint}: {np.sqrt(total):.2f} N·m rms with rigid body and friction", loc="left", fontsize=9)
+        axis.set_title(f"{joint}: {rms(total)} {units[joint]} rms with rigid body and friction", loc="left", fontsize=9)
         axis.legend(
-            [Patch(color=colours[key]) for key in shares], [_line(key, share, total) for key, share in shares.items()],
+            [Patch(color=colours[key]) for key in shares],
+            [_line(key, share, total, units[joint]) for key, share in shares.items()],
             loc="center left", bbox_to_anchor=(1.01, 0.5),
         )  # fmt: skip
-    axes[-1, 0].set_xlabel("mean square of the torque error on runs no fit has seen, (N·m)²")
-    drawn.suptitle("What the torque error is made of", x=0.02, ha="left", fontweight="bold")
+    unit = units[list(budget)[-1]]
+    axes[-1, 0].set_xlabel(
+        f"mean square of the {'force' if unit == 'N' else 'torque'} error on runs no fit has seen, ({unit})²"
+    )
+    drawn.suptitle("What the error is made of", x=0.02, ha="left", fontweight="bold")
     drawn.tight_layout()
     return drawn
 
@@ -88,13 +94,14 @@ def lowest(shares: Mapping[str, float]) -> float:
 
 
 def rms(share: float) -> str:
-    """Return a mean square as root mean square, in N·m; minus where it is taken from the others."""
-    return f"{'−' if share < 0 else ''}{np.sqrt(abs(share)):.2f}"
+    """Return a mean square as root mean square; minus where it is taken from the others."""
+    root = np.sqrt(abs(share))
+    return f"{'−' if share < 0 else ''}{root:.2f}" if root > SMALL else f"{'−' if share < 0 else ''}{root:.2g}"
 
 
-def _line(key: str, share: float, total: float) -> str:
+def _line(key: str, share: float, total: float, unit: str) -> str:
     if abs(share) < NEGLIGIBLE * total:
         return f"{words_of(key)}: none"
     if share < 0:
-        return f"{words_of(key)}: makes it worse by {rms(-share)} N·m rms, {-share / total:.0%} of the square"
-    return f"{words_of(key)}: {rms(share)} N·m rms, {share / total:.0%} of the square"
+        return f"{words_of(key)}: makes it worse by {rms(-share)} {unit} rms, {-share / total:.0%} of the square"
+    return f"{words_of(key)}: {rms(share)} {unit} rms, {share / total:.0%} of the square"

@@ -30,7 +30,7 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
             axis.set_title(_foretold(one, bool(d.causes)), fontsize=8)
         for axis in row[len(ranking) :]:
             axis.set_axis_off()
-        row[0].set_ylabel(f"{joint} residual, N·m")
+        row[0].set_ylabel(f"{joint} residual, {said['units'][joint]['torque']}")
     names = ["before"] + ["after"] * bool(d.causes)
     lines = [Line2D([], [], color=colour, lw=1.8) for colour in (BEFORE, AFTER)]
     drawn.legend(lines[: len(names)], names, loc="upper right", ncols=2)

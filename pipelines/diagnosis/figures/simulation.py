@@ -10,8 +10,11 @@ from matplotlib.figure import Figure
 from pipelines.diagnosis.diagnose import Diagnosis
 from pipelines.diagnosis.examined import Extended
 from pipelines.diagnosis.figures.palette import AFTER, BEFORE, MEASURED, NOISE
+from pipelines.diagnosis.label import number, quantity
 from pipelines.diagnosis.replayed import Stretch, simulated_error, worst_stretch
 
+NARROWEST = 8.0
+"""Inches that the titles need."""
 FAR_MRAD = 500.0
 """Error beyond which a window has nothing more to show."""
 
@@ -20,7 +23,12 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
     """Draw angle, angle error, torque and torque error of each joint, a column each."""
     joints, stretch = d.baseline.joints, worst_stretch(d)
     drawn, axes = plt.subplots(
-        4, len(joints), figsize=(5.2 * len(joints), 7.6), sharex=True, squeeze=False, height_ratios=[2, 1.3, 2, 1.3]
+        4,
+        len(joints),
+        figsize=(max(5.2 * len(joints), NARROWEST), 7.6),
+        sharex=True,
+        squeeze=False,
+        height_ratios=[2, 1.3, 2, 1.3],
     )
     models = [("rigid body and friction", BEFORE, d.before)]
     models += [("with the causes", AFTER, d.after)] if d.causes else []
@@ -29,7 +37,9 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
         column[1].axhline(0, color="black", lw=0.6)
         column[3].axhspan(-d.floor.rms[j], d.floor.rms[j], color=NOISE, alpha=0.6, lw=0, label="noise floor")
         column[0].set_title(f"{joint}: 1 s simulations stray {_strayed(said, joint)}", loc="left", fontsize=9)
-        column[2].set_title(f"{joint}: torque is off by {_off(said, joint)}", loc="left", fontsize=9)
+        column[2].set_title(
+            f"{joint}: {quantity(d.baseline.machine, joint)} is off by {_off(d, said, joint)}", loc="left", fontsize=9
+        )
         column[-1].set_xlabel("time, s")
     for name, colour, made in models:
         _angles(axes[0], axes[1], made, d, stretch, name, colour)
@@ -37,8 +47,12 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
     for error in axes[1]:
         low, high = error.get_ylim()
         error.set_ylim(max(low, -FAR_MRAD), min(high, FAR_MRAD))
-    for row, words in zip(axes, ("angle, rad", "angle error, mrad", "torque, N·m", "torque error, N·m"), strict=True):
-        row[0].set_ylabel(words)
+    # All joints of the mechanisms there are, are of one kind.
+    angle, torque = (said["units"][joints[0]][quantity] for quantity in ("angle", "torque"))
+    where, push = ("position", "force") if torque == "N" else ("angle", "torque")
+    words = (f"{where}, {angle}", f"{where} error, m{angle}", f"{push}, {torque}", f"{push} error, {torque}")
+    for row, label in zip(axes, words, strict=True):
+        row[0].set_ylabel(label)
     lines = [axis.get_legend_handles_labels() for axis in (axes[0, 0], axes[3, 0])]
     drawn.legend([h for some, _ in lines for h in some], [w for _, some in lines for w in some],
                  loc="upper left", bbox_to_anchor=(0.01, 0.965), ncols=4)  # fmt: skip
@@ -59,14 +73,16 @@ def _strayed(said: dict[str, Any], joint: str) -> str:
     words = f"{1e3 * before:.1f}"
     if said["causes"]:
         words += f" → {1e3 * after:.1f}" if after is not None else " → not to be simulated, and so by"
-    return f"{words} mrad rms"
+    return f"{words} m{said['units'][joint]['angle']} rms"
 
 
-def _off(said: dict[str, Any], joint: str) -> str:
-    words = f"{said['baseline_rmse_nm'][joint]:.2f}"
+def _off(d: Diagnosis, said: dict[str, Any], joint: str) -> str:
+    machine = d.baseline.machine
+    words = number(machine, said["baseline_rmse_nm"][joint])
     if said["causes"]:
-        words += f" → {said['extended_rmse_nm'][joint]:.2f}"
-    return f"{words} N·m rms, noise floor {said['noise_floor_nm'][joint]:.2f}"
+        words += f" → {number(machine, said['extended_rmse_nm'][joint])}"
+    floor = number(machine, said["noise_floor_nm"][joint])
+    return f"{words} {machine.joint(joint).unit('torque')} rms, noise floor {floor}"
 
 
 def _measured(angle: Axes, torque: Axes, d: Diagnosis, stretch: Stretch, j: int) -> None:

@@ -3,7 +3,6 @@
 import textwrap
 from typing import Any
 
-import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,7 +12,7 @@ from matplotlib.patches import Patch
 from pipelines.diagnosis.dependence import VARIABLES, knows, tone, variable_share
 from pipelines.diagnosis.diagnose import Diagnosis
 from pipelines.diagnosis.figures.against import against, draw, reach
-from pipelines.diagnosis.figures.budget import colours_of, highest, lowest, stack, words_of
+from pipelines.diagnosis.figures.budget import colours_of, highest, lowest, rms, stack, words_of
 from pipelines.diagnosis.figures.palette import AFTER, BEFORE, NOISE
 from pipelines.diagnosis.label import effect_labelled, in_words
 from pipelines.effects import RUNS
@@ -46,13 +45,16 @@ def _budget(axis: Axes, said: dict[str, Any]) -> None:
     for row, (joint, shares) in enumerate(budget.items()):
         stack(axis, row, shares, colours, scale=100.0 / totals[joint])
     axis.set_yticks(
-        range(len(budget)), [f"{joint}\n{np.sqrt(total):.2f} N·m" for joint, total in totals.items()], fontsize=9
+        range(len(budget)),
+        [f"{joint}\n{rms(total)} {said['units'][joint]['torque']}" for joint, total in totals.items()],
+        fontsize=9,
     )
     axis.set_ylim(len(budget) - 0.5, -0.5)
     ends = [(lowest(shares) * 100 / totals[joint], highest(shares) * 100 / totals[joint])
             for joint, shares in budget.items()]  # fmt: skip
     axis.set_xlim(min(low for low, _ in ends), max(high for _, high in ends))
-    axis.set_xlabel("share of the mean square torque error, %; numbers: N·m rms")
+    units = " and ".join(dict.fromkeys(of["torque"] for of in said["units"].values()))
+    axis.set_xlabel(f"share of the mean square error, %; numbers: {units} rms")
     there = [key for key in next(iter(budget.values()))
              if any(abs(shares[key]) > 0.01 * totals[joint] for joint, shares in budget.items())]  # fmt: skip
     axis.legend(
@@ -73,7 +75,7 @@ def _shape(axis: Axes, d: Diagnosis, said: dict[str, Any]) -> None:
     floor = float(d.floor.rms[j])
     seen = against(variable, d, joint, kinds)
     draw(axis, seen, floor, max(reach(seen.before, seen.after), 2 * floor), bool(d.causes))
-    axis.set_ylabel(f"{joint} torque error, N·m")
+    axis.set_ylabel(f"{joint} error, {said['units'][joint]['torque']}")
     lines = [("rigid body and friction", BEFORE)]
     named = " and ".join(in_words(effect_labelled(label)) for label in d.causes)
     lines += [(f"with {named}", AFTER)] if d.causes else []

@@ -1,0 +1,122 @@
+"""Machines that are no leg: what a servo or a ball screw hides is named, in its own units and at its own scale."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from pipelines.contracts.joints import Joint
+from pipelines.diagnosis.candidate_table import candidates
+from pipelines.diagnosis.candidates import proposals
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.verdict import verdict
+from pipelines.dynamics.assembly import assemble
+from pipelines.effects.backlash import Backlash
+from pipelines.errors import InputError
+from pipelines.identification import identify
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.kinematics import motion_table
+from pipelines.mechanics.machine import THE_LEG, machine_of
+from pipelines.mechanics.motion import motion_from_table
+from pipelines.mechanics.scale import on_one_scale
+from pipelines.model import Model, Term, baseline
+from pipelines.settings.filter import FilterSettings
+from tests.diagnosis.machines import pendulum, slide
+
+
+@cache
+def motions(machine, **hidden):
+    tables = [machine("train", 1, **hidden), machine("validate", 2, **hidden)]
+    made = [motion_from_table(motion_table(table, FilterSettings())) for table in tables]
+    return [replace(m, file=f"{m.purpose}.parquet") for m in made]
+
+
+def labels(machine):
+    return {effect.label for effect in proposals(machine, ("exo_alone",))}
+
+
+@pytest.fixture(scope="module")
+def servo():
+    found = diagnose(motions(pendulum, spring=0.8))
+    return found, verdict(found)
+
+
+@pytest.fixture(scope="module")
+def screw():
+    found = diagnose(motions(slide, asymmetry=-80.0))
+    return found, verdict(found)
+
+
+def test_a_spring_at_a_small_servo_is_named_with_its_size(servo):
+    _, said = servo
+    (cause,) = said["causes"]
+    assert (cause["effect"], cause["joint"], said["status"]) == ("parallel_spring", "arm", "explained")
+    stiffness, rest = cause["parameters"]
+    assert stiffness["value"] == pytest.approx(0.8, rel=0.05)
+    assert stiffness["ci95"][0] < 0.8 < stiffness["ci95"][1]
+    assert (rest["value"], rest["unit"]) == (pytest.approx(0.3, abs=0.03), "rad")
+
+
+def test_friction_that_differs_with_direction_is_named_at_a_ball_screw_in_newtons(screw):
+    found, said = screw
+    (cause,) = said["causes"]
+    assert (cause["effect"], cause["joint"]) == ("viscous_asymmetry", "axis")
+    (asymmetry,) = cause["parameters"]
+    assert (asymmetry["value"], asymmetry["unit"]) == (pytest.approx(-40.0, rel=0.05), "N·s/m")
+    assert said["units"] == {"axis": {"torque": "N", "angle": "m"}}
+    assert " N, " in said["summary"] and "N·m" not in said["summary"]
+    assert "m/s" in said["scoring"]["mask"]
+    tried = candidates(found)
+    assert {"rmse_before_axis_n", "rmse_after_axis_n"} <= set(tried.columns)
+    taken_up = tried[tried["verdict"] == "absorbed"]["causes"].map(lambda causes: causes[0])
+    assert set(taken_up) == {"rotor_inertia@axis", "torque_gain@axis"}
+
+
+def test_nobody_is_asked_for_runs_with_a_person_in_a_ball_screw(screw):
+    assert screw[1]["caveats"] == []
+
+
+def test_the_extended_model_simulates_the_screw_further_than_the_baseline(screw):
+    said = screw[1]
+    assert said["extended_simulation_rmse_rad"]["axis"] < 0.5 * said["baseline_simulation_rmse_rad"]["axis"]
+
+
+def test_a_pendulum_and_a_screw_are_identified_without_exoid_knowing_their_size():
+    arm, axis = (identify(motions(machine)).parameters for machine in (pendulum, slide))
+    assert arm["name"].tolist() == ["X1", "X2", "coulomb", "viscous"]
+    assert np.allclose(arm["value"], [0.03, 0.125, 0.04, 0.05], rtol=0.05)
+    assert axis["unit"].tolist() == ["kg", "N", "N·s/m"]
+    assert np.allclose(axis["value"], [90.0, 20.0, 200.0], rtol=0.05)
+
+
+def test_only_what_a_machine_can_have_and_show_is_a_candidate():
+    arm = machine_of([Joint("arm")], Geometry())
+    turntable = machine_of([Joint("table")], Geometry(gravity_m_s2=0.0))
+    lift = machine_of([Joint("lift", "prismatic")], Geometry())
+    assert {"base_tilt", "mass_off_axis@arm", "encoder_offset@arm", "backlash@arm"} <= labels(arm)
+    assert not {"torque_gain@arm", "rotor_inertia@arm"} & labels(arm)
+    gone = {"base_tilt", "mass_off_axis@table", "payload_change@table", "encoder_offset@table", "backlash@table"}
+    assert not gone & labels(turntable)
+    assert not {"torque_offset@lift", "coulomb_asymmetry@lift"} & labels(lift)
+    elbow = machine_of([Joint("shoulder"), Joint("elbow")], Geometry(0.3))
+    renamed = {label.replace("shoulder", "hip").replace("elbow", "knee") for label in labels(elbow)}
+    assert renamed == labels(THE_LEG)
+
+
+def test_ranges_go_with_the_machine_and_a_leg_keeps_its_own():
+    (arm, _), (axis, _) = (on_one_scale(motions(machine)) for machine in (pendulum, slide))
+    by_label = {e.label: e for e in proposals(axis.machine, ("exo_alone",))}
+    low, high = by_label["parallel_spring@axis"].linear[0].typical
+    assert by_label["parallel_spring@axis"].linear[0].unit == "N/m"
+    assert low > 20.0 and high / low == pytest.approx(20.0)
+    assert arm.machine.scale("arm").torque < 0.1 and arm.machine.scale("arm").travel == 1.0
+    assert on_one_scale([replace(arm, metadata={}, joints=("hip", "knee"), scales=())])[0].scales == ()
+
+
+def test_play_of_another_machine_is_not_simulated_with_an_exoskeletons_teeth():
+    machine = machine_of([Joint("arm")], Geometry())
+    terms = [Term(effect, np.ones(len(effect.linear))) for effect in baseline(machine, ("exo_alone",))]
+    play = Term(Backlash("arm", on=machine), np.array([0.01]))
+    with pytest.raises(InputError, match=r"backlash@arm: the teeth that a simulation has are those of an exoskeleton"):
+        assemble(Model((*terms, play)), Geometry(), ["arm"])
