@@ -73,7 +73,11 @@ def test_what_is_wrong_with_the_logs_of_modexo_is_told(imported):
     ("pattern", "map_name", "joints"),
     [
         ("simple_pendulum/*.csv", "simple_pendulum.toml", {"joint": "pivot"}),
-        ("double_pendulum/A0_fourier_75s.csv", "double_pendulum_fourier.toml", {"joint1": "hip", "joint2": "knee"}),
+        (
+            "double_pendulum/A0_fourier_75s.csv",
+            "double_pendulum_fourier.toml",
+            {"joint1": "shoulder", "joint2": "elbow"},
+        ),
     ],
 )
 def test_a_guess_of_a_real_log_says_what_its_map_says(real_data, tmp_path, capsys, pattern, map_name, joints):
