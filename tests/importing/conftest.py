@@ -96,3 +96,29 @@ def write_csv(tmp_path):
         return path
 
     return write
+
+
+@pytest.fixture(params=["mcap", "sqlite3"])
+def bag(request, pendulum, tmp_path):
+    """A ROS 2 bag whose messages name two joints in changing order, beside another topic."""
+    rosbag2, typesys = pytest.importorskip("rosbags.rosbag2"), pytest.importorskip("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    types = store.types
+    plugin = rosbag2.StoragePlugin.MCAP if request.param == "mcap" else rosbag2.StoragePlugin.SQLITE3
+    with rosbag2.Writer(tmp_path / "bag", version=9, storage_plugin=plugin) as writer:
+        kind = "sensor_msgs/msg/JointState"
+        states = writer.add_connection("/joint_states", kind, typestore=store)
+        text = writer.add_connection("/rosout_text", "std_msgs/msg/String", typestore=store)
+        hello = types["std_msgs/msg/String"]("hello")
+        writer.write(text, 1_700_000_000_000_000_000, store.serialize_cdr(hello, "std_msgs/msg/String"))
+        rows = zip(pendulum.time, pendulum.angle, pendulum.velocity, pendulum.torque, strict=True)
+        for k, (time, *values) in enumerate(rows):
+            stamp = 1_700_000_000_000_000_000 + round(time * 1e9)
+            header = types["std_msgs/msg/Header"](
+                types["builtin_interfaces/msg/Time"](sec=stamp // 10**9, nanosec=stamp % 10**9), "base"
+            )
+            order = [0, 1] if k % 2 else [1, 0]
+            arrays = [np.array([value, 9.0])[order] for value in values]
+            message = types[kind](header, [["pivot", "other"][j] for j in order], *arrays)
+            writer.write(states, stamp + 150_000, store.serialize_cdr(message, kind))
+    return tmp_path / "bag"

@@ -222,3 +222,13 @@ def test_rows_without_a_clock_get_no_guess(pendulum, write_csv, capsys):
     del columns["time"]
     assert run(["import", str(write_csv(columns)), "--guess"]) == 2
     assert "with time.rate_hz where rows are uniform" in capsys.readouterr().err
+
+
+def test_joint_states_of_ros_are_guessed_too(imported, guessed, pendulum, bag):
+    text, doubts = guessed(bag)
+    assert "joint[0].kind" in doubts  # a message of a slide looks the same, in metres and newtons
+    outcome = imported(bag, map_text=text)
+    assert (outcome.code, outcome.err) == (0, "")
+    frame = outcome.recording("bag_train").frame
+    assert_allclose(frame["pivot_torque_nm"], pendulum.torque[: len(frame)], atol=1e-12)
+    assert_allclose(frame["time_s"], pendulum.time[: len(frame)], atol=1e-9)
