@@ -65,7 +65,7 @@ def _import(files: list[Path], map_: Path, output: Path) -> None:
     told: list[dict[str, Any]] = []
     for file in files:
         made = []
-        for recording in recordings(file, settings, map_):
+        for recording in list(recordings(file, settings, map_)):  # all are right before the first is written
             path = output / f"{recording.name}.parquet"
             if path in written:
                 raise InputError(

@@ -101,7 +101,8 @@ def _recordings_of(
     for recording in wanted:
         rows = _span(time, float(run.time_s[-1]), recording)
         own = {name: values[rows] for name, values in columns.items()}
-        cut = Sampling.of(run.time_s, own["time_s"])
+        begin, end = np.searchsorted(run.time_s, own["time_s"][[0, -1]])
+        cut = Sampling.of(run.time_s[begin : end + 1], own["time_s"])
         metadata = _metadata(settings, recording, cut) | provenance
         metadata["imported"] = _account(path, log, run, sampling, findings)
         name = recording.name.replace("{file}", path.stem).replace("{purpose}", recording.purpose) + suffix

@@ -169,3 +169,21 @@ def test_every_unit_is_what_it_is():
     assert UNITS["kgf·cm"].factor == pytest.approx(0.0980665)
     assert UNITS["°F"].factor * 212 + UNITS["°F"].offset == pytest.approx(100.0)
     assert UNITS["K"].factor * 273.15 + UNITS["K"].offset == pytest.approx(0.0)
+
+
+def test_a_span_has_the_rate_and_the_gaps_of_its_own_part(imported, pendulum, write_csv):
+    """The first half at 200 Hz, the second at 100 Hz, as where a logger was set anew."""
+    rows = np.r_[0:1000, 1000:2000:2]
+    columns = {name: values[rows] for name, values in pendulum.columns().items()}
+    text = MAP.partition("[[recording]]")[0] + (
+        '[[recording]]\npurpose = "train"\nspan_s = [0, 4.99]\n[[recording]]\npurpose = "validate"\nspan_s = [5, 99]\n'
+    )
+    outcome = imported(write_csv(columns), map_text=text)
+    rates = [outcome.recording(f"log_{name}").metadata["sample_rate_hz"] for name in ("train", "validate")]
+    assert rates == [pytest.approx(200.0), pytest.approx(100.0)]
+
+
+def test_where_one_recording_is_refused_none_is_written(imported, pendulum, write_csv):
+    text = MAP + '[[recording]]\nname = "late"\npurpose = "validate"\nspan_s = [50, 60]\n'
+    outcome = imported(write_csv(pendulum.columns()), map_text=text)
+    assert (outcome.code, list(outcome.folder.glob("*"))) == (2, [])

@@ -1,0 +1,173 @@
+"""The tables of a joint in a map: its columns, their units, signs and zeros, each with its reason."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.contracts.joints import Kind
+from pipelines.importing.counter import signed
+from pipelines.importing.guess.joints import DRIVES, JointColumns
+from pipelines.importing.guess.motion import TURNS, Units, guess_units
+from pipelines.importing.guess.proposal import Proposal
+from pipelines.importing.guess.register import lost_sign
+from pipelines.importing.guess.torque import TorqueFit, fit_torque
+from pipelines.importing.sources.source import Columns
+from pipelines.settings.units import UNITS
+
+FOLLOWS = 0.7
+"""Share of a torque's variance that a joint's own motion must explain before its sign is judged."""
+SWINGS_RAD = 2.0
+"""So far a joint must have moved before gravity tells where down is."""
+HANGS_RAD = 0.15
+"""So near is gravity's word to zero where the log has its zero there: friction and backlash spoil it by that much."""
+
+
+def write_joint(
+    proposal: Proposal, number: int, joint: JointColumns, columns: Columns, time_s: NDArray, alone: bool
+) -> list[str]:
+    """Write a joint's tables into a map; return the columns that are in them.
+
+    Only of a joint ``alone`` does its own motion tell what its torque does: others throw it about.
+    """
+    where = f"joint[{number}]"
+    logged = {quantity: columns[m.column].astype(float) for quantity, m in joint.columns.items()}
+    bits = {quantity: lost_sign(values) for quantity, values in logged.items()}
+    for quantity, width in bits.items():
+        if width is not None:
+            logged[quantity] = signed(logged[quantity], width, quantity, [])
+    angle, velocity = joint.columns["angle"], joint.columns.get("velocity")
+    units = guess_units(
+        time_s, logged["angle"], angle.unit, logged.get("velocity"), velocity.unit if velocity else None
+    )
+    kind: Kind = "prismatic" if UNITS[units.angle].dimension == "length" else "revolute"
+    proposal.table("[[joint]]", where)
+    proposal.key("name", joint.name)
+    proposal.key(
+        "kind", kind, "its unit is a length" if kind == "prismatic" else "no unit of length; prismatic where it slides",
+        units.why == "its name says so",
+    )  # fmt: skip
+    fit = None
+    if units.angle in TURNS:
+        drive = next((quantity for quantity in DRIVES if quantity in logged), None)
+        angle_rad = logged["angle"] * UNITS[units.angle].factor
+        fit = fit_torque(time_s, angle_rad, logged[drive]) if drive else None
+    used = [_write_angle(proposal, where, joint, units, bits["angle"], fit if alone else None)]
+    if velocity is not None:
+        used.append(_write_velocity(proposal, where, joint, units))
+    used.append(_write_torque(proposal, where, joint, kind, bits, fit if alone else None))
+    used += _write_others(proposal, where, joint, units)
+    return used
+
+
+def _write_angle(
+    proposal: Proposal, where: str, joint: JointColumns, units: Units, bits: int | None, fit: TorqueFit | None
+) -> str:
+    column = joint.columns["angle"].column
+    proposal.table("[joint.angle]", f"{where}.angle")
+    proposal.key("column", column, joint.why.get("angle", ""), "no name" not in joint.why.get("angle", ""))
+    proposal.key("unit", units.angle, units.why, units.sure)
+    if units.angle == "counts":
+        proposal.unknown("counts_per_turn", "counts in a turn of the joint, from the encoder's data sheet")
+    if bits:
+        proposal.key("signed_bits", bits, f"whole numbers up to 2^{bits}, none in the middle: its sign was lost")
+    _write_zero(proposal, fit, units)
+    return column
+
+
+def _write_zero(proposal: Proposal, fit: TorqueFit | None, units: Units) -> None:
+    if fit is None or fit.explained < FOLLOWS or fit.gravity_share < 0.3 or fit.reach_rad < SWINGS_RAD:
+        proposal.key("zero", 0.0, "what the log says where the joint is at zero; nothing here tells", sure=False)
+        return
+    down = fit.down_rad if not fit.backwards else float(np.angle(-np.exp(1j * fit.down_rad)))
+    if abs(down) < HANGS_RAD:
+        proposal.key("zero", 0.0, f"gravity's torque vanishes at {down:.2f} rad: zero hangs down")
+    else:
+        zero = round(down * TURNS[units.angle] / (2.0 * np.pi), 3)
+        proposal.key(
+            "zero", zero, f"there gravity's torque says the joint would hang ({fit.explained:.0%} fits)", False
+        )
+
+
+def _write_velocity(proposal: Proposal, where: str, joint: JointColumns, units: Units) -> str:
+    column = joint.columns["velocity"].column
+    proposal.table("[joint.velocity]", f"{where}.velocity")
+    proposal.key("column", column, joint.why.get("velocity", ""), "no name" not in joint.why.get("velocity", ""))
+    proposal.key("unit", units.velocity, units.velocity_why, units.velocity_sure)
+    if units.velocity_sign < 0:
+        proposal.key("sign", -1, "it counts the other way than the angle", sure=False)
+    return column
+
+
+def _write_torque(
+    proposal: Proposal,
+    where: str,
+    joint: JointColumns,
+    kind: Kind,
+    bits: Mapping[str, int | None],
+    fit: TorqueFit | None,
+) -> str:
+    drive = next((quantity for quantity in DRIVES if quantity in joint.columns), None)
+    proposal.table("[joint.torque]", f"{where}.torque")
+    if drive is None:
+        proposal.unknown("column", "no column's name says torque, current or voltage")
+        proposal.key("unit", "N·m" if kind == "revolute" else "N")
+        return ""
+    found = joint.columns[drive]
+    rather = joint.why.get(drive, "")
+    proposal.key(
+        "column", found.column, _what_torque(found.commanded, rather), not found.commanded and "no name" not in rather
+    )
+    if bits[drive]:
+        proposal.key("signed_bits", bits[drive], f"whole numbers up to 2^{bits[drive]}: its sign was lost")
+    _write_torque_unit(proposal, drive, found.unit, kind, whole=bits[drive] is not None)
+    _write_torque_sign(proposal, fit)
+    return found.column
+
+
+def _what_torque(commanded: bool, rather: str) -> str:
+    if commanded:
+        return f"commanded, not measured: what friction in the drive does to it is not in it {rather}".strip()
+    return rather
+
+
+def _write_torque_unit(proposal: Proposal, drive: str, named: str | None, kind: Kind, whole: bool) -> None:
+    dimension = UNITS[named].dimension if named else ""
+    if drive == "voltage":
+        proposal.key("unit", named if dimension == "voltage" else "V", "a voltage, by its name", dimension == "voltage")
+        proposal.unknown("gain_n_v" if kind == "prismatic" else "gain_nm_v", "what a volt does, from the amplifier")
+    elif drive == "current" or dimension == "current" or whole:
+        why = "its name says so" if dimension == "current" else "whole numbers, as drives tell mA"
+        proposal.key("unit", named if dimension == "current" else "mA" if whole else "A", why, dimension == "current")
+        proposal.unknown("torque_constant_nm_a", "of the motor, from its data sheet")
+        proposal.key("gear_ratio", 1.0, "turns of the motor for one of the joint, from its data sheet", sure=False)
+    elif dimension in ("torque", "force"):
+        proposal.key("unit", named, "its name says so")
+    else:
+        proposal.key("unit", "N·m" if kind == "revolute" else "N", "no name says its unit; SI assumed", sure=False)
+
+
+def _write_torque_sign(proposal: Proposal, fit: TorqueFit | None) -> None:
+    if fit is None:
+        proposal.key("sign", 1, "positive torque must accelerate the angle upward; not to be seen here", sure=False)
+    elif fit.explained < FOLLOWS:
+        proposal.key("sign", 1, f"the motion explains {max(0.0, fit.explained):.0%} of the torque only", sure=False)
+    elif fit.backwards:
+        proposal.key("sign", -1, f"turned, it accelerates the joint and feeds its friction ({fit.explained:.0%} fits)")
+    elif fit.inertia > 0.0 and fit.friction > 0.0:
+        proposal.key("sign", 1, f"accelerates the joint and feeds its friction ({fit.explained:.0%} fits)")
+    else:
+        proposal.key("sign", 1, "inertia and friction disagree about it", sure=False)
+
+
+def _write_others(proposal: Proposal, where: str, joint: JointColumns, units: Units) -> list[str]:
+    used = []
+    for quantity, unit in (("reference", units.angle), ("temperature", "°C")):
+        if quantity in joint.columns:
+            found = joint.columns[quantity]
+            proposal.table(f"[joint.{quantity}]", f"{where}.{quantity}")
+            proposal.key("column", found.column, joint.why.get(quantity, ""))
+            named = found.unit is not None and UNITS[found.unit].dimension == UNITS[unit].dimension
+            proposal.key("unit", found.unit if named else unit, "its name says so" if named else "as is usual", named)
+            used.append(found.column)
+    return used
