@@ -24,10 +24,13 @@ WINDOW_S = 0.5
 """One after the other; longer ones would feel the noise of the torque more, shorter ones that of the first state."""
 PASSES = 2
 """Of reweighting the joints."""
-STEP = 0.1
-"""Standard errors of the start by which a value is moved to see what the simulation does."""
-ENOUGH = 1e-3
-"""Standard errors of the start that a step may still have where the search ends."""
+STEP = 0.5
+"""Standard errors of the start by which a value is moved to see what the simulation does: less than a joint's
+sticking a moment longer or shorter would let it jump."""
+SETTLED = 1e-5
+"""Relative fall of the square error at which the search ends: less than a tenth of a standard error."""
+RESTS = 0.01
+"""Step, as a share of the way from the start, at which it ends."""
 LEAST_RAD = 1e-9
 """A perfect fit would weigh infinitely."""
 RAN_AWAY = 10.0
@@ -45,7 +48,7 @@ class OutputError(Estimator):
         problem = problem.whole()
         start = WeightedLeastSquares().fit(problem)
         # One step of each value: of the fitted ones in their standard errors, of the held ones in thousandths.
-        size = np.abs(problem.held) * ENOUGH
+        size = np.abs(problem.held) / 1000.0
         size[problem.fitted] = np.sqrt(np.diag(start.sensitivity))
         values = nearest(problem, start.values, start.normal)
         evaluations = 0
@@ -97,7 +100,7 @@ def _searched(problem: Problem, values: NDArray, size: NDArray, weights: NDArray
         k = len(problem.fitted)
         return np.concatenate([(s * root[:, np.newaxis]).reshape(-1, k) for s in slopes]) * unit
 
-    found = least_squares(residual, np.zeros(len(unit)), jacobian, method="trf", xtol=None, ftol=ENOUGH**2, gtol=None)
+    found = least_squares(residual, np.zeros(len(unit)), jacobian, method="trf", xtol=RESTS, ftol=SETTLED, gtol=None)
     return values + unit * found.x, int(found.nfev + found.njev * (1 + len(unit)))
 
 
@@ -109,8 +112,8 @@ def _fit(problem: Problem, values: NDArray, size: NDArray, weights: NDArray, sim
     normal = np.asarray(slope)[:, problem.fitted]
     sensitivity = inverse(normal, problem.names)
     scores = [
-        -np.einsum("j,wnjk,wnj->wk", weights, s[..., problem.fitted], e, optimize=True)
-        for s, e in zip(slopes, errors, strict=True)
+        _window_scores(part[..., problem.fitted], e, weights, sensitivity)
+        for part, e in zip(slopes, errors, strict=True)
     ]
     rms = np.sqrt([np.mean(e**2, axis=(0, 1)) for e in errors]).tolist()
     told = {"window_s": WINDOW_S, "simulations": simulations, "angle_rms": rms}
@@ -119,8 +122,18 @@ def _fit(problem: Problem, values: NDArray, size: NDArray, weights: NDArray, sim
     )
 
 
+def _window_scores(slopes: NDArray, errors: NDArray, weights: NDArray, sensitivity: NDArray) -> NDArray:
+    """Return one score for each window, (windows, k): within it nothing is independent.
+
+    There are few, and each has pulled the fit towards itself: what it would score without that is (I - G H⁻¹)⁻¹ times
+    as much, G its part of the normal matrix (the CR3 of Bell and McCaffrey, 2002, Survey Methodology 28(2)).
+    """
+    scores = -np.einsum("j,wnjk,wnj->wk", weights, slopes, errors, optimize=True)
+    parts = np.einsum("j,wnjk,wnjl->wkl", weights, slopes, slopes, optimize=True)
+    return np.linalg.solve(np.eye(len(sensitivity)) - parts @ sensitivity, scores[..., np.newaxis])[..., 0]
+
+
 def _by_run(scores: Sequence[NDArray]) -> Scores:
-    # A window is one score: within it nothing is independent.
     def go_through() -> Iterator[tuple[Hashable, NDArray]]:
         yield from enumerate(scores)
 

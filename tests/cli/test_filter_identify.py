@@ -1,4 +1,5 @@
 import json
+from typing import get_args
 
 import numpy as np
 import pandas as pd
@@ -6,9 +7,11 @@ import pyarrow.parquet as pq
 import pytest
 
 from pipelines.contracts import MOTION, PARAMETERS, RECORDING, RESIDUALS
+from pipelines.estimation.estimators import ESTIMATORS
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
+from pipelines.settings.identify import Method
 from pipelines.settings.plant import PlantSettings
 
 RICH = FourierTrajectory(
@@ -55,6 +58,53 @@ def test_recordings_need_no_filter_command_and_no_settings(exoid, recordings, tm
     assert outcome.code == 0, outcome.err
     said = json.loads(outcome.out)
     assert {"hip", "knee"} == set(said["validation"]["all"])
+
+
+@pytest.mark.parametrize("method", ["iteratively_reweighted", "instrumental_variables", "realizable"])
+def test_a_method_gives_the_same_table_and_says_how_it_was_made(exoid, recordings, tmp_path, method):
+    outcome = exoid("identify", *sorted(recordings.iterdir()), "-o", tmp_path, "--method", method)
+    assert outcome.code == 0, outcome.err
+    found = PARAMETERS.read(tmp_path / "parameters.parquet")
+    assert len(found.frame) == 16
+    assert found.metadata["method"]["estimator"] == method
+    assert set(found.metadata["method"]["steps"]) == {"exo_alone", "with_human"}
+    assert found.metadata["config"]["identify"]["method"] == method
+    said = "Durbin-Wu-Hausman" in outcome.out
+    assert said == (method == "instrumental_variables")
+
+
+def test_the_method_can_stand_in_the_settings(exoid, recordings, tmp_path):
+    (tmp_path / "exoid.toml").write_text('[identify]\nmethod = "ordinary_least_squares"\nfigures = false\n')
+    given = ["identify", *sorted(recordings.iterdir()), "-o", tmp_path / "out", "--config", tmp_path / "exoid.toml"]
+    assert exoid(*given).code == 0
+    found = PARAMETERS.read(tmp_path / "out" / "parameters.parquet")
+    assert found.metadata["method"]["name"] == "two-step ordinary least squares"
+
+
+def test_a_method_that_does_not_exist_ends_in_one_line_with_the_nearest(exoid, recordings, tmp_path):
+    outcome = exoid("identify", *sorted(recordings.iterdir()), "-o", tmp_path / "out", "--method", "realisable")
+    assert outcome.code == 2
+    assert outcome.err.count("\n") == 1
+    assert "--method: there is no method 'realisable'; did you mean realizable?" in outcome.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_instruments_without_set_points_end_in_one_line_that_names_the_file(exoid, recordings, tmp_path):
+    (tmp_path / "runs").mkdir()
+    for file in recordings.iterdir():
+        table = RECORDING.read(file)
+        frame = table.frame.drop(columns=["hip_reference_rad", "knee_reference_rad"])
+        RECORDING.write(tmp_path / "runs" / file.name, frame, table.metadata)
+    files = sorted((tmp_path / "runs").iterdir())
+    outcome = exoid("identify", *files, "-o", tmp_path / "out", "--method", "instrumental_variables")
+    assert outcome.code == 2
+    assert outcome.err.count("\n") == 1
+    assert "exo_alone_train.parquet: has no set-points of the hip, which" in outcome.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_settings_know_every_method():
+    assert get_args(Method) == tuple(estimator.name for estimator in ESTIMATORS)
 
 
 def test_output_fits_eighty_columns(exoid, recordings, tmp_path):
