@@ -12,7 +12,7 @@ EXPERIMENT := $(MAKE) --no-print-directory -f datasets/experiments/experiment.mk
 SEEDS ?= tuning
 
 .DEFAULT_GOAL := help
-.PHONY: help all test test-slow invariants check format bench fuzz blind blind-full blind-fixed blind-page docs lock clean install
+.PHONY: help all test test-slow invariants check format bench estimators fuzz blind blind-full blind-fixed blind-page docs lock clean install
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | sort | expand -t 12
@@ -41,6 +41,9 @@ format: $(INSTALLED) ## format the code
 
 bench: $(INSTALLED) ## measure speed
 	$(BIN)/python -m tests.bench
+
+estimators: $(INSTALLED) ## what docs/estimators.md says of the methods, measured on simulated and real data; about half an hour
+	$(BIN)/python -m tests.estimators
 
 fuzz: $(INSTALLED) ## hostile replies against the client, hostile requests against the rig: 60,000 of each
 	$(BIN)/python -m tests.fuzz

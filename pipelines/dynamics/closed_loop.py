@@ -20,14 +20,14 @@ from pipelines.model import Model
 
 RATE_HZ = 1000.0
 """Of drives that do not tell theirs, and at most: what is faster changes nothing that a regression sees."""
-BANDWIDTH_RAD_S = 2.0 * np.pi * 4.0
+BANDWIDTH_RAD_S = 2.0 * np.pi * 8.0
 """Of the loop that stands for drives that tell nothing."""
 
 
 def closed_loop(model: Model, motion: Motion) -> Motion:
     """Return the run as a model would have moved along its references: angle, velocity and acceleration anew.
 
-    The drives are those of the recording's ``controller``; where it tells none, loops of a bandwidth of 4 Hz take
+    The drives are those of the recording's ``controller``; where it tells none, loops of a bandwidth of 8 Hz take
     their place, tuned to the model's inertia, as in DIDIM (Gautier, Janot and Vandanjon, 2013, IEEE TCST 21(2)).
 
     Raises

@@ -47,8 +47,8 @@ class OutputError(Estimator):
         """Fit all runs at once, beginning with the least-squares model that can exist."""
         problem = problem.whole()
         start = WeightedLeastSquares().fit(problem)
-        # One step of each value: of the fitted ones in their standard errors, of the held ones in thousandths.
-        size = np.abs(problem.held) / 1000.0
+        # One step of each value: of the fitted ones in their standard errors, of the held ones in fiftieths.
+        size = np.abs(problem.held) / 50.0
         size[problem.fitted] = np.sqrt(np.diag(start.sensitivity))
         values = nearest(problem, start.values, start.normal)
         evaluations = 0

@@ -4,6 +4,7 @@ import os
 import tempfile
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from exoid_cli.app import run
@@ -21,6 +22,8 @@ MACHINES = {
     "emps": ("emps/*.mat", "emps.toml"),
     "double pendulum A0": ("double_pendulum/A0_fourier_75s.csv", "double_pendulum_fourier.toml"),
 }
+# Of the benchmark's authors: volts for metres and for metres a second, times 35.1507 N/V.
+CONTROLLERS = {"axis": {"type": "pd", "kp_n_m": 35.1507 * 160.18 * 243.45, "kd_n_s_m": 35.1507 * 243.45}}
 FOLDER = Path(os.environ.get("EXOID_REAL_DATA") or Path(__file__).parents[3] / "shared" / "data")
 
 
@@ -34,6 +37,7 @@ def show() -> None:
             files = sorted(str(file) for file in FOLDER.glob(pattern))
             run(["--quiet", "import", *files, "--map", str(datasets() / "maps" / map_name), "-o", folder])
             motions = read_motions(sorted(Path(folder).glob("*.parquet")), FilterSettings(), Geometry())
+        motions = [replace(motion, metadata={**motion.metadata, "controller": CONTROLLERS}) for motion in motions]
         names = identify(motions).parameters
         symbols = [
             f"{row.joint} {row.symbol}" if isinstance(row.joint, str) else row.symbol for row in names.itertuples()
