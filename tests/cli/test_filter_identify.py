@@ -62,7 +62,9 @@ def test_recordings_need_no_filter_command_and_no_settings(exoid, recordings, tm
 
 @pytest.mark.parametrize("method", ["iteratively_reweighted", "instrumental_variables", "realizable"])
 def test_a_method_gives_the_same_table_and_says_how_it_was_made(exoid, recordings, tmp_path, method):
-    outcome = exoid("identify", *sorted(recordings.iterdir()), "-o", tmp_path, "--method", method)
+    (tmp_path / "exoid.toml").write_text("[identify]\nfigures = false\n")
+    given = ("-o", tmp_path, "--config", tmp_path / "exoid.toml", "--method", method)
+    outcome = exoid("identify", *sorted(recordings.iterdir()), *given)
     assert outcome.code == 0, outcome.err
     found = PARAMETERS.read(tmp_path / "parameters.parquet")
     assert len(found.frame) == 16

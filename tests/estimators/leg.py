@@ -2,12 +2,12 @@
 
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from pipelines.estimation.estimators import ESTIMATORS
+from pipelines.estimation.estimator import Estimator
 from pipelines.identification import identify
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.read import read_motions
@@ -21,25 +21,25 @@ SEED = 480_000
 """Within the range for tuning."""
 
 
-def show(sessions: int) -> None:
+def show(methods: Sequence[Estimator], sessions: int) -> None:
     """Print bias, coverage, error on runs not fitted, and time."""
     made = [simulate(Case(SEED + number, "none")) for number in range(sessions)]
     title = f"**a leg simulated by MuJoCo**, {sessions} sessions of four runs of 60 to 80 s, nothing hidden"
     headings = ("method", "worst bias of X", "of friction", "covered", "validation RMSE N·m", "s")
-    table(title, headings, _rows(made))
+    table(title, headings, _rows(methods, made))
 
 
-def _rows(sessions: list[Session]) -> Iterator[tuple[str, ...]]:
+def _rows(methods: Sequence[Estimator], sessions: list[Session]) -> Iterator[tuple[str, ...]]:
     with tempfile.TemporaryDirectory() as folder:
         recorded = []
         for number, session in enumerate(sessions):
             runs = Path(folder) / str(number)
             write(session, runs, Path(folder) / f"{number}.json")
             recorded.append((read_motions(sorted(runs.iterdir()), FilterSettings(), Geometry()), truth(session)))
-    for estimator in ESTIMATORS:
+    for estimator in methods:
         begun, off, inside, left = time.process_time(), [], [], []
         for motions, true in recorded:
-            found = identify(motions, estimator())
+            found = identify(motions, estimator)
             rows = found.parameters
             off.append((rows["value"] / true - 1.0).to_numpy())
             inside.append(((rows["ci95_low"] <= true) & (true <= rows["ci95_high"])).to_numpy())

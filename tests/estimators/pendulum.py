@@ -1,12 +1,11 @@
 """Many sessions of a pendulum that shares no code with exoid, spoilt in several ways."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from pipelines.estimation.estimator import estimated
-from pipelines.estimation.estimators import ESTIMATORS
+from pipelines.estimation.estimator import Estimator, estimated
 from tests.estimation.pendulum import TRUTH, Disturbed, motion, problem
 from tests.estimators.markdown import show as table
 
@@ -19,19 +18,19 @@ SPOILT = {
 NAMES = ("inertia", "moment", "Coulomb", "viscous")
 
 
-def show(sessions: int) -> None:
+def show(methods: Sequence[Estimator], sessions: int) -> None:
     """Print a table for each way."""
     for name, disturbed in SPOILT.items():
         headings = ("method", *(f"{n}, bias % ± scatter" for n in NAMES), "covered", "s")
-        table(f"**{name}**, {sessions} sessions of 20 s", headings, _rows(disturbed, sessions))
+        table(f"**{name}**, {sessions} sessions of 20 s", headings, _rows(methods, disturbed, sessions))
 
 
-def _rows(disturbed: Disturbed, sessions: int) -> Iterator[tuple[str, ...]]:
+def _rows(methods: Sequence[Estimator], disturbed: Disturbed, sessions: int) -> Iterator[tuple[str, ...]]:
     problems = [problem(motion(disturbed, seed)) for seed in range(1000, 1000 + sessions)]
-    for estimator in ESTIMATORS:
+    for estimator in methods:
         begun, values, inside = time.process_time(), [], []
         for one in problems:
-            found = estimated(estimator().fit(one))
+            found = estimated(estimator.fit(one))
             values.append(found.values / TRUTH)
             inside.append(np.abs(found.values - TRUTH) <= found.critical * np.sqrt(np.diag(found.covariance)))
         bias, scatter = 100.0 * (np.mean(values, axis=0) - 1.0), 100.0 * np.std(values, axis=0)

@@ -3,13 +3,13 @@
 import os
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from exoid_cli.app import run
 from pipelines.errors import InputError
-from pipelines.estimation.estimators import ESTIMATORS
+from pipelines.estimation.estimator import Estimator
 from pipelines.identification import identify
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.motion import Motion
@@ -27,7 +27,7 @@ CONTROLLERS = {"axis": {"type": "pd", "kp_n_m": 35.1507 * 160.18 * 243.45, "kd_n
 FOLDER = Path(os.environ.get("EXOID_REAL_DATA") or Path(__file__).parents[3] / "shared" / "data")
 
 
-def show() -> None:
+def show(methods: Sequence[Estimator]) -> None:
     """Print a table for each machine, or say that there are no data."""
     if not FOLDER.is_dir():
         print(f"\nno real data in {FOLDER}; EXOID_REAL_DATA names their folder")
@@ -42,14 +42,14 @@ def show() -> None:
         symbols = [
             f"{row.joint} {row.symbol}" if isinstance(row.joint, str) else row.symbol for row in names.itertuples()
         ]
-        table(f"**{name}**", ("method", *symbols, "100 e/τ on the run not fitted", "s"), _rows(motions))
+        table(f"**{name}**", ("method", *symbols, "100 e/τ on the run not fitted", "s"), _rows(methods, motions))
 
 
-def _rows(motions: list[Motion]) -> Iterator[tuple[str, ...]]:
-    for estimator in ESTIMATORS:
+def _rows(methods: Sequence[Estimator], motions: list[Motion]) -> Iterator[tuple[str, ...]]:
+    for estimator in methods:
         begun = time.process_time()
         try:
-            found = identify(motions, estimator())
+            found = identify(motions, estimator)
         except InputError as error:
             yield (estimator.name, f"refused: {error}")
             continue
