@@ -26,7 +26,7 @@ def identify(
     \b
     Example:
       exoid identify motions/*.parquet -o identified/
-      exoid identify motions/*.parquet -o identified/ --method instrumental_variables
+      exoid identify motions/*.parquet -o iv/ --method instrumental_variables
     """
     from pipelines.contracts import PARAMETERS, RESIDUALS, describe
     from pipelines.estimation.estimators import estimator_named
