@@ -65,7 +65,8 @@ class Examined:
         after = Extended.of(made, validate, baseline)
         floor = noise_floor(validate, after.residuals)
         standing = _standing(before, after, floor, validate)
-        hums = standing.hums(strongest_tone(validate, after.residuals)[:J])
+        tones = [strongest_tone(validate, extended.residuals)[:J] for extended in (before, after)]
+        hums = standing.hums(*tones)
         wanders = bool(np.any(slow_scatter(validate, after.residuals)[:J] > WANDERING))
         effects = [cause.effect for cause in made.causes]
         foreign = (hums or (wanders and not any(effect.per_run for effect in effects))) and not standing.rings(effects)

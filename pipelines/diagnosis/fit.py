@@ -25,7 +25,9 @@ the right one."""
 ONSETS_APART_S = 2.0
 """How far apart the onsets are that the scan has tried."""
 BEYOND = 5.0
-"""Times what is typical, from which no machine or person has an amplitude."""
+"""Times what is typical, from which an amplitude is doubted."""
+MOST_OF_ALL = 0.5
+"""Share of all of a joint's torque above which such an amplitude only stands because something else takes it away."""
 REACH = 1.6
 """How far a sweep looks from where a shape parameter stands, as a factor or a share of its range."""
 
@@ -45,17 +47,24 @@ class Fit:
     """Sum over outputs of samples times log rms: what refinement lowers."""
     kinds: tuple[str, ...]
     """The kind of each run fitted."""
+    shares: NDArray
+    """(O, size + ...) what each column carries, rms, of all that was measured at an output."""
     loads: NDArray | None = None
     """Values (size + ...,) whose bodies the loads in the runs are computed from, where not those the runs came with."""
 
     def is_absurd(self, baseline: Baseline) -> bool:
-        """Tell whether some cause has an amplitude that no machine or person has: it imitates what it is not."""
-        at = baseline.size
+        """Tell whether some cause is larger than on any machine or person, and carries most of a joint's torque.
+
+        It imitates what it is not, with others that take most of it away again. Where a joint's torques are large
+        themselves, an amplitude beyond what is typical means little.
+        """
+        at, most = baseline.size, self.shares.max(axis=0)
         for cause in self.causes:
             shared = [p for p, apart in zip(cause.effect.linear, cause.apart, strict=True) if not apart]
-            found = self.values[at : at + len(shared)]
-            if any(abs(v) > BEYOND * max(map(abs, p.typical)) for v, p in zip(found, shared, strict=True)):
-                return True
+            for column, parameter in enumerate(shared, start=at):
+                beyond = abs(self.values[column]) > BEYOND * max(map(abs, parameter.typical))
+                if beyond and most[column] > MOST_OF_ALL:
+                    return True
             at += len(shared) + cause.apart.count(True) * self.acting(cause)
         return False
 
@@ -72,7 +81,12 @@ def fit(
     gram = gram_of_runs(runs, *zip(*stacked_columns(causes, runs, baseline), strict=True))
     values = solve(gram, weights)
     ordered, kinds = tuple(sorted(causes, key=_last_sensors)), tuple(run.motion.run for run in runs)
-    return Fit(ordered, values, *_errors(gram, values), kinds, loads)
+    return Fit(ordered, values, *_errors(gram, values), kinds, _shares(gram, values), loads)
+
+
+def _shares(gram: Gram, values: NDArray) -> NDArray:
+    squares = np.einsum("foii->oi", gram.columns) * values**2
+    return np.sqrt(squares / np.maximum(gram.square.sum(axis=0), np.finfo(float).tiny)[:, np.newaxis])
 
 
 def laden(runs: Sequence[Run], made: Fit, baseline: Baseline) -> list[Run]:

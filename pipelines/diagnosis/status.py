@@ -130,9 +130,15 @@ class Standing:
         large = slow.excess[:J] > np.maximum(MATERIAL * self.floor, IMPERFECT * self.torque[:J])
         return np.asarray(large & (slow.sureness[:J] > SIGNIFICANT))
 
-    def hums(self, tone: NDArray) -> bool:
-        """Tell whether a tone (J,) N·m is beyond the floor and beyond a good rig's at some joint."""
-        return bool(np.any(tone > np.maximum(HUM * self.floor, IMPERFECT * self.torque[: len(self.floor)])))
+    def hums(self, before: NDArray, after: NDArray) -> bool:
+        """Tell whether a tone (J,) N·m is left that is beyond the floor and beyond a good rig's at some joint.
+
+        What is left of those that the named causes took most of, at all joints together, is the misfit of their form:
+        what hums at one joint shakes the others too.
+        """
+        loud = after > np.maximum(HUM * self.floor, IMPERFECT * self.torque[: len(self.floor)])
+        was, left = (np.sum((tone / self.floor) ** 2) for tone in (before, after))
+        return bool(np.any(loud) and left > FOREIGN * was)
 
 
 def status_of(standing: Standing, named: bool, wandering: bool) -> str:

@@ -18,7 +18,7 @@ from tests.diagnosis.sessions import session
 
 
 def ranked(effect, score):
-    made = Fit((Candidate(effect, ((),)),), np.zeros(1), np.ones(2), np.ones(2), 0.0, ("exo_alone",))
+    made = Fit((Candidate(effect, ((),)),), np.zeros(1), np.ones(2), np.ones(2), 0.0, ("exo_alone",), np.zeros((2, 1)))
     return Ranked(made, score)
 
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.candidates import Candidate, lowest
-from pipelines.diagnosis.fit import _scale, refined
+from pipelines.diagnosis.fit import _scale, fit, refined
 from pipelines.diagnosis.impacts import evidence_of_play
 from pipelines.diagnosis.observations import FOLDS, baseline_of, observe, with_load
 from pipelines.diagnosis.slow import SlowError, slow_error
 from pipelines.diagnosis.status import Standing
 from pipelines.diagnosis.tone import strongest_tone
 from pipelines.diagnosis.volition import evidence_of_will
-from pipelines.effects import Backlash, Cogging, EncoderOffset, Parameter, TorqueDrift
+from pipelines.effects import Backlash, Cogging, EncoderOffset, Parameter, TorqueDrift, ViscousAsymmetry
 from tests.diagnosis.sessions import session
 
 NOISE = 0.5
@@ -141,6 +141,31 @@ def test_trust_falls_with_what_is_plainly_left():
     assert standing(3.0, 1.0).trust == pytest.approx(1.0)
     assert standing(3.0, 2.0, torque=0.0).trust == pytest.approx(1.0 - 0.5 * 3.0 / 8.0)
     assert standing(1.2, 1.1, samples=20.0).trust > 0.9, "what chance could have left is not held against a cause"
+
+
+def test_a_hum_that_the_causes_took_most_of_is_their_misfit_and_any_other_is_foreign():
+    made = standing(3.0, 1.05)
+    silence, hip, shaken = np.zeros(2), np.array([2.0, 0.5]), np.array([0.8, 0.5])
+    assert not made.hums(silence, silence)
+    assert made.hums(hip, hip), "what no cause touches"
+    assert not made.hums(hip, shaken), "a ripple that is explained, and what it shakes at the other joint"
+    assert made.hums(hip, 0.6 * hip)
+    assert made.hums(np.array([0.0, 2.0]), np.array([0.0, 1.9]))
+
+
+@pytest.mark.parametrize(("speed_share", "absurd"), [(0.2, False), (3.0, True)])
+def test_a_large_amplitude_is_absurd_only_where_it_carries_most_of_the_joints_torque(run, speed_share, absurd):
+    cause, J = Candidate(ViscousAsymmetry(joint="hip"), ((),)), 2
+    direction = np.abs(run.state[1][:, 0])
+    measured = run.measured.copy()
+    largest = 6.0 * max(map(abs, cause.effect.linear[0].typical))
+    # The machine is strong in one case and weak in the other; the amplitude is the same.
+    wanted = largest * np.sqrt(np.mean(direction[run.usable[:, 0]] ** 2)) / speed_share
+    measured[:, :J] *= wanted / np.sqrt(np.mean(measured[run.usable[:, 0], 0] ** 2))
+    measured[:, 0] += largest * direction
+    strong = replace(run, measured=measured)
+    baseline = baseline_of([strong])
+    assert fit([cause], [strong], baseline, np.ones(4)).is_absurd(baseline) == absurd
 
 
 def test_refinement_stays_at_the_maximum_that_the_scan_found():
