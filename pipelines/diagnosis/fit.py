@@ -1,6 +1,6 @@
 """The extended model: baseline and causes fitted together, shapes refined, uncertainty honest."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,15 +58,19 @@ class Fit:
         It imitates what it is not, with others that take most of it away again. Where a joint's torques are large
         themselves, an amplitude beyond what is typical means little.
         """
-        at, most = baseline.size, self.shares.max(axis=0)
-        for cause in self.causes:
-            shared = [p for p, apart in zip(cause.effect.linear, cause.apart, strict=True) if not apart]
-            for column, parameter in enumerate(shared, start=at):
-                beyond = abs(self.values[column]) > BEYOND * max(map(abs, parameter.typical))
-                if beyond and most[column] > MOST_OF_ALL:
-                    return True
-            at += len(shared) + cause.apart.count(True) * self.acting(cause)
+        most = self.shares.max(axis=0)
+        for column, parameter in enumerate(self._amplitudes(), start=baseline.size):
+            beyond = abs(self.values[column]) > BEYOND * max(map(abs, parameter.typical))
+            if beyond and most[column] > MOST_OF_ALL:
+                return True
         return False
+
+    def _amplitudes(self) -> Iterator[Parameter]:
+        """Yield what each of the causes' columns is the amplitude of, in their order."""
+        for cause in self.causes:
+            dealt = list(zip(cause.effect.linear, cause.apart, strict=True))
+            yield from (p for p, apart in dealt if not apart)
+            yield from [p for p, apart in dealt if apart] * self.acting(cause)
 
     def acting(self, cause: Candidate) -> int:
         """Return in how many of the runs a cause acts."""
