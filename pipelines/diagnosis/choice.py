@@ -67,6 +67,18 @@ class Choice:
         ranked = self.refined[len(labels)].get(labels) if labels else None
         return None if ranked is None or labels == self.named.labels else self._instead(ranked)
 
+    def faint(self) -> "Choice | None":
+        """Return the choice of the cause that is likely although training hardly shows it; None where there is none.
+
+        A drag that the training motion was too slow for may be plain in another run: that the runs which no fit has
+        seen decide, as they do between causes as good as one another.
+        """
+        likely = [r for r in self.refined[1].values() if r.score > NEEDED] if len(self.refined) > 1 else []
+        if self.named.labels or self.refuted or not likely:
+            return None
+        best, *others = sorted(likely, key=lambda r: -r.score)
+        return replace(self, named=best, standby=tuple(r for r in others if r.score > best.score - NEEDED))
+
     def none_left(self, empty: Fit) -> "Choice":
         """Return the choice of no cause, the named set refuted."""
         return self._instead(Ranked(empty, 0.0))

@@ -147,6 +147,8 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
     before = Extended.of(empty, validate, baseline)
     examine = partial(Examined.of, before=before, validate=validate, baseline=baseline)
     examined = examine(choice)
+    if bool(np.any(examined.standing.systematic(examined.standing.slow_before))) and (faint := choice.faint()):
+        choice, examined = faint, examine(faint)
     while choice.named.labels and not examined.holds_up:
         # What the training runs promised does not hold on others: the next of those they can hardly tell from it, or
         # else what was heard or felt needs no other beside it.

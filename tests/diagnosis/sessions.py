@@ -23,13 +23,16 @@ RICH = FourierTrajectory(
 RUNS = [(run, purpose) for run in ("exo_alone", "with_human") for purpose in ("train", "validate")]
 
 
-def recordings(effect=None, joint=None, seed=1, seconds=40.0, **values):
-    """Return four recordings of a leg with an effect hidden in it."""
+SLOW = replace(RICH, omega=0.5 * RICH.omega)
+
+
+def recordings(effect=None, joint=None, seed=1, seconds=40.0, trained=RICH, **values):
+    """Return four recordings of a leg with an effect hidden in it; the training runs follow ``trained``."""
     hidden = [term_from(effect_named(effect)(joint=joint), values)] if effect else []
     made = []
     for number, (run, purpose) in enumerate(RUNS):
         plant = Plant(PlantSettings(), run, seed=10 * seed + number, effects=hidden)
-        made.append(Table(*record(plant, RICH, seconds, purpose)))
+        made.append(Table(*record(plant, trained if purpose == "train" else RICH, seconds, purpose)))
     return made
 
 

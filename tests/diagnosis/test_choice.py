@@ -44,6 +44,18 @@ def test_what_was_heard_stays_when_what_stood_beside_it_is_refuted():
     assert choice.just(both.labels) is None, "that is what was refuted"
 
 
+def test_what_training_hardly_shows_stands_for_other_runs_to_decide_where_nothing_was_named_or_refuted():
+    likely = [ranked(QuadraticDrag(joint="knee"), 15.0), ranked(StribeckFriction(joint="knee"), 11.0)]
+    others = [ranked(StribeckFriction(joint="hip"), 7.0), ranked(QuadraticDrag(joint="hip"), 5.0)]
+    none = Ranked(replace(likely[0].fit, causes=()), 0.0)
+    choice = Choice(none, [], [{(): none}, {r.labels: r for r in (*likely, *others)}], np.ones(2))
+    faint = choice.faint()
+    assert (faint.named, *faint.standby) == tuple(likely)
+    assert replace(choice, refined=[{(): none}, {r.labels: r for r in others[1:]}]).faint() is None, "not likely"
+    assert replace(choice, refuted=frozenset({likely[0].labels})).faint() is None
+    assert faint.faint() is None, "something is named"
+
+
 @pytest.fixture(scope="module")
 def offset():
     """A bank of a leg whose hip torque is read 3 N·m too high."""

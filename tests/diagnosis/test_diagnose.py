@@ -10,7 +10,7 @@ from pipelines.diagnosis.candidate_table import candidates
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.verdict import verdict
 from pipelines.errors import InputError
-from tests.diagnosis.sessions import recordings, session
+from tests.diagnosis.sessions import SLOW, recordings, session
 
 
 def labels(cause):
@@ -59,6 +59,14 @@ def test_a_hidden_effect_is_named_with_its_size_and_the_error_falls_to_the_floor
     assert size["value"] == pytest.approx(values[parameter], rel=0.15)
     np.testing.assert_allclose(found.after.errors.rms, found.standing.floor, rtol=0.08)
     assert first["gain"]["ci95"][0] > 0
+
+
+def test_a_drag_that_training_was_too_slow_for_is_named_where_faster_runs_bear_it_out():
+    found = diagnose(session("quadratic_drag", "hip", seed=3, trained=SLOW, drag=28.0))
+    trained = found.choice.refined[0][()].fit.rms[0], found.choice.named.fit.rms[0]
+    assert trained[1] > 0.95 * trained[0], "training alone would not have been worth a word"
+    assert found.causes == ("quadratic_drag@hip",)
+    np.testing.assert_allclose(found.after.errors.rms, found.standing.floor, rtol=0.08)
 
 
 @pytest.mark.parametrize(
