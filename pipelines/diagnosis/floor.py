@@ -33,8 +33,9 @@ def noise_floor(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Floor:
     from_periods = any(len(d) for d in pairs)
     averaged = np.inf
     if not from_periods:
-        averaged = min(_blocks(run, LONGEST_LAG_S) for run in runs)
-        pairs = [faster(run, residual, LONGEST_LAG_S) for run, residual in zip(runs, residuals, strict=True)]
+        lag = runs[0].motion.machine.lasting(LONGEST_LAG_S)
+        averaged = min(_blocks(run, lag) for run in runs)
+        pairs = [faster(run, residual, lag) for run, residual in zip(runs, residuals, strict=True)]
     outputs = residuals[0].shape[1]
     rms, share = np.full(outputs, np.nan), np.ones(outputs)
     for o in range(outputs):

@@ -13,7 +13,8 @@ from pipelines.mechanics.one_machine import refuse_several_machines
 
 MOST_NM = 10_000.0
 LEAST_S = 5.0
-"""Of motion, all runs of a kind and purpose together; below, gravity, inertia and friction are not told apart."""
+"""Of an exoskeleton's motion, all runs of a kind and purpose together; below, gravity, inertia and friction are not
+told apart."""
 
 
 def refuse_unfit(motions: Sequence[Motion]) -> None:
@@ -54,18 +55,19 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
     together = f"in the {motions[0].run} runs to {motions[0].purpose} together"
     moving = [away_from_reversals(m) & m.valid[:, np.newaxis] for m in motions]
     machine = motions[0].machine
+    least = machine.lasting(LEAST_S)
     for j, joint in enumerate(machine.joints):
-        if (lasts := _seconds(motions, [m[:, j] for m in moving])) < LEAST_S:
+        if (lasts := _seconds(motions, [m[:, j] for m in moving])) < least:
             raise InputError(
                 f"{files}: the {joint.name} moves for {lasts:.1f} s (faster than {reversal_speeds(machine)[j]:.2g} "
-                f"{joint.unit('velocity')} and away from reversals), expected {LEAST_S:g} s {together}; "
+                f"{joint.unit('velocity')} and away from reversals), expected {least:.2g} s {together}; "
                 f"excite {'both joints' if len(machine.joints) == 2 else 'it'}, or record longer; "
                 "if it did move, check its encoder"
             )
-    if (lasts := _seconds(motions, [m.all(axis=1) for m in moving])) < LEAST_S:
+    if (lasts := _seconds(motions, [m.all(axis=1) for m in moving])) < least:
         raise InputError(
             f"{files}: {' and '.join(machine.names)} move at once for {lasts:.1f} s, "
-            f"expected {LEAST_S:g} s {together}: errors are scored there; "
+            f"expected {least:.2g} s {together}: errors are scored there; "
             "excite both joints at the same time, or record longer"
         )
 

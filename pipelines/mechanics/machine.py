@@ -38,6 +38,14 @@ class Machine:
         """Return the scale of the joint of a name."""
         return self.scales[self.names.index(name)] if self.scales else Scale()
 
+    def lasting(self, seconds: float) -> float:
+        """Return how long this machine needs for what an exoskeleton does in so many seconds, no longer than that, s.
+
+        A pendulum that swings up goes five times as fast: a second of it tells as much.
+        """
+        slowest = max((scale.travel / scale.speed for scale in self.scales), default=1.0)
+        return seconds * min(1.0, slowest)
+
     def place(self, name: str) -> str:
         """Return what effects call the joint of a name: ``hip`` for a leg's first, whatever it is called."""
         return self.mechanism.places[self.names.index(name)]

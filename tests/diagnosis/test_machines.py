@@ -114,6 +114,12 @@ def test_ranges_go_with_the_machine_and_a_leg_keeps_its_own():
     assert on_one_scale([replace(arm, metadata={}, joints=("hip", "knee"), scales=())])[0].scales == ()
 
 
+def test_a_faster_machine_needs_less_of_a_run_and_a_slower_one_no_more():
+    arm, axis = (on_one_scale(motions(machine))[0].machine for machine in (pendulum, slide))
+    assert arm.lasting(5.0) == pytest.approx(5.0 / arm.scale("arm").speed)
+    assert axis.lasting(5.0) <= 5.0 and THE_LEG.lasting(5.0) == 5.0
+
+
 def test_play_of_another_machine_is_not_simulated_with_an_exoskeletons_teeth():
     machine = machine_of([Joint("arm")], Geometry())
     terms = [Term(effect, np.ones(len(effect.linear))) for effect in baseline(machine, ("exo_alone",))]

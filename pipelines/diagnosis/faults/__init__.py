@@ -20,7 +20,7 @@ from pipelines.diagnosis.faults.wiring import angle_faults, cuff_faults, wiring_
 from pipelines.mechanics.motion import Motion
 
 LEAST_S = 5.0
-"""Of a run that faults must leave, or it is not worth its place."""
+"""Of an exoskeleton's run that faults must leave, or it is not worth its place."""
 
 __all__ = ["Fault", "excluding", "find_faults"]
 
@@ -51,8 +51,10 @@ def find_faults(motions: Sequence[Motion]) -> list[Fault]:
 
 def _hopeless(motions: Sequence[Motion], faults: Iterable[Fault]) -> list[Fault]:
     """Return the faults, those of runs of which too little is left without them as such that masking does not help."""
-    left = {m.file: m.valid.sum() / m.sample_rate_hz for m in excluding(motions, faults)}
-    return [replace(fault, samples=None) if left[fault.file] < LEAST_S else fault for fault in faults]
+    hopeless = {
+        m.file for m in excluding(motions, faults) if m.valid.sum() / m.sample_rate_hz < m.machine.lasting(LEAST_S)
+    }
+    return [replace(fault, samples=None) if fault.file in hopeless else fault for fault in faults]
 
 
 def excluding(motions: Sequence[Motion], faults: Iterable[Fault]) -> list[Motion]:
