@@ -42,7 +42,7 @@ format: $(INSTALLED) ## format the code
 bench: $(INSTALLED) ## measure speed
 	$(BIN)/python -m tests.bench
 
-estimators: $(INSTALLED) ## what docs/estimators.md says of the methods, measured on simulated and real data; about half an hour
+estimators: $(INSTALLED) ## what docs/estimators.md says of the methods, measured on simulated and real data; long
 	$(BIN)/python -m tests.estimators
 
 fuzz: $(INSTALLED) ## hostile replies against the client, hostile requests against the rig: 60,000 of each
