@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +14,7 @@ from exoid_cli.operator_view import OperatorView, plain_line
 
 if TYPE_CHECKING:
     from pipelines.acquisition.loop import Progress
+    from pipelines.mechanics.trajectory import Trajectory
     from pipelines.settings.rig import RigSettings
 
 LINE_S = 5.0
@@ -39,18 +40,22 @@ def acquire(
     """
     from pipelines.acquisition.acquire import acquire as record
     from pipelines.settings import Experiment
-    from pipelines.settings.rig import load_rig
 
     experiment = Experiment.load(config)
     experiment.mechanism.refuse_all_but_the_leg("`exoid acquire`")
-    settings, rig = experiment.run_named(run), experiment.file(experiment.acquire.rig)
-    limited, rate = load_rig(rig).in_force(settings.run), experiment.acquire.sample_rate_hz
-    if settings.run == "with_human" and not limited.embedded and not yes:
-        confirm(limited, settings, trajectory, rate)
-    with _watching(limited, run) as report:
+    settings, rate = experiment.run_named(run), experiment.acquire.sample_rate_hz
+    reports: list[Callable[[Progress], None]] = []
+    with ExitStack() as shown:
+
+        def begin(rig: "RigSettings", motion: "Trajectory") -> None:
+            if settings.run == "with_human" and not rig.embedded and not yes:
+                confirm(rig, settings, trajectory, motion, rate)
+            reports.append(shown.enter_context(_watching(rig, run)))
+
         outcome = record(
-            rig, settings, trajectory, output, rate, experiment.mechanism, report, reset_faults=reset_faults
-        )
+            experiment.file(experiment.acquire.rig), settings, trajectory, output, rate, experiment.mechanism,
+            lambda progress: reports[0](progress), reset_faults=reset_faults, begin=begin,
+        )  # fmt: skip
     if outcome.missed:
         console.warn(f"{outcome.path}: {outcome.missed} samples were missed; `exoid show` lists the gaps")
     console.emit({"path": outcome.path, "samples": outcome.samples, "missed": outcome.missed})

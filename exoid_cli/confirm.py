@@ -1,4 +1,4 @@
-"""The question before a leg with somebody in it is moved."""
+"""The questions before a leg is moved."""
 
 import sys
 from pathlib import Path
@@ -7,26 +7,18 @@ from typing import TYPE_CHECKING
 from exoid_cli.console import console
 
 if TYPE_CHECKING:
+    from pipelines.mechanics.trajectory import Trajectory
     from pipelines.settings.acquire import RunSettings
     from pipelines.settings.rig import RigSettings
 
 
-def confirm(rig: "RigSettings", run: "RunSettings", trajectory: Path, sample_rate_hz: float) -> None:
+def confirm(
+    rig: "RigSettings", run: "RunSettings", trajectory: Path, motion: "Trajectory", sample_rate_hz: float
+) -> None:
     """Show what will be moved and the limits in force, and ask; raise InputError unless the answer is yes."""
     import numpy as np
 
-    from pipelines.acquisition.plan import check_trajectory
-    from pipelines.errors import InputError, about
-    from pipelines.mechanics.trajectory import read_trajectory
-
-    if not sys.stdin.isatty():
-        raise InputError(
-            f"run {run.name} moves somebody, which wants to be confirmed on a terminal; give --yes where a script "
-            "starts it; nothing was moved"
-        )
-    motion = read_trajectory(trajectory)
-    with about(trajectory):
-        check_trajectory(rig, motion, run.duration_s, sample_rate_hz)
+    _refuse_nobody_to_ask(f"run {run.name} moves somebody, which wants to be confirmed on a terminal")
     seconds = min(run.duration_s, motion.period_s or run.duration_s)
     angles, speeds = motion.at(np.arange(0.0, seconds, 1.0 / sample_rate_hz))[:2]
     # On the terminal in every mode: who answers must have seen it.
@@ -41,6 +33,31 @@ def confirm(rig: "RigSettings", run: "RunSettings", trajectory: Path, sample_rat
     cuffs = f"{rig.safety.cuff_force_n:g} N on {len(rig.sensor)} cuff sensors" if rig.sensor else "none on the cuffs"
     lines.append(f"  force {cuffs}; ramps of {rig.safety.ramp_s:g} s or longer lead in and out; Ctrl-C stops it")
     console.err.print("\n".join(lines), markup=False, soft_wrap=True)
-    console.err.print("Is everybody ready, and the emergency stop at hand? [y/N] ", markup=False, end="")
+    _ask("Is everybody ready, and the emergency stop at hand?", f"run {run.name}")
+
+
+def confirm_move() -> None:
+    """Ask whether a check may move the leg; raise InputError unless the answer is yes."""
+    _refuse_nobody_to_ask("--move moves the leg, which wants to be confirmed on a terminal")
+    console.err.print(
+        "\nIf all registers are right, the drives will be enabled and move both joints by 0.05 rad to and fro, the hip "
+        "once in 4 s, the knee twice as fast. Keep the emergency stop in your hand; if the wrong joint moves faster, "
+        "press it: the drives are swapped.",
+        markup=False,
+    )
+    _ask("Is nobody in the machine, and everybody ready?", "--move")
+
+
+def _refuse_nobody_to_ask(why: str) -> None:
+    from pipelines.errors import InputError
+
+    if not sys.stdin.isatty():
+        raise InputError(f"{why}; give --yes where a script starts it; nothing was moved")
+
+
+def _ask(question: str, what: str) -> None:
+    from pipelines.errors import InputError
+
+    console.err.print(f"{question} [y/N] ", markup=False, end="")
     if sys.stdin.readline().strip().lower() not in ("y", "yes"):
-        raise InputError(f"run {run.name} was not confirmed; nothing was moved")
+        raise InputError(f"{what} was not confirmed; nothing was moved")

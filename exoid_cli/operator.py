@@ -25,17 +25,3 @@ class Terminal:
             loop.remove_reader(sys.stdin)
         if not sys.stdin.readline():
             raise InputError("standard input ended before the check did; begin it anew at a terminal")
-
-
-def confirm_move() -> None:
-    """Ask whether the leg may be moved; refuse where nobody can answer, or says no."""
-    if not sys.stdin.isatty():
-        raise InputError("--move moves the leg, and nobody is at a terminal to agree; add --yes if it is safe")
-    console.err.print(
-        "\nIf all registers are right, the drives will be enabled and move both joints by 0.05 rad to and fro, the hip "
-        "once in 4 s, the knee twice as fast. Keep the emergency stop in your hand; if the wrong joint moves faster, "
-        "press it: the drives are swapped.\nType yes to go on.",
-        markup=False,
-    )
-    if sys.stdin.readline().strip() != "yes":
-        raise InputError("--move: not agreed to, nothing was moved")

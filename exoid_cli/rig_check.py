@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from exoid_cli.confirm import confirm_move
 from exoid_cli.console import console
-from exoid_cli.operator import Terminal, confirm_move
+from exoid_cli.operator import Terminal
 
 if TYPE_CHECKING:
     from pipelines.acquisition.check.latency import Latency
@@ -41,12 +42,14 @@ def check(
       exoid rig check rigs/real_time.toml --rate-hz 200
       exoid rig check rig.toml --by-hand
     """
-    from pipelines.acquisition.check.check import check_rig
+    from pipelines.acquisition.check.check import check_rig, refuse_to_move_somebody
     from pipelines.errors import DeviceError
     from pipelines.settings import Experiment
 
     if rate_hz is None and config:
         rate_hz = Experiment.load(config).acquire.sample_rate_hz
+    if run == "with_human":
+        refuse_to_move_somebody(by_hand=by_hand, move=move)
     console.say(f"{file}: asking every device")
     if move and not yes:
         confirm_move()

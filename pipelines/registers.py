@@ -28,7 +28,7 @@ class Block:
         self._words_format = struct.Struct(f">{self.count}H")
         self._values_format = struct.Struct(">" + "".join(_FORMAT[r.type] for r in registers.values()))
         self._scales = [r.si for r in registers.values()]
-        self._ranges = [raw_range(r) for r in registers.values()]
+        self._ranges = [r.counts for r in registers.values()]
 
     def _bytes(self, register: Register) -> list[int]:
         first = register.address - self.address
@@ -57,21 +57,5 @@ class Block:
     def span(self, name: str) -> float:
         """Return after which difference an unsigned counter begins anew, in SI units; 0 for one that does not."""
         register = self.registers[name]
-        limits = raw_range(register)
+        limits = register.counts
         return (limits[1] + 1) * register.si[0] if limits and limits[0] == 0 else 0.0
-
-    def holds(self, name: str, low: float, high: float) -> bool:
-        """Tell whether a register can hold every SI value from ``low`` to ``high``."""
-        limits = raw_range(self.registers[name])
-        scale, offset = self.registers[name].si
-        if limits is None:
-            return True
-        return all(limits[0] <= round((value - offset) / scale) <= limits[1] for value in (low, high))
-
-
-def raw_range(register: Register) -> tuple[int, int] | None:
-    """Return the least and the greatest count of an integer register; None for a float."""
-    if register.type.startswith("float"):
-        return None
-    bits = 16 * register.registers
-    return (0, 2**bits - 1) if register.type.startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)

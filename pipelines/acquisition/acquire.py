@@ -3,7 +3,7 @@
 import logging
 import signal
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +30,8 @@ from pipelines.settings.acquire import RunSettings
 from pipelines.settings.mechanism import MechanismSettings
 from pipelines.settings.rig import RigSettings, load_rig
 
+Begin = Callable[[RigSettings, Trajectory], None]
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -50,6 +52,7 @@ def acquire(
     report: Report = lambda progress: None,
     *,
     reset_faults: bool = False,
+    begin: Begin = lambda rig, trajectory: None,
 ) -> Outcome:
     """Record one run.
 
@@ -70,6 +73,9 @@ def acquire(
         Called about ten times a second with the progress.
     reset_faults : bool
         Clear the faults that drives report before the run, with the control word that the rig file has for it.
+    begin : callable
+        Told the rig with the limits in force and the motion, both found fit, before anything is connected; what it
+        raises refuses the run.
     """
     rig = load_rig(rig_path).in_force(run.run)
     trajectory = read_trajectory(trajectory_path)
@@ -78,6 +84,7 @@ def acquire(
     if rig.clock == "real_time":
         with about(rig_path):
             refuse_slow_lines(rig, sample_rate_hz, with_sensors=run.run == "with_human")
+    begin(rig, trajectory)
     RECORDING.refuse_place(output)
     journal = journal_of(output)
     refuse_leftover(journal)
@@ -117,6 +124,7 @@ async def _record(
         await machine.connect()
         if reset_faults:
             await machine.reset_faults()
+        await machine.make_idle()
         start = np.array((await machine.look()).angle)
         if why := check_start(rig, start):
             raise DeviceError(why)

@@ -3,6 +3,7 @@
 import asyncio
 import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -139,9 +140,9 @@ class Drive:
 
     async def exchange(self, reference: float, *, halt: bool = False) -> Reading:
         """Send a set-point (rad) and return the sample that is latched; ``halt`` where the leg is to stand there."""
-        self.told_reference = reference
         control = self.map.enable if self.map.halt is None or not halt else self.map.halt
-        words = self._words(reference, control)
+        words = self.words(control, reference)
+        self.told_reference = reference
         # Nobody knows which set-point a drive follows that did not answer.
         before, self._sent = self._sent, np.nan
         sent = time.perf_counter()
@@ -151,11 +152,18 @@ class Drive:
         self._sent = reference
         return reading
 
-    async def disable(self, reference: float) -> None:
-        """Take the torque away, and make sure of it."""
-        await self.device.write(self.tell, self._words(reference, self.map.disable))
+    async def disable(self, angle: float) -> None:
+        """Take the torque away, and make sure of it; ``angle`` (rad) is where the leg stands or was sent."""
+        await self._tell_idle(self.map.disable, angle)
         if self.map.enabled_mask:
             await self._until(lambda status: not self._is_enabled(status), "to disable", "see its manual")
+
+    async def make_idle(self) -> bool:
+        """Disable the drive before a run, whatever it does; tell whether it said that it was enabled."""
+        told = self._decoded(self.told, await self.device.read(self.told.address, self.told.count))
+        was_enabled = bool(self.map.enabled_mask) and self._is_enabled(int(told["status"]))
+        await self.disable(told["angle"])
+        return was_enabled
 
     async def reset_fault(self) -> None:
         """Clear a fault; a drive that reports none is told nothing."""
@@ -168,12 +176,45 @@ class Drive:
                 "to be reset; give its control word, see the drive's manual"
             )
         try:
-            await self.device.write(self.tell, self._words(told["angle"], self.map.fault_reset))
+            await self._tell_idle(self.map.fault_reset, told["angle"])
             await self._until(lambda status: not status & self.map.fault_mask, "to reset its fault", "see its manual")
-        finally:
-            await self.device.write(self.tell, self._words(told["angle"], self.map.disable))
+        except DeviceError:
+            with suppress(DeviceError):  # the first one says what is wrong
+                await self._tell_idle(self.map.disable, told["angle"])
+            raise
+        await self._tell_idle(self.map.disable, told["angle"])
 
-    def _words(self, reference: float, control: int) -> list[int]:
+    def words(self, control: int, reference: float) -> list[int]:
+        """Return the registers that tell a control word and a set-point (rad).
+
+        Raises
+        ------
+        DeviceError
+            The set-point is no number, or outside the joint's limits.
+        """
+        low, high = self.settings.angle_rad
+        if not low <= reference <= high:
+            raise DeviceError(
+                f"{self.device.label}: a set-point of {reference:.3f} rad was due, outside its limits {low:g} to "
+                f"{high:g} rad; it was not sent"
+            )
+        return self._encoded(control, reference)
+
+    async def idle_words(self, control: int, angle: float) -> list[int]:
+        """Return the registers that tell a control word to a drive that is not to follow, its leg at ``angle`` (rad).
+
+        Where that can be no set-point, the one that the drive holds already is told again.
+        """
+        low, high = self.settings.angle_rad
+        if low <= angle <= high:
+            return self.words(control, angle)
+        held = self.tell.decode(await self.device.read(self.tell.address, self.tell.count))
+        return self._encoded(control, held["reference"])
+
+    async def _tell_idle(self, control: int, angle: float) -> None:
+        await self.device.write(self.tell, await self.idle_words(control, angle))
+
+    def _encoded(self, control: int, reference: float) -> list[int]:
         self._beats = (self._beats + 1) % self._beats_span
         return self.tell.encode({"reference": reference, "control": control, "heartbeat": self._beats})
 
@@ -330,6 +371,15 @@ class Machine:
         """Clear the faults that drives report."""
         for drive in self.drives:
             await drive.reset_fault()
+
+    async def make_idle(self) -> None:
+        """Disable every drive before a run; refuse to go on where one was enabled: nobody knows what moved the leg."""
+        found = [drive.device.label for drive in self.drives if await drive.make_idle()]
+        if found:
+            raise DeviceError(
+                f"{' and '.join(found)}: enabled before the run began, by one that was killed perhaps; disabled now; "
+                "see to the leg, and to what else moves it, and start again"
+            )
 
     def close(self) -> None:
         """Close every line."""

@@ -10,8 +10,7 @@ from pipelines.acquisition.set_points import SetPoints
 from pipelines.errors import InputError
 from pipelines.mechanics.ramp import smooth_share
 from pipelines.mechanics.trajectory import Trajectory
-from pipelines.registers import Block
-from pipelines.settings.rig import RigSettings, registers_of
+from pipelines.settings.rig import RigSettings
 
 LONGEST_RAMP_S = 60.0
 RAMP_GROWTH = 1.2
@@ -171,10 +170,4 @@ def _refuse_outside(rig: RigSettings, run: NDArray, first: int, rate: float) -> 
             raise InputError(
                 f"the {drive.joint} would move at {speed[k, j]:.3f} rad/s at {(first + k + 0.5) / rate:.3f} s, but the "
                 f"rig allows {drive.speed_rad_s:g} rad/s; make the excitation slower or smaller"
-            )
-        reference = Block(registers_of(rig.map.drive[drive.map].write))
-        if not reference.holds("reference", low, high):
-            raise InputError(
-                f"map.drive.{drive.map}.write.reference: cannot hold {low:g} to {high:g} rad, the {drive.joint}'s "
-                "limits; correct its type or scale"
             )

@@ -65,6 +65,8 @@ class Supervisor:
         self.state = State.IDLE
         self.why: str | None = None
         """The first reason to stop early; None while there is none."""
+        self.also: list[str] = []
+        """What else went wrong after that, in its order."""
         self.fault: BaseException | None = None
         """The first error that was exoid's own."""
         self.still_enabled = False
@@ -240,12 +242,15 @@ class Supervisor:
         return reached - (self._plan.first - 1) * cycle - cycle // 2 - 1
 
     def abort(self, error: BaseException) -> None:
-        """Stop, whatever it was; the first reason is kept."""
+        """Stop, whatever it was; the first reason is kept, and what else goes wrong is told after it."""
         ours = not isinstance(error, DeviceError | KeyboardInterrupt | SystemExit | CancelledError)
         if ours and self.fault is None:
             self.fault = error
+        reason = _reason(error)
         if self.why is None:
-            self.why = _reason(error)
+            self.why = reason
+        elif reason not in (self.why, *self.also):
+            self.also.append(reason)
         if State.ABORT in TRANSITIONS[self.state]:
             self._go(State.ABORT)
 
@@ -289,6 +294,8 @@ class Supervisor:
 
         Disabled is what is known to be: with a complaint a run ends in abort.
         """
+        if self.why is not None:
+            self.why = "; then ".join((self.why, *self.also))
         if not complaints:
             self._go(State.DISABLED)
             return

@@ -74,6 +74,21 @@ class Register(Settings):
         """SI units per count, and the SI value at a raw 0."""
         return self.scale * UNITS[self.unit], self.offset * UNITS[self.unit]
 
+    @property
+    def counts(self) -> tuple[int, int] | None:
+        """The least and the greatest count of an integer; None for a float."""
+        if self.type.startswith("float"):
+            return None
+        bits = 16 * self.registers
+        return (0, 2**bits - 1) if self.type.startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+
+    def holds(self, low: float, high: float) -> bool:
+        """Tell whether it can hold every SI value from ``low`` to ``high``."""
+        scale, offset = self.si
+        return self.counts is None or all(
+            self.counts[0] <= round((value - offset) / scale) <= self.counts[1] for value in (low, high)
+        )
+
 
 class Identity(Settings):
     """A register that tells which device this is, and what it must hold."""
@@ -225,6 +240,26 @@ class DriveMap(Settings):
             if times > 1:
                 same = " and ".join(name for name, value in words.items() if value == word)
                 raise ValueError(f"{same}: both are 0x{word:04X}, expected different control words; correct one")
+        return self
+
+    @model_validator(mode="after")
+    def _words_and_masks_fit_their_registers(self) -> Self:
+        words = {name: getattr(self, name) for name in ("enable", "disable", "halt", "fault_reset")}
+        masks = {name: getattr(self, name) for name in ("fault_mask", "enabled_mask")}
+        for name, register, told in (
+            ("write.control", self.write.control, words),
+            ("read.status", self.read.status, masks),
+        ):
+            if register is None:
+                continue
+            if not register.type.startswith("u") or (register.scale, register.offset) != (1.0, 0.0):
+                raise ValueError(
+                    f"{name}: found {register.type} with scale {register.scale:g} and offset {register.offset:g}, "
+                    "expected uint16, uint32 or uint64 as it is: its bits have meanings of their own; correct it"
+                )
+            for key, value in told.items():
+                if value is not None and not register.holds(value, value):
+                    raise ValueError(f"{key}: found 0x{value:X}, but {name} is a {register.type}; correct one of them")
         return self
 
     def told_faults(self, status: int) -> str:
@@ -471,6 +506,13 @@ class RigSettings(Settings):
             raise ValueError("plant: missing; a virtual rig (embedded, or in lockstep) needs the machine it plays")
         self._refuse_impossible_sampling()
         self._refuse_torque_that_is_never_told()
+        for drive in self.drive:
+            low, high = drive.angle_rad
+            if not self.map.drive[drive.map].write.reference.holds(low, high):
+                raise ValueError(
+                    f"map.drive.{drive.map}.write.reference: cannot hold {low:g} to {high:g} rad, the {drive.joint}'s "
+                    "limits; correct its type or scale"
+                )
         return self
 
     def _refuse_torque_that_is_never_told(self) -> None:

@@ -1,13 +1,17 @@
 """What a drive is told beside set-points, and how it is made sure that it took it."""
 
+import asyncio
+
 import pytest
 
 from pipelines.acquisition.acquire import acquire
 from pipelines.acquisition.device import Device
+from pipelines.acquisition.machine import Machine
 from pipelines.errors import DeviceError, SettingsError
 from pipelines.rig.server import Drive
 from pipelines.rig.servo import Servo
 from pipelines.settings.acquire import RunSettings
+from pipelines.settings.rig import load_rig
 from tests.acquisition.conftest import free_port
 
 ENABLE, DISABLE, HALT, RESET = 0x000F, 0x0000, 0x010F, 0x0080
@@ -30,12 +34,12 @@ def heard(monkeypatch):
 
 def test_a_run_enables_halts_and_disables_and_nothing_else(record, heard):
     record()
-    assert heard() == [[ENABLE, HALT, DISABLE]] * 2
+    assert heard() == [[DISABLE, ENABLE, HALT, DISABLE]] * 2
 
 
 def test_a_drive_that_knows_no_halt_is_held_by_its_set_point(record, heard):
     record(drop=("halt = ",))
-    assert heard() == [[ENABLE, DISABLE]] * 2
+    assert heard() == [[DISABLE, ENABLE, DISABLE]] * 2
 
 
 def test_a_drive_that_does_not_say_that_it_is_enabled_is_not_moved(record, monkeypatch):
@@ -74,14 +78,60 @@ def test_a_drive_that_still_says_enabled_is_told_again_and_then_reported(record,
         await write(device, block, words)
 
     monkeypatch.setattr(Device, "write", count)
-    status = Servo.status.fget
-    monkeypatch.setattr(Servo, "status", property(lambda servo: status(servo) | (servo._limits[0] > -1.0)))
+    status, enabled = Servo.status.fget, set()
+
+    def sticks(servo):
+        enabled.update({servo} if servo.enabled and servo._limits[0] > -1.0 else ())  # the hip's
+        return status(servo) | (servo in enabled)
+
+    monkeypatch.setattr(Servo, "status", property(sticks))
     with pytest.raises(DeviceError) as caught:
         record(watchdog_s=0.3)
     assert str(caught.value).startswith("the run is complete; and could not be disabled: drive hip (127.0.0.1:")
     assert "was told to disable, but its status word is still 0x0001 after 0.3 s" in str(caught.value)
     assert "USE THE EMERGENCY STOP" in str(caught.value)
-    assert (told.count("hip"), told.count("knee")) == (3, 1)
+    assert (told.count("hip"), told.count("knee")) == (4, 2)
+
+
+def test_a_drive_that_is_found_enabled_is_disabled_and_the_run_refused(record, monkeypatch, tmp_path):
+    served, begin = [], Servo.__init__
+
+    def left_enabled(servo, *arguments):
+        begin(servo, *arguments)
+        servo._control = ENABLE
+
+    monkeypatch.setattr(Servo, "__init__", left_enabled)
+    with pytest.raises(DeviceError, match=r"^drive hip \(.*\) and drive knee \(.*\): enabled before the run began"):
+        record(served_as=served)
+    assert served[0].enabled == [False, False]
+
+
+def first_drive(rig_file):
+    async def made():  # a connection belongs to an event loop
+        return Machine(load_rig(rig_file()), with_sensors=False).drives[0]
+
+    return asyncio.run(made())
+
+
+@pytest.mark.parametrize("angle", [float("nan"), 1.8, -300.0])
+def test_no_set_point_goes_out_that_is_no_number_or_outside_the_limits_whoever_sends_it(rig_file, angle):
+    drive = first_drive(rig_file)
+    with pytest.raises(DeviceError, match=r"outside its limits -0\.35 to 1\.75 rad; it was not sent"):
+        drive.words(DISABLE, angle)
+
+
+@pytest.mark.parametrize("angle", [float("nan"), 1.8])
+def test_a_drive_whose_angle_is_no_set_point_is_told_the_one_it_holds(rig_file, monkeypatch, angle):
+    drive = first_drive(rig_file)
+    held = drive.tell.encode({"reference": 0.3, "control": ENABLE, "heartbeat": 0})
+
+    async def read(device, address, count):
+        assert (address, count) == (drive.tell.address, drive.tell.count)
+        return held
+
+    monkeypatch.setattr(Device, "read", read)
+    told = drive.tell.decode(asyncio.run(drive.idle_words(DISABLE, angle)))
+    assert (told["reference"], told["control"]) == (pytest.approx(0.3), DISABLE)
 
 
 def faulty(rig, reset_faults, tmp_path, excitation, serve, port):
@@ -98,10 +148,10 @@ def test_a_fault_is_cleared_where_the_operator_asks_for_it_and_nowhere_else(
     with pytest.raises(DeviceError) as caught:
         faulty(rig_file(port=port), False, tmp_path, excitation, serve, port)
     assert "clear the fault and start again, with --reset-faults where the drive is to clear it" in str(caught.value)
-    assert heard() == []
+    assert heard() == [[DISABLE]] * 2
     port = free_port()
     faulty(rig_file(port=port), True, tmp_path, excitation, serve, port)
-    assert sorted(heard()) == sorted([[ENABLE, HALT, DISABLE], [RESET, DISABLE, ENABLE, HALT, DISABLE]])
+    assert sorted(heard()[2:]) == sorted([[DISABLE, ENABLE, HALT, DISABLE], [RESET, DISABLE, ENABLE, HALT, DISABLE]])
 
 
 def test_a_fault_that_the_rig_file_knows_no_word_for_is_not_cleared(tmp_path, excitation, rig_file, serve):

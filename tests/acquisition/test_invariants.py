@@ -195,6 +195,7 @@ def the_abort_is_told(run, folder):
         return
     if run.first_reason is not None:
         assert supervisor.why.startswith(run.first_reason)
+        assert all(also in supervisor.why for also in supervisor.also)
     if supervisor.why is None:
         assert isinstance(result, Outcome)
         assert RECORDING.read(result.path).metadata.get("abort") is None
@@ -210,7 +211,8 @@ def the_abort_is_told(run, folder):
 
 def only_disabling_failed(run):
     """Tell whether what was raised befell nothing but attempts to disable, the last of which went through."""
-    first = min(t.time for t in run.rig.told if t.control == 0)
+    enabled = min(t.time for t in run.rig.told if t.control != 0)
+    first = min(t.time for t in run.rig.told if t.control == 0 and t.time > enabled)
     return all(at >= first for at, _ in run.rig.raised)
 
 

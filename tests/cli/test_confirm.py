@@ -5,6 +5,7 @@ import io
 import pytest
 
 from pipelines.settings import datasets
+from pipelines.settings.rig import RigSettings
 
 
 @pytest.fixture
@@ -106,3 +107,20 @@ def test_nobody_is_strapped_into_an_embedded_rig(exoid, experiment, monkeypatch)
     outcome = exoid(*experiment(embedded="true"))
     assert len(recorded) == 1
     assert "[y/N]" not in outcome.err
+
+
+@pytest.mark.parametrize("option", ["--move", "--by-hand"])
+def test_a_leg_of_unverified_signs_is_not_checked_in_motion_with_somebody_in_it(exoid, option):
+    outcome = exoid("rig", "check", datasets() / "rigs" / "plain.toml", "--run", "with_human", option, "--yes")
+    assert (outcome.code, outcome.out) == (2, "")
+    assert outcome.err == (
+        f"exoid: {option} wants nobody in the machine, but --run with_human says that somebody is; drop one\n"
+    )
+
+
+def test_what_was_shown_is_what_runs_though_the_file_is_changed_meanwhile(exoid, experiment, answer, monkeypatch):
+    loads, load = [], RigSettings.in_force
+    monkeypatch.setattr(RigSettings, "in_force", lambda rig, run: (loads.append(run), load(rig, run))[1])
+    answer("y\n")
+    assert WENT_ON in exoid(*experiment()).err
+    assert loads == ["with_human"]

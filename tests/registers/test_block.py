@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from pydantic import ValidationError
 
-from pipelines.registers import Block, raw_range
+from pipelines.registers import Block
 from pipelines.settings.rig import REGISTERS, Register, SensorMap
 
 patient = settings(deadline=None)  # a busy computer is no fault of a block's
@@ -52,7 +52,7 @@ def raws(kind):
     """Return every value that a register can hold."""
     if kind.startswith("float"):
         return st.floats(allow_nan=False, allow_infinity=False, width=int(kind[5:]))
-    low, high = raw_range(Register(address=0, type=kind))
+    low, high = Register(address=0, type=kind).counts
     return st.integers(low, high)
 
 
@@ -109,7 +109,7 @@ def test_any_words_at_all_decode_to_something_for_each_register(drawn, words):
 )
 def test_a_scaled_value_comes_back_to_half_a_count(kind, scale, negative, offset, share):
     scale = -scale if negative else scale
-    low, high = raw_range(Register(address=0, type=kind))
+    low, high = Register(address=0, type=kind).counts
     value = (low + share * (min(high, 2**40) - low)) * scale + offset
     block = Block({"x": Register(address=0, type=kind, scale=scale, offset=offset)})
     rounding = 4 * np.finfo(float).eps * (abs(value) + abs(offset))
@@ -134,8 +134,8 @@ def test_registers_that_overlap_are_refused_and_others_are_not(first, second):
 def test_a_value_too_large_saturates_as_in_a_device():
     block = Block({"x": Register(address=0, type="int16", scale=0.001, unit="rad")})
     assert block.decode(block.encode({"x": 50.0}))["x"] == pytest.approx(32.767)
-    assert block.holds("x", -32.0, 32.0)
-    assert not block.holds("x", -33.0, 0.0)
+    assert block.registers["x"].holds(-32.0, 32.0)
+    assert not block.registers["x"].holds(-33.0, 0.0)
 
 
 def test_units_become_si():

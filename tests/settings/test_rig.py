@@ -49,6 +49,15 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
          "the lowest angle first; swap them"),
         ('map = "servo"', 'map = "servo"\nline = "leg"', "line: found 'leg' at unit 1, expected a table below [line]: "
          "there is none"),
+        ("enable = 0x000F", "enable = 0x1000F", "map.drive.servo: enable: found 0x1000F, but write.control is a "
+         "uint16; correct one of them"),
+        ("fault_mask = 0x0008", "fault_mask = 0x10000", "map.drive.servo: fault_mask: found 0x10000, but read.status "
+         "is a uint16; correct one of them"),
+        ('control = { address = 202, type = "uint16"', 'control = { address = 202, type = "int16"', "map.drive.servo: "
+         "write.control: found int16 with scale 1 and offset 0, expected uint16, uint32 or uint64 as it is: its bits "
+         "have meanings of their own; correct it"),
+        ('scale = 1e-6, unit = "rad" }\ncontrol', 'scale = 1e-10, unit = "rad" }\ncontrol',
+         "map.drive.servo.write.reference: cannot hold -0.35 to 1.75 rad, the hip's limits; correct its type or scale"),
         ("[plant]\n", "[controller.knee]\nlimit_nm = 110.0\n[plant]\n", "torque_nm: found 110 of the knee, expected "
          "less than its controller.limit_nm (110), which the drive never goes beyond; lower it"),
         ("following_error_rad = 0.1\n", "following_error_rad = 0.2\n", "safety: with_human.following_error_rad: found "

@@ -61,7 +61,7 @@ async def by_hand(
     for probe in probes:
         await probe.read()
         if isinstance(probe.part, Drive):
-            await probe.part.disable(probe.angle())
+            await probe.part.disable(probe.last()["angle"])
     findings: list[Finding] = []
     for probe in drives:
         motion, sign = MOTIONS[probe.place]

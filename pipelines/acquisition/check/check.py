@@ -13,7 +13,7 @@ from pipelines.acquisition.check.look import RigReport, look, probes_of
 from pipelines.acquisition.embedded import embedded
 from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.pace import urgent
-from pipelines.errors import DeviceError
+from pipelines.errors import DeviceError, InputError
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import RigSettings, load_rig
 
@@ -41,6 +41,8 @@ def check_rig(
     move : bool
         Whether the drives shall move the joints a little, once nothing else is wrong.
     """
+    if run == "with_human":
+        refuse_to_move_somebody(by_hand=operator is not None, move=move)
     rig = load_rig(path)
     if rate_hz is None and rig.plant:
         rate_hz = rig.plant.sample_rate_hz
@@ -54,6 +56,15 @@ def check_rig(
                 refuse_far_from_zero(start)
             report.answers, report.findings = guided(present, start, rate_hz or _counted(report), run)
         return report
+
+
+def refuse_to_move_somebody(*, by_hand: bool, move: bool) -> None:
+    """Refuse to move a leg of unverified signs with somebody in it, or to take its torque away."""
+    for option, given in (("--by-hand", by_hand), ("--move", move)):
+        if given:
+            raise InputError(
+                f"{option} wants nobody in the machine, but --run with_human says that somebody is; drop one"
+            )
 
 
 def _counted(report: RigReport) -> float:

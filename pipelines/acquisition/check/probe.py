@@ -74,19 +74,13 @@ class Probe:
         if not (self.in_lockstep and isinstance(self.part, Drive)):
             return await self.read()
         asked = time.perf_counter()
-        told = dict.fromkeys(self.part.tell.names, 0.0) | {"reference": self.angle(), "control": self.part.map.disable}
-        words = self.part.tell.encode(told)
+        words = await self.part.idle_words(self.part.map.disable, self.last()["angle"])
         self._keep(asked, await self.part.device.exchange(self.part.tell, words, self.part.told))
 
     async def count(self) -> None:
         """Read the sample counter alone, as a run does before each sample."""
         counter = self.block.registers["sequence"]
         await self.part.device.read(counter.address, counter.registers)
-
-    def angle(self) -> float:
-        """Return the angle that was read last, one that can be sent back: a drive that is disabled ignores it."""
-        angle = self.last()["angle"]
-        return angle if abs(angle) < 1e3 else 0.0
 
     def last(self) -> dict[str, float]:
         """Return the values that were read last, SI units."""

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.plausible import natural
 from pipelines.acquisition.check.probe import Probe, Series
-from pipelines.registers import raw_range
 
 AXES = ("force_x", "force_y", "force_z")
 ZERO_SHARE = 0.05
@@ -33,7 +32,7 @@ def check_zeros(probe: Probe, series: Series, limit_n: float, *, alone: bool) ->
         return  # the registers are to be mended first
     where = f"{probe.map_path}.read"
     for i, axis in enumerate(AXES):
-        mean, full = float(forces[:, i].mean()), raw_range(series.block.registers[axis])
+        mean, full = float(forces[:, i].mean()), series.block.registers[axis].counts
         scale, offset = series.block.registers[axis].si
         if full and np.mean(np.abs((forces[:, i] - offset) / scale) >= NEAR_END * full[1]) > 0.5:
             yield Finding(
