@@ -115,6 +115,9 @@ def _cutoff(recording: Rows, stretches: Stretches, rate_hz: float, settings: Fil
                 f"the longest stretch without a gap has {_count(samples)}, too few to choose a cut-off from; "
                 "record longer runs, or set filter.cutoff_hz"
             )
+        if not stretches.uniform[stretches.longest]:
+            # A uniform grid has more or fewer places than there are samples; never less than half as many.
+            samples //= 2
         names = tuple(joint.name for joint in recording.joints)
         return choose_cutoff(_on_grid(recording, stretches, rate_hz), samples, rate_hz, names)
     if settings.cutoff_hz >= rate_hz / 2:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from exoid_cli.app import run
 from tests.importing.conftest import MAP
 
 
@@ -168,3 +169,14 @@ def test_rows_that_never_hold_both_need_to_be_interpolated(imported, pendulum, w
     assert len(frame) == 999  # not the last row: no angle follows it
     assert_allclose(frame["pivot_torque_nm"], pendulum.torque[1:-1:2], atol=1e-12)
     assert_allclose(frame["pivot_angle_rad"], pendulum.angle[1:-1:2], atol=2e-4)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_short_irregular_recording_can_be_filtered(imported, pendulum, write_csv, seed):
+    """Its uniform grid has a place less than it has samples, or more."""
+    jitter = np.random.default_rng(seed).uniform(-0.001, 0.001, 1200)
+    columns = cut(pendulum.columns(), slice(0, 1200)) | {"time": pendulum.time[:1200] + jitter}
+    outcome = imported(write_csv(columns))
+    assert (
+        run(["-q", "filter", str(outcome.folder / "whole.parquet"), "-o", str(outcome.folder / "motion.parquet")]) == 0
+    )
