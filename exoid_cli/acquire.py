@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from exoid_cli.aside import Aside
 from exoid_cli.confirm import confirm
 from exoid_cli.console import console
 from exoid_cli.operator_view import OperatorView, plain_line
@@ -74,7 +75,7 @@ def _watching(rig: "RigSettings", run: str) -> Iterator[Callable[["Progress"], N
             return
         if progress.state is not last_state or time.monotonic() - last_line >= LINE_S:
             last_line, last_state = time.monotonic(), progress.state
-            console.say(plain_line(progress))
+            lines.say(plain_line(progress))
 
-    with console.live(view):
+    with Aside(console.say) as lines, console.live(view):
         yield report

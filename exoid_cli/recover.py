@@ -50,6 +50,8 @@ def _told(one: "Recovered") -> str:
         seconds = account.cut_off / account.rate_hz
         text += f"; {account.cut_off} more ({seconds:.3f} s) were planned"
     text += f"; {account.missed} are missing in {len(account.gaps)} gaps" if account.gaps else "; no gaps"
+    if account.damaged:
+        text += "; the journal is damaged in places and is kept: check the disk"
     return f"{text}; {account.abort or 'the run had ended, only its recording was not written'}"
 
 
@@ -57,5 +59,5 @@ def _as_json(one: "Recovered") -> dict:
     account = one.account
     return {
         "path": one.path, "samples": account.samples, "planned": account.planned, "cut_off": account.cut_off,
-        "gaps": account.gaps, "abort": account.abort,
+        "gaps": account.gaps, "abort": account.abort, "damaged": account.damaged,
     }  # fmt: skip

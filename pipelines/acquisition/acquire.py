@@ -163,27 +163,32 @@ def _signals() -> Iterator[list[str]]:
 
 def _finish(output: Path, path: Path, supervisor: Supervisor) -> Outcome:
     """Turn the journal into a recording; raise where the run was stopped, or exoid was at fault."""
-    journal = JournalFile(path)
-    account = account_of(journal)
-    place, samples = place_for(output, account.abort), account.samples
     kind: type[ExoidError] = DeviceError
     told = f"{supervisor.why}; {_rest(supervisor)}" if supervisor.why else "the run is complete"
     if fault := supervisor.fault:
         kind = ExoidError
-        told = f"{supervisor.why}; please report it with {_keep_traceback(fault, place)}; {_rest(supervisor)}"
-    if account.abort and not samples:
-        path.unlink()
-        raise kind(f"{told} before the recording began") from fault
+        log = _keep_traceback(fault, place_for(output, supervisor.why))
+        told = f"{supervisor.why}; please report it with {log}; {_rest(supervisor)}"
     try:
-        write_recording(journal, place, account)
+        journal = JournalFile(path)
+        account = account_of(journal)
+        place, samples = place_for(output, account.abort), account.samples
+        if samples or not account.abort:
+            write_recording(journal, place, account)
     except (ExoidError, OSError) as error:
         raise kind(
-            f"{told}; its {samples} samples are in {path}, but could not be written as a recording: {error}; once "
-            f"that is mended, `exoid recover {path}` makes one"
+            f"{told}; its samples are in {path}, but could not be written as a recording: {error}; once that is "
+            f"mended, `exoid recover {path}` makes one"
         ) from error
+    if account.damaged:
+        raise kind(
+            f"{told}; {samples} samples are in {place}, but the disk did not give back all that was written; check the "
+            f"disk, {path} is kept"
+        ) from fault
     path.unlink()
     if account.abort:
-        raise kind(f"{told}, its {samples} samples so far are in {place}") from fault
+        rest = f", its {samples} samples so far are in {place}" if samples else " before the recording began"
+        raise kind(told + rest) from fault
     return Outcome(place, samples, account.missed)
 
 

@@ -1,4 +1,4 @@
-"""Every sample on disk as it comes: an Arrow stream beside the recording, readable wherever it was cut off.
+"""Every sample on disk as it comes: an Arrow stream beside the recording, readable wherever it was cut off or damaged.
 
 Whoever writes a journal holds a lock on it, which the system takes away whatever becomes of the process: so a run
 that goes on can be told from one that was killed.
@@ -7,12 +7,13 @@ that goes on can be told from one that was killed.
 import fcntl
 import io
 import json
-import time
-from collections.abc import Iterator, Mapping, Sequence
+import threading
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, BinaryIO, Self
 
 import pyarrow as pa
 
@@ -21,11 +22,19 @@ from pipelines.errors import ContractError, InputError
 
 FLUSH_S = 0.2
 """Longest a sample waits before it is written, s; a crash loses no more."""
+MOST_WAITING = 20_000
+"""Samples that wait for a disk that takes none; then the run stops. 20 s at 1 kHz."""
 ENDING = ".journal"
 ABORT = b"abort"
 """Key under which a journal's last words say why the run was stopped early; empty where it was not."""
 FOUND = b"found"
 """Key under which they hold what the run found out for its metadata."""
+ROWS = b"rows"
+"""Key under which they tell how many samples there must be."""
+MARK = b"\xff\xff\xff\xff"
+"""With this every part of an Arrow stream begins, at a multiple of eight bytes."""
+SCANNED = 65536
+"""Bytes that are looked through at once for the next one, a multiple of eight."""
 
 
 def journal_of(output: Path) -> Path:
@@ -34,15 +43,15 @@ def journal_of(output: Path) -> Path:
 
 
 class Journal:
-    """Rows on their way to disk."""
+    """Rows on their way to disk, which a thread of its own brings there: a disk that hangs must not hold up a leg."""
 
     def __init__(self, path: Path, columns: Sequence[str], metadata: dict[str, Any]) -> None:
         self.path = path
         self.rows = 0
         fields = [pa.field(name, pa.int64() if name == "sequence" else pa.float64()) for name in columns]
         self._schema = pa.schema(fields, metadata={KEY: to_json(metadata, str(path)).encode()})
-        self._waiting: list[Sequence[float]] = []
-        self._flushed = time.monotonic()
+        self._waiting: deque[Sequence[float]] = deque()
+        self._failure: OSError | None = None
         self._last_words: dict[bytes, str] | None = None
         path.parent.mkdir(parents=True, exist_ok=True)
         # Exclusive: a journal that is there already is all that is left of a run.
@@ -52,31 +61,57 @@ class Journal:
         self._stream = pa.ipc.new_stream(self._bytes, self._schema)
         self._stream.write_batch(self._batch([]))  # the head comes to disk with a first batch only
         self._hand_over()
+        self._writing, self._ends = threading.Lock(), threading.Event()
+        self._writer = threading.Thread(target=self._write_on, name="journal", daemon=True)
+        self._writer.start()
 
     def append(self, row: Sequence[float]) -> None:
-        """Add a sample."""
+        """Add a sample; never waits for the disk.
+
+        Raises
+        ------
+        OSError
+            The disk took what came before not, or not for too long.
+        """
         self._waiting.append(row)
         self.rows += 1
-        if time.monotonic() - self._flushed >= FLUSH_S:
-            self.flush()
+        if self._failure:
+            raise self._failure
+        if len(self._waiting) > MOST_WAITING:
+            raise OSError(f"{MOST_WAITING} samples wait for the disk, which does not answer")
 
     def flush(self) -> None:
-        """Hand what waits over to the operating system."""
-        if self._waiting:
-            self._stream.write_batch(self._batch(self._waiting))
-            self._hand_over()
-            self._waiting = []
-        self._flushed = time.monotonic()
+        """Hand what waits over to the operating system; returns when that has it."""
+        with self._writing:
+            rows = [self._waiting.popleft() for _ in range(len(self._waiting))]
+            if not rows:
+                return
+            try:
+                self._stream.write_batch(self._batch(rows))
+                self._hand_over()
+            except OSError:
+                self._waiting.extendleft(reversed(rows))
+                raise
+
+    def _write_on(self) -> None:
+        """Flush time after time, until the end or until that fails."""
+        while not self._failure and not self._ends.wait(FLUSH_S):
+            try:
+                self.flush()
+            except OSError as error:
+                self._failure = error
 
     def end(self, abort: str | None, found: Mapping[str, Any] | None = None) -> None:
         """Say how the run ended: why it was stopped early, None if it was not. Only a killed run never says.
 
         ``found`` is what else its metadata shall tell that was not known before the run.
         """
-        self._last_words = {ABORT: abort or "", FOUND: json.dumps(found or {})}
+        self._last_words = {ABORT: abort or "", FOUND: json.dumps(found or {}), ROWS: str(self.rows)}
 
     def close(self) -> None:
         """Write the rest and close the file."""
+        self._ends.set()
+        self._writer.join()
         with self._file:  # closed even where the disk is full
             self.flush()
             if self._last_words is not None:
@@ -122,41 +157,94 @@ class Batch:
 
 
 class JournalFile:
-    """A journal as it is found, whole or cut off anywhere; it is read batch by batch."""
+    """A journal as it is found: whole, cut off or damaged anywhere; it is read batch by batch."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.damaged = self.rows = 0
+        """Of what was read last: bytes that told nothing though more came after them, and samples."""
         try:
             with open(path, "rb") as file:
                 self.schema = pa.ipc.open_stream(file).schema
+                file.seek(0)
+                pa.ipc.read_message(pa.PythonFile(file, mode="r"))
+                self._head = _between(file, 0, file.tell())
             self.metadata: dict[str, Any] = json.loads(self.schema.metadata[KEY])
-        except (pa.ArrowException, KeyError, TypeError, ValueError) as error:
+        except (pa.ArrowException, EOFError, KeyError, TypeError, ValueError) as error:
             raise ContractError(
                 f"{path}: is no journal of a run, or not even its head was written and so no sample; delete it"
             ) from error
 
     def batches(self) -> Iterator[Batch]:
-        """Yield batch after batch; the one that was cut off is none."""
-        with open(self.path, "rb") as file:
-            stream = pa.ipc.open_stream(file)
-            while True:
-                try:
-                    rows, words = stream.read_next_batch_with_custom_metadata()
-                except (StopIteration, pa.ArrowException, OSError):  # the end, or where it was cut off
-                    return
-                yield Batch(rows, None if words is None else dict(words))
+        """Yield batch after batch; one that was cut off or is damaged is left out, and what comes after it looked for.
 
-    def pieces(self, rows: int) -> Iterator[pa.Table]:
-        """Yield all samples as tables of about so many rows."""
-        waiting, count = [], 0
-        for batch in self.batches():
-            waiting.append(batch.rows)
-            count += batch.rows.num_rows
-            if count >= rows:
-                yield pa.Table.from_batches(waiting)
-                waiting, count = [], 0
-        if waiting:
+        Raises
+        ------
+        InputError
+            The disk does not give back what is on it.
+        """
+        self.damaged = self.rows = 0
+        with open(self.path, "rb") as file:
+            unread_from = len(self._head)
+            place: int | None = unread_from
+            while place is not None:
+                file.seek(place)
+                if batch := self._batch_at(file, place):
+                    self.damaged += place - unread_from
+                    self.rows += batch.rows.num_rows
+                    place = unread_from = file.tell()
+                    yield batch
+                else:
+                    place = _next_mark(file, place + 1)
+
+    def _batch_at(self, file: BinaryIO, place: int) -> Batch | None:
+        """Return the batch that begins at a place of the file, and leave the file at its end; None where none does."""
+        try:
+            pa.ipc.read_message(pa.PythonFile(file, mode="r"))
+            end = file.tell()
+            stream = pa.ipc.open_stream(self._head + _between(file, place, end))
+            rows, words = stream.read_next_batch_with_custom_metadata()
+            rows.validate()
+        except OSError as error:
+            if error.errno is not None:  # not what Arrow makes of a file that ends too soon
+                raise InputError(
+                    f"{self.path}: cannot be read ({error.strerror}); nothing was changed; copy it to another disk and "
+                    "recover it there"
+                ) from error
+            return None
+        except (pa.ArrowException, EOFError, StopIteration, ValueError):
+            return None
+        return Batch(rows, None if words is None else dict(words))
+
+
+def _between(file: BinaryIO, begin: int, end: int) -> bytes:
+    file.seek(begin)
+    return file.read(end - begin)
+
+
+def _next_mark(file: BinaryIO, begin: int) -> int | None:
+    """Return where the next part of a stream may begin, from a place on; None where none does."""
+    file.seek(begin - begin % -8)
+    place = file.tell()
+    while chunk := file.read(SCANNED):
+        for k in range(0, len(chunk) - 7, 8):
+            if chunk[k : k + 4] == MARK:
+                return place + k
+        place += len(chunk)
+    return None
+
+
+def in_pieces(batches: Iterable[pa.RecordBatch], rows: int) -> Iterator[pa.Table]:
+    """Yield batches joined to tables of about so many rows."""
+    waiting, count = [], 0
+    for batch in batches:
+        waiting.append(batch)
+        count += batch.num_rows
+        if count >= rows:
             yield pa.Table.from_batches(waiting)
+            waiting, count = [], 0
+    if waiting:
+        yield pa.Table.from_batches(waiting)
 
 
 @contextmanager

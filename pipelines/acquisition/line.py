@@ -6,6 +6,7 @@ import ssl
 import sys
 import termios
 from collections.abc import Awaitable, Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, cast
 
@@ -30,13 +31,20 @@ class Line:
         self.place = settings.place
         self.client = _client(settings, timeout_s, self._told)
         self.client.set_max_no_responses(sys.maxsize)  # the watchdog decides for how long silence is borne
-        check_replies(self.client)
+        self._conversation = check_replies(self.client)
         self.devices: list[str] = []
         """Who is on it."""
         self._settings, self._timeout_s, self._name = settings, timeout_s, name
         self._turn = asyncio.Lock()
         self._asking = False
+        self._unanswered_s: float | None = None
+        """How long the last request was awaited in vain; None where it was answered."""
         self._quiet_since = 0.0
+
+    @property
+    def tells_replies_apart(self) -> bool:
+        """Whether a reply names the request that it answers; on a serial line none does."""
+        return not isinstance(self._settings, RtuLine | RtuOverTcpLine)
 
     def join(self, name: str, unit: int) -> str:
         """Add a device; return what errors call it."""
@@ -47,8 +55,11 @@ class Line:
     async def connect(self) -> None:
         """Open the connection; nothing happens where there is one."""
         async with self._turn:
-            if not self.client.connected and not await self._connected():
-                raise DeviceError(f"{self._label}: {await self._refusal()}")
+            await self._open()
+
+    async def _open(self) -> None:
+        if not self.client.connected and not await self._connected():
+            raise DeviceError(f"{self._label}: {await self._refusal()}")
 
     async def _connected(self) -> bool:
         self.client.ctx.comm_params.timeout_connect = self._timeout_s
@@ -68,10 +79,16 @@ class Line:
         self.client.close()
 
     async def renew(self) -> None:
-        """Close the connection and open another, once whoever is asking has been answered."""
+        """Open another connection where this one did not answer last, once whoever is asking has been answered.
+
+        Nobody's turn comes in between: whoever else is on the line is asked on the old connection or the new one.
+        """
         async with self._turn:
+            if self._unanswered_s is None:
+                return
             self.close()
-        await self.connect()
+            await self._open()
+            self._unanswered_s = None
 
     async def ask(self, within_s: float, request: Callable[..., Awaitable[ModbusPDU]], **arguments: Any) -> ModbusPDU:
         """Send a request of the client's when it is its turn, and return the answer, awaited for ``within_s``.
@@ -84,12 +101,16 @@ class Line:
             The device did not answer; the line stands.
         """
         async with self._turn:
+            if self._unanswered_s is not None and not self.tells_replies_apart:
+                await self._let_pass(self._unanswered_s)
             await self._quiet()
             # The one place where pymodbus looks for how long to wait, be it for a connection or for an answer.
             self.client.ctx.comm_params.timeout_connect = within_s
-            self._asking = True
+            self._asking, self._unanswered_s = True, within_s
             try:
-                return await request(**arguments)
+                answer = await request(**arguments)
+                self._unanswered_s = None
+                return answer
             except (ModbusException, OSError) as error:
                 if self.client.connected:
                     raise
@@ -102,6 +123,12 @@ class Line:
     @property
     def _label(self) -> str:
         return f"line {self._name} ({self.place})" if self._name else self.devices[0]
+
+    async def _let_pass(self, within_s: float) -> None:
+        """Wait for the reply that did not come in time, lest it be taken for the next one's."""
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self._conversation.replied.wait(), within_s)
+            self._quiet_since = asyncio.get_running_loop().time()
 
     async def _quiet(self) -> None:
         """Wait until nothing has been on the line for as long as its devices need to tell frames apart."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipelines.acquisition.columns import columns_of
 from pipelines.acquisition.journal import Journal
-from pipelines.acquisition.machine import Machine, Row, all_answers
+from pipelines.acquisition.machine import Answers, Machine, Row, all_answers
 from pipelines.acquisition.pace import Lockstep, PhaseLock
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.sampling import Sampling
@@ -101,8 +101,9 @@ class Loop:
             self._heed_signals()
             if self.supervisor.missed(found, time.monotonic()) and not await self._resume():
                 continue
-            row = await self._exchange(self.supervisor.next(found, time.monotonic()))
-            if not self.supervisor.judge(row, time.monotonic()):
+            answers = await self._exchange(self.supervisor.next(found, time.monotonic()))
+            row = self.supervisor.judge(answers, time.monotonic())
+            if row is None:
                 continue
             last = self._row = row
             for whole in await self.sampling.rows(row):
@@ -125,8 +126,8 @@ class Loop:
         began = time.monotonic()
         while True:
             self._heed_signals()
-            row = await self._exchange(self.supervisor.rest(time.monotonic()))
-            if self.supervisor.enabled(row, time.monotonic() - began):
+            answers = await self._exchange(self.supervisor.rest(time.monotonic()))
+            if row := self.supervisor.enabled(answers, time.monotonic() - began):
                 break
             await asyncio.sleep(1.0 / self._rate)
         self._enabled_at = self._reported = time.monotonic()
@@ -137,7 +138,7 @@ class Loop:
         if self.stopped_by:
             raise DeviceError(f"stopped by {self.stopped_by[0]}")
 
-    async def _exchange(self, reference: NDArray) -> Row:
+    async def _exchange(self, reference: NDArray) -> Answers:
         self._cycle += 1
         return await self.machine.cycle(reference, self._cycle)
 

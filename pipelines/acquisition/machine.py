@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.acquisition.clocks import Bounds
+from pipelines.acquisition.counter import Counter
 from pipelines.acquisition.device import Device
 from pipelines.acquisition.line import Line, lines_of
+from pipelines.acquisition.patience import Patience
 from pipelines.acquisition.ring import Queue, Ring
 from pipelines.errors import DeviceError, SettingsError, Unanswered
 from pipelines.mechanics.motion import CUFFS
@@ -27,29 +29,13 @@ STATUS_PAUSE_S = 0.002
 
 LOOKS = 9
 """Readings from which the distance between the drives' counters is taken."""
-CLOCK_SHARE = 0.1
+SAME_TIME = 0.1
 """Share of a sample within which the clocks of drives that sample together tell the same time."""
 MOST_LOOKS = 200
 """How many it may take where samples come faster than replies."""
 
 
 Answer = TypeVar("Answer")
-
-
-class Counter:
-    """A device's counter or clock, carried on beyond the width of its register."""
-
-    def __init__(self, span: float) -> None:
-        self._span = span
-        self._last: float | None = None
-
-    def __call__(self, value: float) -> float:
-        """Return the value with every turn of the register added, forwards or, for an older sample, backwards."""
-        if self._span and self._last is not None:
-            # What is less than half a span away is a turn; anything else is a step of the device's own.
-            value += self._span * round((self._last - value) / self._span)
-        self._last = value
-        return value
 
 
 @dataclass(frozen=True)
@@ -87,7 +73,6 @@ class Drive:
         self._patience_s = rig.safety.watchdog_s
         self._sequence = Counter(self.told.span("sequence"))
         self._time = Counter(self.told.span("time"))
-        self._ring_time = Counter(self.told.span("time"))
         self.bounds: Bounds | None = None
         """Told of every reply, where somebody wants to know when the drive samples."""
         self.ring = self._its_ring() if rig.sampling == "recorder" else None
@@ -102,7 +87,8 @@ class Drive:
     def _its_ring(self) -> Ring | Queue:
         settings = self.map.ring
         assert settings  # a rig file that asks for recorders has one for every drive
-        return (Ring if settings.fifo is None else Queue)(self.device, settings, self._newest)
+        self._ring_time = Counter(Block(registers_of(settings.record)).span("time"))
+        return Ring(self.device, settings, self._newest) if settings.fifo is None else Queue(self.device, settings)
 
     def _recorded(self) -> frozenset[str]:
         if self.ring is None or self.map.ring is None:
@@ -236,10 +222,13 @@ class Drive:
                 )
             await asyncio.sleep(STATUS_PAUSE_S)
 
-    def _decoded(self, block: Block, words: list[int]) -> dict[str, float]:
-        """Decode words; whatever is counted with must be a number."""
-        told = block.decode(words)
-        for name in ("sequence", "time", "status"):
+    def _decoded(self, block: Block, words: list[int]) -> Mapping[str, float]:
+        """Decode words."""
+        return self._numbers(block.decode(words))
+
+    def _numbers(self, told: Mapping[str, float]) -> Mapping[str, float]:
+        """Refuse what is no number where that is counted with, or would mean that the drive does not tell it."""
+        for name in ("sequence", "time", "status", "velocity", "temperature", "reference"):
             if not np.isfinite(told.get(name, 0.0)):
                 raise DeviceError(
                     f"{self.device.label}: its {name} is {told[name]}, expected a number; compare the register map in "
@@ -276,6 +265,7 @@ class Drive:
 
     def _of_ring(self, number: int, told: Mapping[str, float]) -> Reading:
         """Return a record as a sample; temperature is what the last exchange told."""
+        told = self._numbers(told)
         return Reading(
             sequence=number,
             time=self._ring_time(told["time"]),
@@ -297,21 +287,31 @@ class Sensor:
         safety = rig.safety
         self.device = Device(f"sensor {settings.cuff}", settings.unit, line, safety.watchdog_s, safety.longest_reply_s)
         self.block = Block(registers_of(self.map.read))
-        self._patience_s, self._answered = safety.watchdog_s, 0.0
+        self._patience = Patience(safety.watchdog_s)
         self._last: float | None = None
+        self._owes = False
+        """Whether an answer of it may still come that another request's would be taken for."""
 
     async def look(self) -> tuple[float, float, float] | None:
-        """Return the force (N), or None where the sensor has no new sample or, for once, does not answer."""
-        self._answered = self._answered or time.monotonic()
+        """Return the force (N), or None where the sensor has no new sample or, for once, does not answer.
+
+        Raises
+        ------
+        DeviceError
+            It has not answered for too long; never Unanswered, which is survived.
+        """
+        self._patience.waited(time.monotonic())
         try:
             told = self.block.decode(await self.device.read(self.block.address, self.block.count, in_motion=True))
-        except Unanswered:
-            if time.monotonic() - self._answered > self._patience_s:
-                raise
+        except Unanswered as error:
+            if self._patience.is_over(time.monotonic()):
+                raise DeviceError(str(error)) from error
+            self._owes = not self.device.line.tells_replies_apart
             return None
-        self._answered = time.monotonic()
+        self._patience.hear(time.monotonic())
+        owed, self._owes = self._owes, False
         stale, self._last = told["sequence"] == self._last, told["sequence"]
-        return None if stale else (told["force_x"], told["force_y"], told["force_z"])
+        return None if stale or owed else (told["force_x"], told["force_y"], told["force_z"])
 
 
 @dataclass(frozen=True)
@@ -339,6 +339,18 @@ class Row:
         return [drive.angle for drive in self.drives]
 
 
+@dataclass(frozen=True)
+class Answers:
+    """What one cycle brought, whole or not."""
+
+    drives: tuple[Reading | Unanswered, ...]
+    """Of a drive that did not answer in time, the error that says so."""
+    forces: NDArray
+    """(4, 3) N; NaN where a sensor was not read or had nothing new."""
+    row: Row | None
+    """The sample of the whole machine; None where a drive's is missing."""
+
+
 class Machine:
     """All devices of a rig."""
 
@@ -358,8 +370,6 @@ class Machine:
         """Whether a slow line hides by how many samples."""
         self._counted = 0
         """At which count all drives were at the end of the last cycle."""
-        self._last: Row | None = None
-        self._answered = 0.0
 
     async def connect(self) -> None:
         """Open every line and make sure who is at its end."""
@@ -433,35 +443,25 @@ class Machine:
         """Return the cycle that the first drive is in."""
         return await self.drives[0].count() // self.samples_per_cycle
 
-    async def cycle(self, reference: NDArray, number: int) -> Row:
-        """Send set-points (J,) rad and return the sample that is latched in all devices, or in each its newest.
-
-        An exchange that is not answered brings no new sample: the last one is returned again, until the watchdog's
-        time is over. Nothing is sent twice, for a set-point that comes late is no set-point; only the first one,
-        where the leg stands, is.
-        """
-        self._answered = self._answered or time.monotonic()
-        while True:
-            try:
-                self._last = await self._cycle(reference, number)
-                self._answered = time.monotonic()
-            except Unanswered:
-                if time.monotonic() - self._answered > self.rig.safety.watchdog_s:
-                    raise
-            if self._last is not None:
-                return self._last
-
-    async def _cycle(self, reference: NDArray, number: int) -> Row:
-        """Exchange all devices.
+    async def cycle(self, reference: NDArray, number: int) -> Answers:
+        """Send set-points (J,) rad and return what came: the sample that all devices latched, or of each its newest.
 
         In lockstep the drives' exchange ends a sample, so sensors are read before it. In real time the drives
-        tell when a new sample begins, so sensors are read after it.
+        tell when a new sample begins, so sensors are read after it. Nothing is sent twice, for a set-point that comes
+        late is no set-point.
         """
         if self.rig.clock == "lockstep":
             forces = await self.felt(number)
-            return Row(await self._exchange(reference), forces, self.samples_per_cycle)
-        drives = await self._exchange(reference)
-        return Row(drives, await self.felt(number), self.samples_per_cycle)
+            told = await self._exchange(reference)
+        else:
+            told = await self._exchange(reference)
+            forces = await self.felt(number)
+        readings = [answer for answer in told if isinstance(answer, Reading)]
+        whole = len(readings) == len(told)
+        if whole and self._latches:
+            whole = await self._latch(readings)
+            told = list(readings)
+        return Answers(tuple(told), forces, Row(tuple(readings), forces, self.samples_per_cycle) if whole else None)
 
     async def felt(self, number: int) -> NDArray:
         """Return the forces (4, 3) N of those sensors that are due in a cycle."""
@@ -469,29 +469,37 @@ class Machine:
         if not due:
             return self.no_force
         forces = self.no_force.copy()
-        for sensor, force in zip(due, await asyncio.gather(*(s.look() for s in due)), strict=True):
+        for sensor, force in zip(due, await all_answers(sensor.look() for sensor in due), strict=True):
             if force is not None:
                 forces[CUFFS.index(sensor.settings.cuff)] = force
         return forces
 
-    async def _exchange(self, reference: NDArray) -> tuple[Reading, ...]:
-        """Exchange every drive; one that has not latched the others' sample yet is asked again if that is kept."""
-        pairs = list(zip(self.drives, reference.tolist(), strict=True))
-        readings = await all_answers(drive.exchange(angle) for drive, angle in pairs)
+    async def _exchange(self, reference: NDArray) -> list[Reading | Unanswered]:
+        """Exchange every drive; return what each answers."""
+        pairs = zip(self.drives, reference.tolist(), strict=True)
+        return await answers_or_silence(drive.exchange(angle) for drive, angle in pairs)
+
+    async def _latch(self, readings: list[Reading]) -> bool:
+        """Ask those drives again that have not latched the others' sample yet, in place of what they told.
+
+        Returns whether all have latched it in the end; not, where one does not answer.
+        """
         until = time.monotonic() + self.rig.safety.watchdog_s
         while True:
             counts = [reading.sequence - ahead for reading, ahead in zip(readings, self.leads, strict=True)]
             late = [j for j, count in enumerate(counts) if count < max(counts)]
-            if not late or not self._latches:
+            if not late:
                 self._counted = max(counts)
-                return tuple(readings)
+                return True
             if time.monotonic() > until:
-                break
+                raise DeviceError(self._out_of_step(readings, counts))
             await asyncio.sleep(LAG_PAUSE_S)
             for j in late:
                 # Not told again: what is due by then is another set-point.
-                readings[j] = await self.drives[j].look(in_motion=True)
-        raise DeviceError(self._out_of_step(readings, counts))
+                try:
+                    readings[j] = await self.drives[j].look(in_motion=True)
+                except Unanswered:
+                    return False
 
     def _out_of_step(self, readings: Sequence[Reading], counts: Sequence[int]) -> str:
         """Return in words which drive's counter has parted from the others', and how."""
@@ -508,19 +516,33 @@ class Machine:
         )
 
 
-async def all_answers(asked: Iterable[Awaitable[Answer]]) -> list[Answer]:
-    """Return all answers, once there are all: none shall be left for the next request to find."""
+async def answers_or_silence(asked: Iterable[Awaitable[Answer]]) -> list[Answer | Unanswered]:
+    """Return each answer, or the error that says that there was none in time, once that is known of all.
+
+    None shall be left for the next request to find. What is worse than silence is raised.
+    """
     answers = await asyncio.gather(*asked, return_exceptions=True)
-    failures = [answer for answer in answers if isinstance(answer, BaseException)]
-    # What is worse than silence comes first.
-    for failure in sorted(failures, key=lambda failure: isinstance(failure, Unanswered)):
-        raise failure
-    return [answer for answer in answers if not isinstance(answer, BaseException)]
+    told: list[Answer | Unanswered] = []
+    for answer in answers:
+        if isinstance(answer, BaseException) and not isinstance(answer, Unanswered):
+            raise answer
+        told.append(answer)
+    return told
+
+
+async def all_answers(asked: Iterable[Awaitable[Answer]]) -> list[Answer]:
+    """Return all answers, once there are all; raise where one is missing."""
+    answers: list[Answer] = []
+    for answer in await answers_or_silence(asked):
+        if isinstance(answer, Unanswered):
+            raise answer
+        answers.append(answer)
+    return answers
 
 
 def _lead(bounded: float, margin: float, first: Reading, other: Reading, rate_hz: float) -> int | None:
     """Return how many samples a drive is ahead, by its replies ``bounded`` give or take ``margin``; None if unclear."""
     by_clock = other.sequence - first.sequence - (other.time - first.time) * rate_hz
-    if abs(by_clock - round(by_clock)) < CLOCK_SHARE and abs(round(by_clock) - bounded) <= margin + 0.5:
+    if abs(by_clock - round(by_clock)) < SAME_TIME and abs(round(by_clock) - bounded) <= margin + 0.5:
         return round(by_clock)
     return round(bounded) if margin <= 0.5 else None

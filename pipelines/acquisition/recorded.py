@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.acquisition.journal import ABORT, FOUND, JournalFile
+from pipelines.acquisition.journal import ABORT, FOUND, ROWS, JournalFile, in_pieces
+from pipelines.acquisition.sound import sound_batches
 from pipelines.contracts import RECORDING
 
 PIECE_ROWS = 32768
@@ -28,6 +29,8 @@ class Account:
     """Why the run was stopped early, None if it was not."""
     found: dict[str, Any] = field(default_factory=dict)
     """What else the run found out for its metadata."""
+    damaged: bool = False
+    """Whether the journal holds less than was written into it, and not only because it was cut off."""
 
     @property
     def missed(self) -> int:
@@ -46,7 +49,7 @@ def account_of(journal: JournalFile) -> Account:
     seconds = journal.metadata["config"]["run"]["duration_s"]
     planned, samples, reached = round(seconds * rate_hz), 0, 0
     gaps, offset, last_words = list[tuple[float, int]](), None, None
-    for batch in journal.batches():
+    for batch in sound_batches(journal):
         last_words = batch.last_words
         if not batch.rows.num_rows:
             continue
@@ -57,11 +60,13 @@ def account_of(journal: JournalFile) -> Account:
         found, samples = _gaps(np.concatenate([[reached - 1], index]), rate_hz), samples + len(index)
         gaps, reached = gaps + found, int(index[-1]) + 1
     if last_words is None:
-        return Account(samples, planned, rate_hz, gaps, f"killed {reached / rate_hz:.3f} s into {seconds:g} s")
+        why = f"killed {reached / rate_hz:.3f} s into {seconds:g} s"
+        return Account(samples, planned, rate_hz, gaps, why, damaged=journal.damaged > 0)
     abort = last_words[ABORT].decode() or None
     if not abort:
         gaps = gaps + _gaps(np.array([reached - 1, planned]), rate_hz)
-    return Account(samples, planned, rate_hz, gaps, abort, json.loads(last_words.get(FOUND, "{}")))
+    damaged = journal.damaged > 0 or int(last_words[ROWS]) != journal.rows
+    return Account(samples, planned, rate_hz, gaps, abort, json.loads(last_words[FOUND]), damaged)
 
 
 def _gaps(index: np.ndarray, rate_hz: float) -> list[tuple[float, int]]:
@@ -74,7 +79,8 @@ def write_recording(journal: JournalFile, path: Path, account: Account, **more: 
     """Write what a journal holds as ``recording/1``; ``more`` goes into its metadata."""
     abort = {"abort": account.abort} if account.abort else {}
     metadata = journal.metadata | account.found | {"gaps": account.gaps} | abort | more
-    RECORDING.write_pieces(path, journal.pieces(PIECE_ROWS), metadata)
+    rows = (batch.rows for batch in sound_batches(journal))
+    RECORDING.write_pieces(path, in_pieces(rows, PIECE_ROWS), metadata)
 
 
 def place_for(output: Path, abort: str | None) -> Path:

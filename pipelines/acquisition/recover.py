@@ -27,7 +27,7 @@ def journals_in(place: Path) -> list[Path]:
 
 
 def recover(path: Path, output: Path | None = None) -> Recovered:
-    """Make a recording of a journal that was cut off anywhere, and remove the journal.
+    """Make a recording of a journal that was cut off anywhere, and remove the journal; one that is damaged is kept.
 
     Parameters
     ----------
@@ -50,5 +50,6 @@ def recover(path: Path, output: Path | None = None) -> Recovered:
         if output.exists():
             raise InputError(f"{output}: is there already and is not overwritten; name another file with -o")
         write_recording(journal, output, account, recovered=True)
-        path.unlink()
+        if not account.damaged:
+            path.unlink()
     return Recovered(output, account)

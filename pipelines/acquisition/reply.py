@@ -4,6 +4,8 @@ pymodbus is lenient: it takes transaction id 0 for any, a reply to another funct
 frame; and what it cannot decode it raises within asyncio, where nobody waits for it. Numbers move a leg here.
 """
 
+import asyncio
+
 from pymodbus.client.base import ModbusBaseClient
 from pymodbus.pdu import DecodePDU, ExceptionResponse, ModbusPDU
 from pymodbus.pdu.file_message import ReadFifoQueueResponse
@@ -74,12 +76,16 @@ class Conversation:
 
     def __init__(self) -> None:
         self._asked = ModbusPDU()
+        self.replied = asyncio.Event()
+        """Set once anything has come since the last request."""
 
     def __call__(self, sending: bool, pdu: ModbusPDU) -> ModbusPDU:
         """Remember a request; return a reply, or what is wrong with it."""
         if sending:
             self._asked = pdu
+            self.replied.clear()
             return pdu
+        self.replied.set()
         wrong = None if isinstance(pdu, NoReply) else self._wrong(pdu)
         return pdu if wrong is None else _instead(pdu, wrong)
 
@@ -102,7 +108,8 @@ def _instead(reply: ModbusPDU, wrong: str) -> NoReply:
     return none
 
 
-def check_replies(client: ModbusBaseClient) -> None:
+def check_replies(client: ModbusBaseClient) -> Conversation:
     """Have a client hand out nothing but replies, and a NoReply for what came instead of one."""
     client.ctx.framer.decoder = ReplyDecoder()
-    client.ctx.trace_pdu = Conversation()
+    client.ctx.trace_pdu = conversation = Conversation()
+    return conversation

@@ -8,6 +8,7 @@ after the records, so that one which the drive may have overwritten meanwhile is
 import time
 from collections.abc import Callable, Mapping, Sequence
 
+from pipelines.acquisition.counter import carried
 from pipelines.acquisition.device import Device
 from pipelines.registers import Block
 from pipelines.settings.rig import MOST_QUEUED, MOST_REGISTERS, RingSettings, registers_of
@@ -57,8 +58,15 @@ class Ring:
             first += count
         sent = time.perf_counter()
         words = await self._device.read(self._newest.address, self._newest.count, in_motion=True)
+        found = self._newest.decode(words)["newest"]
+        ends = int(carried(found, newest, self._span))
+        # So far from what the exchange told: all of it is overwritten, or the answer damaged. Nothing of it is sure.
+        if abs(ends - newest) > self._capacity:
+            ends = newest + self._capacity
+        else:
+            self._numbered(found, sent)
         # The drive may have been writing the record after that one while these were read.
-        overwritten = self._numbered(self._newest.decode(words)["newest"], sent) + 1 - self._capacity
+        overwritten = ends + 1 - self._capacity
         self._next = newest + 1  # not before all was answered: what was not is read again
         return self._trusted([(number, words) for number, words in read if number > overwritten])
 
@@ -82,33 +90,34 @@ class Ring:
 class Queue:
     """The queue of one drive, which FC24 reads and which reading empties."""
 
-    def __init__(self, device: Device, settings: RingSettings, numbered: Numbered) -> None:
+    def __init__(self, device: Device, settings: RingSettings) -> None:
         assert settings.fifo is not None  # a queue has an address
         self._device = device
-        self._numbered = numbered
         self._address, self._words = settings.fifo, settings.words
         self._record = Block(registers_of(settings.record))
+        self._span = self._record.span("sequence")
         self.block = MOST_QUEUED // settings.words
         """Records that one read brings."""
-        self._last: int | None = None
+        self._began: int | None = None
+        self._fetched: list[tuple[int, Record]] = []
+        """Records that nobody else has any more, until a drain returns them."""
 
     async def drain(self, newest: int) -> list[tuple[int, Record]]:
         """Return records not returned before, each with its sequence number.
 
-        The first drain returns none: what had gathered in the queue before it is let go.
+        What had gathered in the queue before the first drain is let go.
         """
-        began, last = self._last is not None, newest if self._last is None else self._last
-        records: list[tuple[int, Record]] = []
+        if self._began is None:
+            self._began = newest
         for _ in range(MOST_READS):
             words = await self._device.read_fifo(self._address, self._words)
             for start in range(0, len(words), self._words):
                 place = start + self._record.address
                 record = self._record.decode(words[place : place + self._record.count])
-                number = self._numbered(record["sequence"], None)
-                if number > last:
-                    last = number
-                    records.append((number, record))
+                number = int(carried(record["sequence"], newest, self._span))
+                if number > self._began:
+                    self._fetched.append((number, record))
             if len(words) < self.block * self._words:
                 break
-        self._last = last
-        return records if began else []
+        records, self._fetched = self._fetched, []
+        return records

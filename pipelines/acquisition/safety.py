@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.acquisition.machine import Reading, Row
+from pipelines.acquisition.machine import Answers, Reading, Row
 from pipelines.errors import DeviceError
 from pipelines.mechanics.motion import CUFFS
 from pipelines.settings.rig import DriveSettings, RigSettings, SensorSettings
@@ -25,50 +25,33 @@ class Limits:
         self._sensors = {CUFFS.index(sensor.cuff): sensor for sensor in sensors}
         self._felt: dict[int, int] = {}
         """Of each cuff the machine's counter at its last fresh sample."""
-        self._last: Row | None = None
-        self._recorded: dict[int, Reading] = {}
-        """Of each drive the last sample that it recorded itself."""
+        self._last: dict[int, Reading] = {}
+        """Of each drive the last sample that it told."""
 
-    def violation(self, row: Row) -> str | None:
-        """Return which limit a sample breaks, None if it keeps them all."""
-        last, self._last = self._last, row
-        for j, found in enumerate(row.drives):
-            if why := self._sample_violation(j, found, found if last is None else last.drives[j]):
-                return why
-        return self.force_violation(row.forces) or self._silence(row)
-
-    def record_violation(self, records: Sequence[Sequence[Reading]]) -> str | None:
-        """Return which limit a sample breaks of those that each drive recorded itself; None if all keep them."""
-        for j, samples in enumerate(records):
-            for found in samples:
-                if why := self._sample_violation(j, found, self._recorded.get(j, found)):
+    def violation(self, told: Row | Answers) -> str | None:
+        """Return which limit is broken by what came, None if it keeps them all."""
+        samples_hz = self._rate * self._rig.samples_per_cycle(self._rate)
+        for j, (drive, found) in enumerate(zip(self._rig.drive, told.drives, strict=True)):
+            if isinstance(found, Reading):
+                if why := sample_violation(drive, self._last.get(j, found), found, samples_hz):
                     return why
-                self._recorded[j] = found
-        return None
+                self._last[j] = found
+        return self.cuff_violation(told)
 
-    def _sample_violation(self, joint: int, found: Reading, before: Reading) -> str | None:
-        drive = self._rig.drive[joint]
-        low, high = drive.angle_rad
-        if not low <= found.angle <= high:
-            return f"{drive.joint} angle {found.angle:.3f} rad is outside its limits {low:g} to {high:g} rad"
-        speed = found.velocity
-        if np.isnan(speed):
-            # The drive tells no speed: what the angle did since the last sample.
-            samples = max(found.sequence - before.sequence, 1)
-            speed = (found.angle - before.angle) * self._rate * self._rig.samples_per_cycle(self._rate) / samples
-        # Written so that a NaN breaks every limit.
-        if not abs(speed) <= drive.speed_rad_s:
-            return f"{drive.joint} speed {speed:.3f} rad/s is above its limit of {drive.speed_rad_s:g} rad/s"
-        if not abs(found.torque) <= drive.torque_nm:
-            return f"{drive.joint} torque {found.torque:.1f} N·m is above its limit of {drive.torque_nm:g} N·m"
-        return None
+    def cuff_violation(self, told: Row | Answers) -> str | None:
+        """Return which cuff's force is above its limit, or could be unseen: its sensor tells nothing any more."""
+        first = told.drives[0]
+        cycle = first.sequence // self._rig.samples_per_cycle(self._rate) if isinstance(first, Reading) else None
+        return self.force_violation(told.forces) or (None if cycle is None else self._silence(told.forces, cycle))
 
-    def straying(self, row: Row, in_force: NDArray, late: int = 0) -> str | None:
+    def straying(self, told: Row | Answers, in_force: NDArray, late: int = 0) -> str | None:
         """Return which joint is too far from its set-point, (J,) rad, None if none is.
 
         A drive that has been told nothing for so many samples ``late`` may have gone on meanwhile.
         """
-        for drive, reading, reference in zip(self._rig.drive, row.drives, in_force, strict=True):
+        for drive, reading, reference in zip(self._rig.drive, told.drives, in_force, strict=True):
+            if not isinstance(reading, Reading):
+                continue
             error = reading.angle - reference
             allowed = self._rig.safety.following_error_rad + drive.speed_rad_s * late / self._rate
             if not abs(error) <= allowed:
@@ -79,12 +62,12 @@ class Limits:
                 )
         return None
 
-    def _silence(self, row: Row) -> str | None:
+    def _silence(self, forces: NDArray, cycle: int) -> str | None:
         """Return which cuff sensor has told nothing for too long: its limit would be watched by nobody."""
         for cuff, sensor in self._sensors.items():
-            if np.isfinite(row.forces[cuff]).all():
-                self._felt[cuff] = row.sequence
-            silent_s = (row.sequence - self._felt.setdefault(cuff, row.sequence)) / self._rate
+            if np.isfinite(forces[cuff]).all():
+                self._felt[cuff] = cycle
+            silent_s = (cycle - self._felt.setdefault(cuff, cycle)) / self._rate
             if silent_s > self._rig.safety.watchdog_s + sensor.every / self._rate:
                 return (
                     f"watchdog: no new sample from {self._rig.label_of(sensor)} for {silent_s:.3f} s, allowed are "
@@ -103,6 +86,23 @@ class Limits:
             f"{CUFFS[cuff]} force {'xyz'[axis]} {forces[cuff, axis]:.0f} N is above the limit of "
             f"{self._rig.safety.cuff_force_n:g} N"
         )
+
+
+def sample_violation(drive: DriveSettings, before: Reading, found: Reading, samples_hz: float) -> str | None:
+    """Return which limit of its joint a drive's sample breaks, None if it keeps them all."""
+    low, high = drive.angle_rad
+    if not low <= found.angle <= high:
+        return f"{drive.joint} angle {found.angle:.3f} rad is outside its limits {low:g} to {high:g} rad"
+    speed = found.velocity
+    if np.isnan(speed):
+        # The drive tells no speed: what the angle did since the last sample.
+        speed = (found.angle - before.angle) * samples_hz / max(found.sequence - before.sequence, 1)
+    # Written so that a NaN breaks every limit.
+    if not abs(speed) <= drive.speed_rad_s:
+        return f"{drive.joint} speed {speed:.3f} rad/s is above its limit of {drive.speed_rad_s:g} rad/s"
+    if not abs(found.torque) <= drive.torque_nm:
+        return f"{drive.joint} torque {found.torque:.1f} N·m is above its limit of {drive.torque_nm:g} N·m"
+    return None
 
 
 def refuse_leap(drives: Sequence[DriveSettings], last: NDArray, reference: NDArray, allowed_s: NDArray) -> None:

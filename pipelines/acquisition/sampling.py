@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from pipelines.acquisition.align import Alignment
 from pipelines.acquisition.clocks import BUCKET_S, Bounds, Drift
 from pipelines.acquisition.machine import Drive, Machine, Reading, Row, all_answers
-from pipelines.acquisition.watch import Watch
 from pipelines.errors import DeviceError, Unanswered
 
-Judge = Callable[[Sequence[Sequence[Reading]]], None]
-"""Raises DeviceError where one of each drive's samples is reason to stop."""
+Judge = Callable[[Row, Sequence[Sequence[Reading]], float], list[list[Reading]]]
+"""Given a cycle's row, samples of each drive and the host's clock (s), returns those that are new; raises DeviceError
+where one is reason to stop."""
 
 SECOND_LOOK = (0.3, 0.65)
 """Shares of a sample after an exchange between which a drive with a clock of its own is looked at again: with both
@@ -83,12 +83,10 @@ class Cycled:
 class Recorded:
     """Samples that one drive kept itself, drained once they fill a read."""
 
-    def __init__(self, drive: Drive, patience_s: float) -> None:
+    def __init__(self, drive: Drive) -> None:
         assert drive.ring  # a rig file that asks for recorders has one for every drive
         self._drive, self._block = drive, drive.ring.block
         self._drained: int | None = None
-        self._patience_s = patience_s
-        self._silent_since: float | None = None
 
     async def samples(self, reading: Reading) -> list[Reading]:
         """Return what was drained; mostly nothing, until a read is worth its while."""
@@ -97,12 +95,7 @@ class Recorded:
         try:
             samples = await self._drive.drain(reading.sequence)
         except Unanswered:
-            if self._silent_since is None:
-                self._silent_since = time.monotonic()
-            if time.monotonic() - self._silent_since > self._patience_s:
-                raise
             return []  # the ring keeps them: the next drain brings what this one did not
-        self._silent_since = None
         self._drained = samples[-1].sequence if samples else reading.sequence
         return samples
 
@@ -117,12 +110,9 @@ class Streams:
         self._own = rig.clocks == "own"
         period = 1.0 / self._rate_hz
         self._sources: list[Recorded | Cycled] = [
-            Recorded(drive, rig.safety.watchdog_s)
-            if rig.sampling == "recorder"
-            else Cycled(drive, period, looks_again=j > 0)
+            Recorded(drive) if rig.sampling == "recorder" else Cycled(drive, period, looks_again=j > 0)
             for j, drive in enumerate(drives)
         ]
-        self._watches = [Watch(rig, self._rate_hz, j) for j in range(1, len(drives))]
         self._drifts = [Drift(self._rate_hz) for _ in drives[1:]]
         self._leads = machine.leads
         self._alignment = Alignment([self._position(j) for j in range(len(self._drifts))])
@@ -143,10 +133,10 @@ class Streams:
     async def rows(self, row: Row) -> list[Row]:
         """Return rows that are whole now, at the first drive's instants; no sample has gone in that was not judged."""
         now = time.monotonic()
-        self._watch(row, now)
+        self._bucket_ends = self._bucket_ends or now + BUCKET_S
         pairs = zip(self._sources, row.drives, strict=True)
         told = await all_answers(source.samples(reading) for source, reading in pairs)
-        self._judge(told)
+        told = self._judge(row, told, now)
         if self._own:
             self._compare(row, now)
         if not np.isnan(row.forces).all():
@@ -161,17 +151,6 @@ class Streams:
                 del self._forces[missed]
             self._last = Row(drives, forces, self._machine.samples_per_cycle)
             yield self._last
-
-    def _watch(self, row: Row, now: float) -> None:
-        """Refuse to go on with a drive whose samples stop, or whose counter or clock leaps; the supervisor has a look
-        at the first one only.
-        """
-        for watch, reading in zip(self._watches, row.drives[1:], strict=True):
-            if self._bucket_ends is None:
-                watch.begin(reading, now)
-            else:
-                watch.take(reading, now)
-        self._bucket_ends = self._bucket_ends or now + BUCKET_S
 
     def _compare(self, row: Row, now: float) -> None:
         """Compare the clocks from time to time."""

@@ -11,12 +11,14 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.acquisition.machine import Reading, Row
+from pipelines.acquisition.counter import RATE_TOLERANCE
+from pipelines.acquisition.cuffs import Cuffs
+from pipelines.acquisition.frozen import ANSWER_CYCLES, Told
+from pipelines.acquisition.machine import Answers, Reading, Row
 from pipelines.acquisition.plan import Plan
-from pipelines.acquisition.plausibility import Plausibility
 from pipelines.acquisition.safety import HOLD_SAMPLES, Limits, refuse_leap, slowed
-from pipelines.acquisition.watch import RATE_TOLERANCE, Watch
-from pipelines.errors import DeviceError
+from pipelines.acquisition.stream import Stream
+from pipelines.errors import DeviceError, Unanswered
 from pipelines.settings.rig import RigSettings, SensorSettings
 
 REST_RAD = 0.02
@@ -80,8 +82,10 @@ class Supervisor:
         self.pressing = False
         """Whether slowing down would go on pressing: the drives are then disabled without it."""
         self._limits = Limits(rig, sample_rate_hz, sensors)
-        self._plausibility = Plausibility(rig, sample_rate_hz)
-        self._watch = Watch(rig, sample_rate_hz)
+        self._cuffs = Cuffs(sample_rate_hz)
+        self._told = [Told() for _ in rig.drive]
+        self._streams = [Stream(rig, j, sample_rate_hz, told) for j, told in enumerate(self._told)]
+        self._records = [Stream(rig, j, sample_rate_hz, told) for j, told in enumerate(self._told)]
         self._speed = np.zeros_like(self.sent)
         self._sample_s = np.full(len(rig.drive), 1.0 / sample_rate_hz)
         self._step = np.array([drive.speed_rad_s for drive in rig.drive]) * self._sample_s
@@ -123,10 +127,16 @@ class Supervisor:
         self._send(self._start, np.zeros_like(self.sent), now)
         return self.sent
 
-    def enabled(self, row: Row, waited_s: float) -> bool:
-        """Tell whether every drive says that it is enabled, as far as it tells; refuse to wait too long for it."""
-        if why := self._dropped(row):
+    def enabled(self, answers: Answers, waited_s: float) -> Row | None:
+        """Return the sample at which every drive says that it is enabled, as far as it tells; None until then.
+
+        Refuse to wait too long for it.
+        """
+        if why := self._dropped(answers):
             raise DeviceError(why)
+        silent = [told for told in answers.drives if isinstance(told, Unanswered)]
+        if silent and waited_s > self.rig.safety.watchdog_s:
+            raise silent[0]
         idle = [drive for drive, enabled in zip(self.rig.drive, self._enabled, strict=True) if enabled is False]
         if idle and waited_s > self.rig.safety.watchdog_s:
             raise DeviceError(
@@ -134,22 +144,31 @@ class Supervisor:
                 f"{self.rig.safety.watchdog_s:g} s; see the drive's manual, or correct enabled_mask and enabled_value "
                 "in the rig file"
             )
-        if why := self._limits.violation(row) or self._limits.straying(row, self._start):
+        if why := self._limits.violation(answers) or self._limits.straying(answers, self._start):
             raise DeviceError(why)
-        return not idle
+        return None if idle else answers.row
 
     def begin(self, row: Row, now: float) -> None:
         """Follow the plan from the first sample on at which the drives are enabled."""
         self._refuse_after_abort()
         self._first = self._found = row.sequence
-        self._watch.begin(row, now)
+        for j, found in enumerate(row.drives):
+            self._streams[j].begin(found, now)
+            self._told[j].tell(found.sequence, float(self.sent[j]))
         self._go(State.RAMP)
 
     def missed(self, found: int, now: float) -> bool:
         """Tell whether drives were told nothing for longer than a sample, now that sample ``found`` is latched."""
         self._refuse_after_abort()
-        self._watch.look(found, now)
+        self._look(found, now)
         return found - self._found > 1
+
+    def _look(self, found: int, now: float) -> None:
+        """Refuse to go on after too long a silence, or with a counter that runs backwards or leaps."""
+        for stream in self._streams:
+            stream.refuse_silence(now)
+        cycle = self.rig.samples_per_cycle(self.rate)
+        self._streams[0].refuse_count((found + 1) * cycle - 1)
 
     def is_stale(self, told: float, now: float) -> bool:
         """Tell whether a set-point that was told then is so old that nobody knows what its drive has made of it."""
@@ -186,7 +205,7 @@ class Supervisor:
             Where nothing more may be sent.
         """
         self._refuse_after_abort()
-        self._watch.look(found, now)
+        self._look(found, now)
         index = min(found - self._first, len(self._plan.reference))
         while self.state is not self._due(index):
             self._go(FOLLOWING[FOLLOWING.index(self.state) + 1])
@@ -199,27 +218,71 @@ class Supervisor:
         self._found = found
         return self.sent
 
-    def judge(self, row: Row, now: float) -> bool:
-        """Tell whether a sample is a new one; raise DeviceError where it is reason to stop."""
-        self._refuse_after_abort()
-        if why := self._dropped(row):
-            raise DeviceError(why)
-        if not self._watch.take(row, now):
-            return False
-        if why := (
-            self._limits.violation(row)
-            or self._limits.straying(row, self._in_force, row.sequence - self._found)
-            or self._plausibility.doubt(row, self.sent)
-        ):
-            raise DeviceError(why)
-        return True
+    def judge(self, answers: Answers, now: float) -> Row | None:
+        """Return the sample that a cycle brought, where it is whole and a new one.
 
-    def judge_records(self, records: Sequence[Sequence[Reading]]) -> None:
-        """Raise DeviceError where a sample that a drive recorded itself is reason to stop."""
+        Raises
+        ------
+        DeviceError
+            Where anything that came, whole or not, is reason to stop.
+        """
+        self._refuse_after_abort()
+        if why := self._dropped(answers):
+            raise DeviceError(why)
+        new = [self._is_new(j, found, now) for j, found in enumerate(answers.drives)]
+        if why := self._limits.cuff_violation(answers) or self._straying(answers):
+            raise DeviceError(why)
+        row = answers.row
+        if row is None or not new[0]:  # the first drive's counter is the machine's
+            return None
+        if why := self._cuffs.doubt(row.forces, row.sequence, self._travel(row)):
+            raise DeviceError(why)
+        return row
+
+    def _straying(self, answers: Answers) -> str | None:
+        """Return which joint is too far from its set-point; without the machine's counter nobody knows from which."""
+        first = answers.drives[0]
+        if isinstance(first, Unanswered):
+            return None
+        late = first.sequence // self.rig.samples_per_cycle(self.rate) - self._found
+        return self._limits.straying(answers, self._in_force, late)
+
+    def _is_new(self, joint: int, found: Reading | Unanswered, now: float) -> bool:
+        """Tell whether an answer is a new sample; raise DeviceError where it, or silence, is reason to stop."""
+        stream = self._streams[joint]
+        if isinstance(found, Unanswered):
+            stream.miss(found)
+            is_new = False
+        else:
+            is_new = stream.take(found, now)
+            # What was sent with the question takes effect after the sample that it brought.
+            self._told[joint].tell(found.sequence, float(self.sent[joint]))
+        stream.refuse_silence(now)
+        return is_new
+
+    def _travel(self, row: Row) -> float:
+        """Return how far the joints were told to go up to a sample, all together, rad."""
+        pairs = zip(self._told, row.drives, strict=True)
+        lag = ANSWER_CYCLES * row.samples_per_cycle
+        return sum(told.at(found.sequence - lag).travel for told, found in pairs)
+
+    def judge_records(self, row: Row, records: Sequence[Sequence[Reading]], now: float) -> list[list[Reading]]:
+        """Return those samples of the drives' own records that are new, beside the row of a cycle.
+
+        Raises
+        ------
+        DeviceError
+            Where one is reason to stop, or they do not come any more.
+        """
         self._refuse_after_abort()
         heeded = [self._heed_enabled(joint, found) for joint, samples in enumerate(records) for found in samples]
-        if why := next(filter(None, heeded), None) or self._limits.record_violation(records):
+        if why := next(filter(None, heeded), None):
             raise DeviceError(why)
+        kept = []
+        for stream, newest, samples in zip(self._records, row.drives, records, strict=True):
+            kept.append([found for found in samples if stream.take(found, now)])
+            stream.refuse_to_fall_behind(newest.sequence)
+        return kept
 
     def has_followed(self, row: Row) -> bool:
         """Tell whether the plan is at its end with a sample, and the set-points have walked there."""
@@ -333,9 +396,9 @@ class Supervisor:
             "emergency stop pressed?"
         )
 
-    def _dropped(self, row: Row) -> str | None:
+    def _dropped(self, told: Row | Answers) -> str | None:
         """Return why to stop where a drive is no longer enabled; note what each of them says."""
-        found = [self._heed_enabled(joint, reading) for joint, reading in enumerate(row.drives)]
+        found = [self._heed_enabled(j, one) for j, one in enumerate(told.drives) if isinstance(one, Reading)]
         return next(filter(None, found), None)
 
     def _refuse_to_lag(self, due: NDArray, reference: NDArray) -> None:

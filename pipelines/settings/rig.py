@@ -226,11 +226,13 @@ class DriveMap(Settings):
                 f"enabled_value: found 0x{self.enabled_value:04X}, expected bits of enabled_mask "
                 f"0x{self.enabled_mask:04X} only; correct one of them"
             )
-        if self.ring and self.ring.record.sequence.type != self.read.sequence.type:
-            raise ValueError(
-                f"ring.record.sequence.type: found {self.ring.record.sequence.type}, expected "
-                f"{self.read.sequence.type} as in read.sequence: it is the same counter"
-            )
+        counters = {"newest": self.ring.newest, "record.sequence": self.ring.record.sequence} if self.ring else {}
+        for name, counter in counters.items():
+            if counter and counter.type != self.read.sequence.type:
+                raise ValueError(
+                    f"ring.{name}.type: found {counter.type}, expected {self.read.sequence.type} as in "
+                    "read.sequence: it is the same counter"
+                )
         return self
 
     @model_validator(mode="after")

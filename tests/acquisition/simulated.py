@@ -361,7 +361,7 @@ def _patched(simulated, time, run, plan, own):
         run.states.append(state)
 
     with ExitStack() as stack:
-        for module in (journal, loop, machine, pace):
+        for module in (loop, machine, pace):
             stack.enter_context(patch.object(module, "time", time))
         stack.enter_context(patch("asyncio.events.new_event_loop", lambda: time))
         # The line has no part in this: every way to ask a device goes to the simulated rig.

@@ -1,7 +1,10 @@
+import threading
+import time
+
 import numpy as np
 import pytest
 
-from pipelines.acquisition.journal import FLUSH_S, Journal, refuse_leftover
+from pipelines.acquisition.journal import FLUSH_S, Journal, JournalFile, refuse_leftover
 from pipelines.errors import ContractError, InputError
 from tests.acquisition.journals import read_journal
 
@@ -39,18 +42,105 @@ def test_a_journal_cut_off_anywhere_gives_every_batch_before(tmp_path):
     assert lengths[-1] >= 150
 
 
-def test_what_was_appended_is_on_disk_before_the_journal_is_closed(tmp_path, monkeypatch):
+def test_what_was_appended_is_soon_on_disk_though_nothing_is_appended_any_more(tmp_path):
+    path = tmp_path / "run.journal"
+    with fill(path, 0) as journal:
+        journal.append([0.0, 0.0, 0])
+        until = time.monotonic() + 60.0
+        while not len(read_journal(path)[0]) and time.monotonic() < until:
+            time.sleep(FLUSH_S / 10)
+        assert len(read_journal(path)[0]) == 1
+
+
+class Hung:
+    """A disk that takes nothing until it is told to go on."""
+
+    def __init__(self, file):
+        self._file, self.goes_on = file, threading.Event()
+
+    def __getattr__(self, name):
+        return getattr(self._file, name)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._file.close()
+
+    def write(self, data):
+        assert self.goes_on.wait(60)
+        return self._file.write(data)
+
+
+def test_a_disk_that_hangs_holds_up_nobody_and_is_told_before_memory_is_full(tmp_path, monkeypatch):
+    monkeypatch.setattr("pipelines.acquisition.journal.MOST_WAITING", 300)
     path = tmp_path / "run.journal"
     journal = fill(path, 0)
-    now = 0.0
-    monkeypatch.setattr("pipelines.acquisition.journal.time.monotonic", lambda: now)
-    journal._flushed = 0.0
-    for k in range(400):
-        now = k / 200
-        journal.append([now, 0.0, k])
-        lost = k + 1 - len(read_journal(path)[0])
-        assert lost <= FLUSH_S * 200 + 1
+    disk = journal._file = Hung(journal._file)
+    began, rows = time.monotonic(), 0
+    with pytest.raises(OSError, match="300 samples wait for the disk, which does not answer"):
+        while time.monotonic() - began < 60:
+            journal.append([rows / 200, 0.0, rows])
+            rows += 1
+            time.sleep(0.0005)
+    disk.goes_on.set()
     journal.close()
+    assert read_journal(path)[0]["sequence"].tolist() == list(range(rows + 1))
+
+
+@pytest.fixture
+def three_batches(tmp_path):
+    """A whole journal of 150 rows with its last words, and where each of its batches begins."""
+    path, places = tmp_path / "run.parquet.journal", []
+    journal = fill(path, 0)
+    for k in range(150):
+        journal.append([k / 200, 0.1 * k, k])
+        if k % 50 == 49:
+            places.append(path.stat().st_size)
+            journal.flush()
+    journal.end(None)
+    journal.close()
+    return path, places
+
+
+def test_a_batch_that_is_damaged_costs_itself_only_and_that_is_known(three_batches):
+    path, places = three_batches
+    whole = path.read_bytes()
+    for at, was in ((places[1], 50), (places[1] + 6, 50), (places[1] + 40, 50)):
+        path.write_bytes(whole[:at] + b"\x5a\x5a\x5a\x5a" + whole[at + 4 :])
+        journal = JournalFile(path)
+        batches = list(journal.batches())
+        assert sum(batch.rows.num_rows for batch in batches) == 150 - was
+        assert batches[-1].rows.num_rows == 0
+        assert batches[-1].last_words[b"rows"] == b"150"
+        assert journal.damaged > 0
+
+
+def test_a_disk_that_gives_an_error_is_no_end_of_a_journal(three_batches, monkeypatch):
+    path, places = three_batches
+
+    class Failing:
+        def __init__(self, *arguments):
+            self.file = open(*arguments)  # noqa: SIM115
+
+        def __getattr__(self, name):
+            return getattr(self.file, name)
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            self.file.close()
+
+        def read(self, count=-1):
+            if self.file.tell() >= places[1]:
+                raise OSError(5, "Input/output error")
+            return self.file.read(count)
+
+    journal = JournalFile(path)
+    monkeypatch.setattr("pipelines.acquisition.journal.open", Failing, raising=False)
+    with pytest.raises(InputError, match=r"cannot be read \(Input/output error\); nothing was changed"):
+        list(journal.batches())
 
 
 def test_a_killed_runs_journal_is_not_recorded_over(tmp_path):

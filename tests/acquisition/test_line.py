@@ -9,16 +9,18 @@ import time
 
 import pytest
 import serial
+from pymodbus.framer import FramerRTU
 from pymodbus.server.base import ModbusBaseServer
 
 from pipelines.acquisition.acquire import acquire
-from pipelines.acquisition.line import _explained
+from pipelines.acquisition.device import Device
+from pipelines.acquisition.line import Line, _explained
 from pipelines.acquisition.machine import Machine
 from pipelines.contracts import RECORDING
-from pipelines.errors import DeviceError, SettingsError
+from pipelines.errors import DeviceError, SettingsError, Unanswered
 from pipelines.rig.null_modem import null_modem
 from pipelines.settings.acquire import RunSettings
-from pipelines.settings.line import RtuLine
+from pipelines.settings.line import RtuLine, RtuOverTcpLine
 from pipelines.settings.rig import load_rig
 
 from .conftest import free_port
@@ -325,3 +327,75 @@ def test_silence_is_what_the_standard_says_where_the_rig_file_says_nothing(baud_
     line = RtuLine(transport="rtu", serial_port="x", baud_rate=baud_rate)
     assert line.quiet_s == pytest.approx(silence)
     assert line.exchange_s(0) == pytest.approx(2 * silence)
+
+
+class Slow:
+    """A device behind a serial device server: its n-th answer's words are all n, and come after ``delays[n]``."""
+
+    def __init__(self, *delays):
+        self.delays, self.asked, self.writers = delays, 0, []
+
+    async def serve(self, reader, writer):
+        self.writers.append(writer)
+        while request := await reader.read(1000):
+            count = int.from_bytes(request[4:6], "big")
+            body = request[:2] + bytes([2 * count]) + self.asked.to_bytes(2, "big") * count
+            delay, self.asked = self.delays[self.asked], self.asked + 1
+            reply = body + FramerRTU.compute_CRC(body).to_bytes(2, "big")
+            asyncio.get_running_loop().call_later(delay, writer.write, reply)
+
+    def at_work(self, ask, reply_s=0.4):
+        """Return what ``ask(device)`` finds on a line that such a device is on."""
+
+        async def run():
+            server = await asyncio.start_server(self.serve, "127.0.0.1", 0)
+            port = server.sockets[0].getsockname()[1]
+            line = Line(RtuOverTcpLine(transport="rtu_over_tcp", port=port), 5.0, "leg")
+            await line.connect()
+            try:
+                return await ask(Device("sensor thigh_front", 11, line, 5.0, reply_s))
+            finally:
+                line.close()
+                server.close()
+                for writer in self.writers:
+                    writer.transport.abort()
+                await asyncio.sleep(0.05)  # what was aborted is closed by then
+
+        return asyncio.run(run())
+
+
+def test_a_reply_that_comes_too_late_on_a_serial_line_is_not_taken_for_the_next_ones():
+    async def ask(device):
+        found = []
+        for count in (4, 4, 7, 4):
+            try:
+                found.append(await device.read(100, count, in_motion=True))
+            except Unanswered:
+                found.append(None)
+        return found
+
+    # Without waiting for it, the second would be told [0, 0, 0, 0], and the third be refused for its length.
+    assert Slow(0.55, 0.0, 0.0, 0.0).at_work(ask) == [None, [1] * 4, [2] * 7, [3] * 4]
+    assert Slow(0.0, 0.55, 0.0, 0.0).at_work(ask) == [[0] * 4, None, [2] * 7, [3] * 4]
+
+
+def test_a_line_is_renewed_only_where_it_failed_and_nobody_is_asked_in_between():
+    async def ask(device):
+        line, opened = device.line, []
+        connect = line.client.connect
+
+        async def slowly():
+            opened.append(line.client.connected)
+            await asyncio.sleep(0.2)
+            return await connect()
+
+        line.client.connect = slowly
+        await line.renew()
+        assert not opened  # all that was asked was answered
+        with pytest.raises(Unanswered):
+            await device.read(100, 1, in_motion=True)
+        # The neighbour on the line, whose turn comes while it is renewed.
+        _, found = await asyncio.gather(line.renew(), device.read(100, 2))
+        return opened, found
+
+    assert Slow(9.0, 0.0).at_work(ask) == ([False], [1, 1])

@@ -9,6 +9,7 @@ from pipelines.acquisition.acquire import acquire
 from pipelines.contracts import RECORDING
 from pipelines.errors import DeviceError, SettingsError
 from pipelines.mechanics.trajectory import read_trajectory
+from pipelines.rig.ring import Ring
 from pipelines.rig.server import Drive
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import load_rig
@@ -98,6 +99,68 @@ def test_a_glitch_between_two_cycles_which_no_exchange_sees_ends_the_run(record,
     monkeypatch.setattr(Drive, "_values", glitch)
     with pytest.raises(DeviceError, match=r"knee angle (99|100)\.\d+ rad is outside its limits"):
         record(shipped="recorder", watchdog_s=20.0, replace=LOCKSTEP)
+
+
+def recorded_with(monkeypatch, record, damage, queue=False, watchdog_s=20.0):
+    """Record a run in which the knee's own record holds something else than what it measured; return why it ends."""
+    append = Ring.append
+
+    def damaged(ring, sequence, values):
+        if values["angle"] < 0.0:  # the knee's
+            sequence, values = damage(sequence, dict(values))
+        if values:
+            append(ring, sequence, values)
+
+    monkeypatch.setattr(Ring, "append", damaged)
+    with pytest.raises(DeviceError) as caught:
+        record(shipped="recorder", watchdog_s=watchdog_s, replace=LOCKSTEP | (QUEUE if queue else {}))
+    return str(caught.value)
+
+
+def at(number, **change):
+    """Return a damage of one record, far into the recording."""
+
+    def damage(sequence, values):
+        if sequence == number:
+            values |= {name: values[name] + by for name, by in change.items()}
+        return sequence, values
+
+    return damage
+
+
+@pytest.mark.parametrize(
+    ("damage", "words"),
+    [
+        (at(1502, angle=0.1), "its angle leapt from"),
+        (at(1502, time=0.005), "its clock went on by 0.006000 s while its counter went on by 1 samples"),
+        (at(1502, time=-0.5), "its clock went from"),
+        (at(1502, current=100.0), "knee torque"),
+    ],
+    ids=["angle", "clock ahead", "clock back", "current"],
+)
+def test_a_record_that_cannot_be_true_ends_the_run_and_all_before_it_is_a_recording(
+    record, tmp_path, monkeypatch, damage, words
+):
+    assert words in recorded_with(monkeypatch, record, damage)
+    frame = RECORDING.read(tmp_path / "test.aborted.parquet").frame
+    assert 1480 < frame["sequence"].iloc[-1] < 1502  # those of one drain are judged together
+    assert np.diff(frame["sequence"]).tolist() == [1] * (len(frame) - 1)
+
+
+@pytest.mark.parametrize(("bit", "words"), [(2**30, "its sample counter"), (2, "one of the two leapt")])
+def test_a_record_of_a_queue_under_another_number_ends_the_run(record, tmp_path, monkeypatch, bit, words):
+    damage = at(1500, sequence=bit)
+    assert words in recorded_with(monkeypatch, record, damage, queue=True)
+    assert 1480 < RECORDING.read(tmp_path / "test.aborted.parquet").frame["sequence"].iloc[-1] < 1500
+
+
+def test_a_ring_that_stands_still_while_the_drive_counts_on_ends_the_run(record, tmp_path, monkeypatch):
+    def stands_still(sequence, values):
+        return sequence, values if sequence <= 1500 else {}
+
+    why = recorded_with(monkeypatch, record, stands_still, watchdog_s=0.5)
+    assert "but its record brought none after 1500" in why
+    assert RECORDING.read(tmp_path / "test.aborted.parquet").frame["sequence"].iloc[-1] == 1500
 
 
 def test_in_real_time_no_sample_is_lost_though_cycles_are(record_in_real_time):

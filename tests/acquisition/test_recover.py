@@ -9,7 +9,7 @@ import pytest
 from pipelines.acquisition.journal import Journal, JournalFile, journal_of, refuse_leftover
 from pipelines.acquisition.recover import journals_in, recover
 from pipelines.contracts import RECORDING
-from pipelines.errors import ContractError, InputError
+from pipelines.errors import InputError
 
 RATE = 200.0
 COLUMNS = ["time_s", *(f"{joint}_{q}" for joint in ("hip", "knee") for q in ("angle_rad", "torque_nm")), "sequence"]
@@ -133,12 +133,42 @@ def test_a_folder_stands_for_the_journals_below_it(killed, tmp_path):
         journals_in(tmp_path)
 
 
-def test_what_keeps_no_contract_is_refused_and_the_journal_stays(tmp_path):
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [("time_s", 0.9), ("time_s", 0.1), ("time_s", np.nan), ("sequence", 7000), ("sequence", 2**40),
+     ("hip_angle_rad", np.nan), ("hip_angle_rad", 1e3), ("knee_torque_nm", np.inf)],
+)  # fmt: skip
+@pytest.mark.parametrize("at", [100, 119, 120])
+def test_a_row_that_no_recording_may_hold_costs_itself_only_and_is_told(tmp_path, column, value, at):
     output = tmp_path / "one.parquet"
-    journal_with(output, [*range(50), 49, *range(51, 60)], flush_every=25).close()
-    with pytest.raises(ContractError, match=r"column time_s, row 50: found 0.245 after 0.245"):
-        recover(journal_of(output))
-    assert [path.name for path in tmp_path.iterdir()] == ["one.parquet.journal"]
+    journal = journal_with(output, range(at))
+    journal.append([value if name == column else told for name, told in zip(COLUMNS, row(at), strict=True)])
+    for index in range(at + 1, 200):
+        journal.append(row(index))
+    journal.end(None)
+    journal.close()
+    recover(journal_of(output))
+    table = RECORDING.read(output)
+    assert table.metadata["gaps"] == [[at / RATE, 1]]
+    assert table.frame["sequence"].tolist() == [7000 + k for k in range(200) if k != at]
+
+
+def test_a_damaged_journal_is_kept_beside_the_recording_of_all_that_can_be_read(tmp_path):
+    output = tmp_path / "one.parquet"
+    journal = journal_with(output, range(100))
+    place = journal.path.stat().st_size
+    for index in range(100, 200):
+        journal.append(row(index))
+        if index % 20 == 19:
+            journal.flush()
+    journal.end(None)
+    journal.close()
+    whole = journal.path.read_bytes()
+    journal.path.write_bytes(whole[:place] + bytes(8) + whole[place + 8 :])
+    made = recover(journal.path)
+    assert (made.path, made.account.damaged, made.account.gaps) == (output, True, [(0.5, 20)])
+    assert len(RECORDING.read(output).frame) == 180
+    assert journal.path.exists()
 
 
 class FullAfter:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipelines.acquisition.machine import Counter
+from pipelines.acquisition.counter import Counter
 from pipelines.acquisition.ring import MOST_READS, Queue, Ring
 from pipelines.errors import SettingsError
 from pipelines.registers import Block
@@ -156,7 +156,7 @@ def test_a_record_that_was_counted_before_it_was_written_is_not_lost():
 def test_a_queue_is_emptied_and_what_it_lost_is_missing():
     drive = Drive(QUEUE)
     drive.sample(3)
-    queue = Queue(drive, QUEUE, numbered())
+    queue = Queue(drive, QUEUE)
     assert drained(queue, 2) == []
     drive.sample(8)
     assert drained(queue, 10) == truth(range(3, 11))

@@ -191,29 +191,42 @@ def test_where_a_cuff_still_presses_the_drives_are_disabled_without_slowing_down
     assert (len(exchanges) < 4 * HOLD_SAMPLES) == still_pressed
 
 
-def test_a_recording_that_cannot_be_written_does_not_hide_why_the_run_was_stopped(stopped, tmp_path):
+def test_a_recording_that_cannot_be_written_does_not_hide_why_the_run_was_stopped(stopped, tmp_path, monkeypatch):
+    def freeze(device, function):
+        device.rig.catch_up = lambda: None
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("pipelines.acquisition.acquire.write_recording", full)
+    why = stopped(fault=After(300, freeze), watchdog_s=0.3, duration_s=3.0)
+    journal = journal_of(tmp_path / "test.parquet")
+    assert why.startswith("watchdog: no new sample from drive hip")
+    assert f"its samples are in {journal}, but could not be written as a recording: [Errno 28] No space left" in why
+    assert len(read_journal(journal)[0]) > 50
+
+
+def test_a_register_that_tells_no_number_ends_the_run_before_that_is_recorded(stopped, tmp_path):
+    """A recording that holds an infinity could not be written."""
     hot = {"temperature = { address = 112, type = \"int16\", scale = 0.1":
            "temperature = { address = 114, type = \"float32\", scale = 1.0"}  # fmt: skip
 
     def burn(device, function):
         shows(device, lambda true: replace(true, temperature=np.inf * true.temperature))
-        if device.rig.sample.sequence[0] > 400:
-            device.rig.catch_up = lambda: None
 
-    why = stopped(fault=After(300, burn), watchdog_s=0.3, replace=hot, duration_s=3.0)
-    journal = journal_of(tmp_path / "test.parquet")
-    assert why.startswith("watchdog: no new sample from drive hip")
-    assert f"samples are in {journal}, but could not be written as a recording" in why
-    assert len(read_journal(journal)[0]) > 100
+    why = stopped(fault=After(300, burn), replace=hot, duration_s=3.0)
+    assert "drive hip (127.0.0.1:" in why
+    assert "its temperature is inf, expected a number" in why
+    assert np.isfinite(aborted(tmp_path).frame["hip_temperature_c"]).all()
 
 
 def test_a_fault_of_our_own_stops_the_leg_ends_with_exit_code_1_and_keeps_its_traceback(stopped, tmp_path, monkeypatch):
-    def fails(limits, row):
-        if row.sequence > 300:
+    def fails(limits, told):
+        if told.drives[0].sequence > 300:
             raise ZeroDivisionError("a bug")
         return None
 
-    monkeypatch.setattr(Limits, "violation", fails)
+    monkeypatch.setattr(Limits, "cuff_violation", fails)
     why = stopped(raises=ExoidError)
     samples, log = len(aborted(tmp_path).frame), tmp_path / "test.aborted.log"
     assert why == (

@@ -1,15 +1,16 @@
 """The safety state machine itself: as it is drawn, and what may not be skipped."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pipelines.acquisition.machine import Reading, Row
+from pipelines.acquisition.machine import Answers, Reading, Row
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.states import TRANSITIONS, State, Supervisor
-from pipelines.errors import DeviceError
+from pipelines.errors import DeviceError, Unanswered
 from pipelines.settings import datasets
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import load_rig
@@ -48,6 +49,37 @@ def row(sequence, angle=0.0):
     return Row((at_rest, at_rest), np.full((4, 3), np.nan))
 
 
+def answers(row):
+    return Answers(row.drives, row.forces, row)
+
+
+LOST = Unanswered("drive knee: did not answer an exchange")
+
+
+def test_what_one_drive_and_the_cuffs_told_is_judged_though_the_other_drive_did_not_answer(supervisor):
+    supervisor.rest(10.0)
+    supervisor.begin(row(100), 10.0)
+    supervisor.next(101, 10.005)
+    assert supervisor.judge(Answers((row(101).drives[0], LOST), row(101).forces, None), 10.006) is None
+    supervisor.next(102, 10.01)
+    pressed = np.where([[True], [False], [False], [False]], 401.0, np.nan) * np.ones(3)
+    with pytest.raises(DeviceError, match="thigh_front force x 401 N is above the limit"):
+        supervisor.judge(Answers((LOST, LOST), pressed, None), 10.011)
+    loaded = replace(row(102).drives[0], torque=151.0)
+    with pytest.raises(DeviceError, match=r"hip torque 151\.0 N·m is above its limit"):
+        supervisor.judge(Answers((loaded, LOST), row(102).forces, None), 10.011)
+
+
+def test_the_drive_that_is_silent_for_too_long_is_named_though_the_other_one_answers(supervisor):
+    supervisor.rest(10.0)
+    supervisor.begin(row(100), 10.0)
+    for k in range(1, 20):
+        supervisor.judge(Answers((row(100 + k).drives[0], LOST), row(100).forces, None), 10.0 + k / RATE)
+    with pytest.raises(Unanswered, match="drive knee: did not answer"):
+        too_late = 10.001 + supervisor.rig.safety.watchdog_s
+        supervisor.judge(Answers((row(120).drives[0], LOST), row(100).forces, None), too_late)
+
+
 def test_a_state_cannot_be_skipped(supervisor):
     with pytest.raises(AssertionError, match="there is no way from check to run"):
         supervisor._go(State.RUN)
@@ -61,7 +93,7 @@ def test_after_an_abort_no_set_point_of_the_plan_follows_and_the_first_reason_st
     supervisor.abort(ValueError("the second"))
     assert (supervisor.state, supervisor.why) == (State.ABORT, "the first")
     assert isinstance(supervisor.fault, ValueError)
-    for ask in (lambda: supervisor.next(102, 10.01), lambda: supervisor.judge(row(102), 10.01)):
+    for ask in (lambda: supervisor.next(102, 10.01), lambda: supervisor.judge(answers(row(102)), 10.01)):
         with pytest.raises(DeviceError, match="the first"):
             ask()
 
@@ -73,8 +105,8 @@ def test_many_small_leaps_of_a_counter_do_not_add_up_to_a_speed_above_the_limit(
     with pytest.raises(DeviceError, match=r"faster than its limit of 3 rad/s; it was not sent"):
         for k in range(1, 100):  # the counter goes on twice as fast as the time
             supervisor.next(100 + k, 10.0 + 0.5 * k / RATE)
-            supervisor._watch._last = row(100 + k)
-            supervisor._watch._fresh = 10.0 + 0.5 * k / RATE
+            for stream, reading in zip(supervisor._streams, row(100 + k).drives, strict=True):
+                stream.begin(reading, 10.0 + 0.5 * k / RATE)
     assert supervisor.sent[0] < 0.1
 
 
@@ -82,7 +114,8 @@ def follow(supervisor, k):
     """Send what is due at a sample, and take the sample; return the hip's set-point."""
     now = 10.0 + (k - 100) / RATE
     sent = float(supervisor.next(k, now)[0])
-    supervisor._watch.take(row(k), now)
+    for stream, reading in zip(supervisor._streams, row(k).drives, strict=True):
+        stream.begin(reading, now)
     return sent
 
 
@@ -135,7 +168,7 @@ def test_a_leg_that_does_not_follow_stops_the_run(supervisor):
     with pytest.raises(DeviceError, match=r"hip angle 0\.000 rad is 0\.15\d rad from its set-point of 0\.15\d rad"):
         for k in range(101, 200):  # the leg hangs and trembles, the plan goes on
             supervisor.next(k, 10.0 + (k - 100) / RATE)
-            supervisor.judge(row(k, 1e-4 * (k % 2)), 10.0 + (k - 100) / RATE)
+            supervisor.judge(answers(row(k, 1e-4 * (k % 2))), 10.0 + (k - 100) / RATE)
     assert supervisor.sent[0] < 0.16
 
 

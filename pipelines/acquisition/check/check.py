@@ -13,7 +13,7 @@ from pipelines.acquisition.check.look import RigReport, look, probes_of
 from pipelines.acquisition.embedded import embedded
 from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.pace import urgent
-from pipelines.errors import DeviceError, InputError
+from pipelines.errors import DeviceError, InputError, SettingsError
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import RigSettings, load_rig
 
@@ -46,15 +46,20 @@ def check_rig(
     rig = load_rig(path)
     if rate_hz is None and rig.plant:
         rate_hz = rig.plant.sample_rate_hz
+    if move and rate_hz is None and rig.sampling == "recorder":
+        raise SettingsError("--rate-hz: missing; of a rig that records by itself it is not known how often it is told")
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # what it would print, our errors say
     settings = RunSettings(name="check", run=run, purpose="train")
     place = embedded(rig, path, settings, rate_hz) if rig.embedded and rate_hz else nullcontext(rig)
     with place as present, nullcontext() if rig.clock == "lockstep" else urgent():
         report, start = asyncio.run(_check(present, rate_hz, run == "exo_alone", operator))
         if move and not report.findings:
-            if not report.by_hand:
-                refuse_far_from_zero(start)
-            report.answers, report.findings = guided(present, start, rate_hz or _counted(report), run)
+            try:
+                if not report.by_hand:
+                    refuse_far_from_zero(start)
+                report.answers, report.findings = guided(present, start, rate_hz or _counted(report), run)
+            except InputError as error:  # what was found out before must not be lost with it
+                report.findings.append(Finding("rig", str(error)))
         return report
 
 

@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.interpretation import remedy
 from pipelines.acquisition.check.probe import Probe, Series
+from pipelines.acquisition.counter import RATE_TOLERANCE
 from pipelines.settings.rig import DIMENSION, UNITS
 
-TOLERANCE = 0.05
-"""How far rates may differ: acquisition refuses a run beyond it."""
 RATES_HZ = (0.5, 1e5)
 """Sample rates that a device may have, where none is known."""
 OFTEN = 3.0
@@ -112,7 +111,7 @@ def _counts(counter: NDArray, seconds: float, rate_hz: float | None) -> bool:
     if rate_hz is None:
         return bool(RATES_HZ[0] <= found <= RATES_HZ[1])
     # A sample more or less at either end.
-    return bool(abs(found - rate_hz) <= TOLERANCE * rate_hz + 2.0 / seconds)
+    return bool(abs(found - rate_hz) <= RATE_TOLERANCE * rate_hz + 2.0 / seconds)
 
 
 def _time(probe: Probe, series: Series, clock: Clock, seconds: float) -> Iterator[Finding]:
@@ -123,7 +122,7 @@ def _time(probe: Probe, series: Series, clock: Clock, seconds: float) -> Iterato
     reference = "by its counter" if probe.in_lockstep else "of this computer's clock"
     found = f"its clock goes on by {rate:.4g} s in each second {reference}"
     for unit in DIMENSION["time"]:
-        if rate and abs(rate * UNITS[unit] / UNITS[register.unit] - 1.0) <= TOLERANCE:
+        if rate and abs(rate * UNITS[unit] / UNITS[register.unit] - 1.0) <= RATE_TOLERANCE:
             yield Finding(probe.name, f'{found}; with unit = "{unit}" the two agree: correct {where}')
             return
     mended = remedy("time", " s", where, series, lambda v: _keeps_time(v, seconds), counts=True)
@@ -140,7 +139,7 @@ def _keeps_time(time: NDArray, seconds: float) -> bool:
     if not np.isfinite(time).all() or (np.diff(time) < 0).any():
         return False
     # A sample more or less at either end.
-    return bool(abs(time[-1] - time[0] - seconds) <= TOLERANCE * seconds + 2.0 * np.diff(time).max(initial=0.0))
+    return bool(abs(time[-1] - time[0] - seconds) <= RATE_TOLERANCE * seconds + 2.0 * np.diff(time).max(initial=0.0))
 
 
 def check_latch(probe: Probe, series: Series) -> Iterator[Finding]:

@@ -15,7 +15,7 @@ from pipelines.acquisition.acquire import acquire
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.loop import Progress
 from pipelines.contracts import RECORDING
-from pipelines.errors import DeviceError, SettingsError
+from pipelines.errors import DeviceError, InputError, SettingsError
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import RigSettings
 
@@ -81,16 +81,20 @@ def guided(rig: RigSettings, start: Sequence[float], rate_hz: float, run: str) -
     seen: list[Progress] = []
     try:
         acquire(rig_file, settings, excitation, output, rate_hz, report=seen.append)
+    except InputError:  # nothing has moved, and nothing is in the folder that anybody may want
+        shutil.rmtree(folder)
+        raise
     except DeviceError as error:  # the folder stays: the message names a file in it
         return [], [Finding("rig", f"the guided movement was stopped: {error}"), *_first_signs(rig, seen)]
-    frame = RECORDING.read(output).frame
+    table = RECORDING.read(output)
+    frame, recorded_hz = table.frame, table.metadata["sample_rate_hz"]
     shutil.rmtree(folder)
     reference = _sent(np.asarray(frame["time_s"], float), start)
     answers, findings = [], list[Finding]()
     for j, drive in enumerate(rig.drive):
         columns = {name: np.asarray(frame[f"{drive.joint}_{name}"], float) for name in ("angle_rad", "torque_nm")}
-        gains, delay = _answer(columns["angle_rad"], reference, rate_hz)
-        speed = np.gradient(reference[:, j]) * rate_hz * np.sign(gains[j])
+        gains, delay = _answer(columns["angle_rad"], reference, recorded_hz)
+        speed = np.gradient(reference[:, j]) * recorded_hz * np.sign(gains[j])
         torque = float(np.corrcoef(columns["torque_nm"], speed)[0, 1])
         answers.append(Answer(drive.joint, float(gains[j]), delay, torque))
         findings += _judged(rig, j, gains, torque)

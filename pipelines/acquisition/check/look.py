@@ -7,15 +7,18 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 
 from pipelines.acquisition.check.agreement import check_velocity
-from pipelines.acquisition.check.clock import TOLERANCE, Clock, check_clock, check_latch, measure_clock
+from pipelines.acquisition.check.clock import Clock, check_clock, check_latch, measure_clock
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.guided import Answer
 from pipelines.acquisition.check.latency import Latency
 from pipelines.acquisition.check.plausible import check_registers
 from pipelines.acquisition.check.probe import Probe, Series
 from pipelines.acquisition.check.rate import Rate, check_rate, cycles
+from pipelines.acquisition.check.rings import check_rings
 from pipelines.acquisition.check.zeros import check_zeros
+from pipelines.acquisition.counter import RATE_TOLERANCE
 from pipelines.acquisition.machine import Drive, Machine, Sensor
+from pipelines.acquisition.pace import SLOW
 from pipelines.errors import DeviceError
 from pipelines.settings.rig import RigSettings
 
@@ -25,8 +28,6 @@ READS_S = 2.0
 TOGETHER_S = 2.0
 DRIVES_S = 1.0
 """How long all devices are asked together, and the drives alone."""
-SLOW = 0.5
-"""Share of a sample that a typical answer may take: a run asks a device twice in each."""
 
 
 @dataclass
@@ -118,6 +119,8 @@ async def look(machine: Machine, rate_hz: float | None, *, alone: bool) -> RigRe
     for probe, (device, still) in present.items():
         report.findings += _judged(probe, device, still, probe.taken(), machine.rig, rate_hz, alone=alone)
     report.findings += _counters_differ([device for device, _ in present.values()])
+    if machine.rig.sampling == "recorder" and not report.findings:
+        report.findings += await check_rings(machine, list(present), rate_hz)
     return report
 
 
@@ -188,7 +191,8 @@ def _judged(
         )
     if series is together:
         report.clock = measure_clock(probe, series, seconds)
-        findings += check_clock(probe, series, report.clock, seconds, rate_hz)
+        counts_hz = rate_hz if rig.sampling == "cyclic" else rig.record_rate_hz if probe.is_drive else None
+        findings += check_clock(probe, series, report.clock, seconds, counts_hz)
     if not probe.in_lockstep:
         findings += check_latch(probe, series)
     wrong = list(check_registers(probe, series, rig))
@@ -218,7 +222,7 @@ def _counters_differ(devices: Sequence[DeviceReport]) -> Iterator[Finding]:
     drives = [(d.name, d.clock.counter_hz) for d in devices if d.name.startswith("drive") and d.clock]
     for name, found in drives[1:]:
         first = drives[0][1]
-        if first and found and abs(found / first - 1.0) > TOLERANCE:
+        if first and found and abs(found / first - 1.0) > RATE_TOLERANCE:
             yield Finding(
                 name,
                 f"samples {found:.4g} times a second, {drives[0][0]} {first:.4g}; let all drives sample at one "

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.acquisition.machine import Counter, Drive, Sensor
+from pipelines.acquisition.counter import Counter
+from pipelines.acquisition.machine import Drive, Sensor
 from pipelines.registers import Block
 from pipelines.settings.rig import Register, registers_of
 

@@ -1,9 +1,10 @@
 """A small movement by the drives tells whether set-point, angle, torque and velocity go the same way."""
 
+import tempfile
+
 import pytest
 
 from pipelines.acquisition.check import guided
-from pipelines.errors import SettingsError
 
 READ = 'angle = { address = 104, type = "int32", scale = 1e-6, unit = "rad" }'
 WRITE = 'reference = { address = 200, type = "int32", scale = 1e-6, unit = "rad" }'
@@ -63,8 +64,19 @@ def test_a_set_point_in_the_wrong_unit_is_stopped_before_the_leg_goes_far(checke
 
 
 def test_a_leg_away_from_zero_is_not_moved_before_its_signs_are_known(checked):
-    with pytest.raises(SettingsError, match="a drive of wrong sign leaps by twice its angle"):
-        checked(options=MOVE, rest_rad="[0.3, -0.6]", coulomb_nm="[40.0, 40.0]")
+    report = checked(options=MOVE, rest_rad="[0.3, -0.6]", coulomb_nm="[40.0, 40.0]")
+    assert "a drive of wrong sign leaps by twice its angle" in told(report)
+    assert (report.answers, len(report.devices)) == ([], 6)  # what was found out before is told
+
+
+def test_a_movement_that_the_rigs_limits_do_not_allow_is_told_beside_all_else_and_leaves_no_files(
+    checked, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    report = checked(options=MOVE, rest_rad="[0.0, 0.0]", served={"[-0.35, 1.75]": "[-0.02, 1.75]"})
+    assert "rig: " in told(report) and "rad" in told(report)
+    assert len(report.devices) == 6
+    assert not list(tmp_path.glob("exoid-check-*"))
 
 
 def test_nothing_is_moved_where_something_is_wrong(checked):

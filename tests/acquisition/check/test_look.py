@@ -30,6 +30,29 @@ def test_nothing_is_said_of_a_right_rig(checked, shipped, run):
         assert sum(device.latency.histogram) == device.latency.count
 
 
+LOCKSTEP = {'clock = "real_time"': 'clock = "lockstep"'}
+RECORDED = 'angle = { address = 4, type = "int32", scale = 1e-6, unit = "rad" }'
+
+
+def test_nothing_is_said_of_a_rig_whose_drives_record_faster_than_they_are_told(checked):
+    report = checked("recorder", served=LOCKSTEP, options={"rate_hz": 200.0})
+    assert report.findings == []
+    assert report.devices[0].clock.step == 5.0
+
+
+@pytest.mark.parametrize(
+    ("was", "believed", "words"),
+    [
+        (RECORDED, RECORDED.replace("1e-6", "2e-6"), "its record tells angle"),
+        ("address = 1000", "address = 1010", "its record brought no sample in 40 cycles"),
+    ],
+)
+def test_a_record_that_is_not_as_the_file_says_is_found(checked, was, believed, words):
+    report = checked("recorder", served=LOCKSTEP, believed={was: believed}, options={"rate_hz": 200.0})
+    assert words in told(report)
+    assert "map.drive.servo.ring" in told(report)
+
+
 def test_nothing_is_written_to_a_real_rig(checked):
     functions = set()
 
