@@ -1,15 +1,16 @@
-"""Where the real data are: shared/data beside the checkout, or wherever EXOID_REAL_DATA says."""
+"""Real data for tests, where there are any."""
 
-import os
 from pathlib import Path
 
 import pytest
+
+from tests.real.folder import real_data_folder
 
 
 @pytest.fixture(scope="session")
 def real_data() -> Path:
     """Return the folder of recordings that other people made on real machines; skip the test where it is absent."""
-    folder = Path(os.environ.get("EXOID_REAL_DATA") or Path(__file__).parents[3] / "shared" / "data")
+    folder = real_data_folder()
     if not folder.is_dir():
         pytest.skip(f"no real data in {folder}; EXOID_REAL_DATA names their folder")
     return folder

@@ -1,0 +1,117 @@
+"""The machines that other people recorded: from their logs to motions and verdicts, by the commands a user has."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from exoid_cli.app import run
+from pipelines.contracts import PARAMETERS
+from pipelines.dynamics.replay import replay
+from pipelines.effects.torque_offset import TorqueOffset
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.read import read_motions
+from pipelines.model import Model, Term, baseline, model_from_parameters
+from pipelines.settings.datasets import datasets
+from pipelines.settings.filter import FilterSettings
+
+
+@dataclass(frozen=True)
+class Logs:
+    """The logs of one machine and the map that exoid brings for them."""
+
+    title: str
+    files: str
+    """Pattern in the folder of real data."""
+    map: str
+
+    @property
+    def commands(self) -> str:
+        """What a user types to get from these logs to a verdict."""
+        return (
+            f"exoid import ../shared/data/{self.files} --map datasets/maps/{self.map} -o recordings/\n"
+            "exoid diagnose recordings/*.parquet --out diagnosed/"
+        )
+
+
+LOGS = {
+    "emps": Logs("EMPS", "emps/*.mat", "emps.toml"),
+    "A0-fourier": Logs(
+        "Double pendulum A0, Fourier run", "double_pendulum/A0_fourier_75s.csv", "double_pendulum_fourier.toml"
+    ),
+    "A0-swings": Logs("Double pendulum A0, swings", "double_pendulum/A0_swing_*.csv", "double_pendulum.toml"),
+    "C1-swings": Logs("Double pendulum C1, swings", "double_pendulum/C1_swing_*.csv", "double_pendulum_C1.toml"),
+    "simple": Logs("Simple pendulum", "simple_pendulum/*.csv", "simple_pendulum.toml"),
+    "xl330": Logs("XL330", "xl330/*.json", "xl330.toml"),
+    "modexo": Logs("modexo", "modexo/*.csv", "modexo.toml"),
+}
+
+
+def recordings(logs: Logs, data: Path, folder: Path) -> list[Path]:
+    """Import the logs into a folder and return the recordings."""
+    files = sorted(str(file) for file in data.glob(logs.files))
+    _exoid("import", *files, "--map", str(datasets() / "maps" / logs.map), "-o", str(folder))
+    return sorted(folder.glob("*.parquet"))
+
+
+def motions(recorded: list[Path]) -> list[Motion]:
+    """Return the recordings filtered as every stage does it by itself."""
+    return read_motions(recorded, FilterSettings(), Geometry())
+
+
+@dataclass(frozen=True)
+class Diagnosed:
+    """A machine's runs and what ``exoid diagnose`` says of them."""
+
+    motions: list[Motion]
+    verdict: dict[str, Any]
+    parameters: pd.DataFrame
+    folder: Path
+
+    @property
+    def causes(self) -> list[tuple[str, str | None]]:
+        """Effect and joint of each named cause."""
+        return [(cause["effect"], cause["joint"]) for cause in self.verdict["causes"]]
+
+    @property
+    def model(self) -> Model:
+        """The extended model."""
+        return model_from_parameters(self.parameters, self.motions[0].run, self.motions[0].machine)
+
+    def strayed(self, motion: Motion) -> NDArray:
+        """Return the rms angle error (J,) of 1 s simulations of the extended model under a run's torque."""
+        return replay(self.model, motion).rmse
+
+
+def diagnosed(logs: Logs, data: Path, folder: Path, figures: bool = False) -> Diagnosed:
+    """Import and diagnose the logs in a folder."""
+    recorded = recordings(logs, data, folder / "recordings")
+    out = folder / "diagnosed"
+    drawn = "--figures" if figures else "--no-figures"
+    _exoid("diagnose", *map(str, recorded), "--out", str(out), drawn)
+    told = json.loads((out / "verdict.json").read_text(encoding="utf-8"))
+    return Diagnosed(motions(recorded), told, PARAMETERS.read(out / "parameters.parquet").frame, out)
+
+
+def _exoid(*arguments: str) -> None:
+    code = run(["--quiet", *arguments])
+    if code:
+        raise RuntimeError(f"exoid {' '.join(arguments)} ended with exit code {code}")
+
+
+def of_purpose(among: list[Motion], purpose: str) -> list[Motion]:
+    """Return the runs to train on, or those to validate on."""
+    return [motion for motion in among if motion.purpose == purpose]
+
+
+def symmetric(motion: Motion) -> Model:
+    """Return the model every lab starts with and a drive's offset at each joint, without values."""
+    machine = motion.machine
+    offsets = [TorqueOffset(name, on=machine) for name in machine.names]
+    effects = [*baseline(machine, [motion.run]), *offsets]
+    return Model(tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects))

@@ -1,0 +1,75 @@
+"""100 |e| / |tau|, as the people who published these data count it, and the error in N·m beside it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import decimate
+
+from pipelines.mechanics.motion import Motion
+from pipelines.model import Model
+from pipelines.signals.low_pass import low_pass
+
+EDGE = 20
+"""Decimated samples at each end of a run where the filter lacks one side."""
+SLOW_HZ = 5.0
+
+
+def decimated(x: NDArray, times: int = 10) -> NDArray:
+    """Put (n, ...) behind the authors' parallel filter: low-pass without delay, then every tenth sample.
+
+    ``scipy.signal.decimate`` is MATLAB's ``decimate``: Chebyshev I of order 8 at 0.8 of the new Nyquist frequency.
+    """
+    return np.asarray(decimate(x, times, axis=0)[EDGE:-EDGE])
+
+
+@dataclass(frozen=True)
+class TorqueError:
+    """Of each joint, (J,)."""
+
+    rms: NDArray
+    """N·m, N at a prismatic joint."""
+    percent: NDArray
+    """100 |e| / |tau|."""
+
+
+def torque_error(left: NDArray, torque: NDArray) -> TorqueError:
+    """Return the error of a residual (n, J) beside its torque (n, J)."""
+    size, all_of_it = np.linalg.norm(left, axis=0), np.linalg.norm(torque, axis=0)
+    return TorqueError(size / np.sqrt(len(left)), 100.0 * size / all_of_it)
+
+
+def slow_error(predicted: NDArray, motion: Motion) -> TorqueError:
+    """Return the error below 5 Hz, reversals included, of a predicted torque (n, J).
+
+    Torque and prediction go through the same zero-phase low-pass, on a uniform grid.
+    """
+    inside = np.flatnonzero(motion.valid)
+    first, last = motion.time[inside[0]], motion.time[inside[-1]]
+    grid = np.arange(motion.time[0], motion.time[-1], 1.0 / motion.sample_rate_hz)
+    kept = (grid >= first) & (grid <= last)
+
+    def slow(x: NDArray) -> NDArray:
+        uniform = np.column_stack([np.interp(grid, motion.time, column) for column in x.T])
+        return low_pass(uniform, motion.sample_rate_hz, SLOW_HZ)[kept]
+
+    return torque_error(slow(motion.torque - predicted), slow(motion.torque))
+
+
+def pooled(errors: list[TorqueError]) -> TorqueError:
+    """Return the error over several runs of about one length."""
+    rms = np.sqrt(np.mean([e.rms**2 for e in errors], axis=0))
+    torque = np.sqrt(np.mean([(100.0 * e.rms / e.percent) ** 2 for e in errors], axis=0))
+    return TorqueError(rms, 100.0 * rms / torque)
+
+
+def fitted(model: Model, motion: Motion) -> Model:
+    """Return the model by ordinary least squares behind the authors' parallel filter."""
+    A, b = decimated(model.regressor(motion)), decimated(motion.torque)
+    values = np.linalg.lstsq(A.reshape(-1, A.shape[-1]), b.ravel(), rcond=None)[0]
+    return model.with_linear(values)
+
+
+def decimated_error(model: Model, motion: Motion) -> TorqueError:
+    """Return a model's error on a run behind the authors' parallel filter."""
+    return torque_error(decimated(motion.torque - model.torque(motion)), decimated(motion.torque))

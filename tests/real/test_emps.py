@@ -1,0 +1,26 @@
+"""The published benchmark of a drive whose screw is worn: EMPS of Janot, Gautier and Brunot."""
+
+import pytest
+
+from tests.real.machines import LOGS, motions, of_purpose, recordings, symmetric
+from tests.real.published import EMPS, EMPS_ERRORS
+from tests.real.relative_error import decimated_error, fitted
+
+
+@pytest.fixture(scope="module")
+def runs(real_data, tmp_path_factory):
+    return motions(recordings(LOGS["emps"], real_data, tmp_path_factory.mktemp("emps")))
+
+
+def _errors(model, runs):
+    (train,), (pulses,) = of_purpose(runs, "train"), of_purpose(runs, "validate")
+    return [decimated_error(model, run).percent[0] for run in (train, pulses)]
+
+
+def test_the_symmetric_model_is_the_published_one(runs):
+    """All four parameters within 1 %, errors no larger than those of the authors."""
+    (train,) = of_purpose(runs, "train")
+    found = fitted(symmetric(train), train)
+    values = dict(zip((p.symbol for _, p in found.linear_parameters), found.linear_values, strict=True))
+    assert values == pytest.approx(EMPS, rel=0.01)
+    assert all(e <= asked for e, asked in zip(_errors(found, runs), EMPS_ERRORS["symmetric"], strict=True))
