@@ -101,7 +101,7 @@ class Line:
             The device did not answer; the line stands.
         """
         async with self._turn:
-            if self._unanswered_s is not None and not self.tells_replies_apart:
+            if self._unanswered_s is not None and not self.tells_replies_apart and self.client.connected:
                 await self._let_pass(self._unanswered_s)
             await self._quiet()
             # The one place where pymodbus looks for how long to wait, be it for a connection or for an answer.

@@ -143,20 +143,20 @@ def test_a_drive_whose_line_breaks_is_disabled_on_a_new_one(stopped, monkeypatch
 
     async def breaks(line, block, words):
         tried.append(line.label)
-        if tried.count(line.label) == 1:
+        if tried.count(line.label) == 2:  # the first one is that before the run
             line.line.close()
         await write(line, block, words)
 
     monkeypatch.setattr(Line, "write", breaks)
     assert "could not be disabled" not in stopped(fault=After(300, refuse_exchanges))
-    assert len(tried) == 4
+    assert len(tried) == 2 + 4
 
 
 def test_what_goes_wrong_with_one_drives_stop_neither_hides_nor_hinders_the_other(stopped, monkeypatch):
     encode, disable = Line.exchange, Line.write
 
     async def fails(line, *arguments):
-        if "hip" in line.label:
+        if "hip" in line.label and broken:
             raise ValueError("no number")
         await disable(line, *arguments)
 
