@@ -63,7 +63,7 @@ class Leg(DataHandler):
 
     def _followed(self, unit: int, angle: int) -> int:
         high, low, control = self.words[unit][WRITE : WRITE + 3]
-        return struct.unpack(">i", struct.pack(">HH", high, low))[0] if control == ENABLE else angle
+        return struct.unpack(">i", struct.pack(">HH", high, low))[0] if control & ENABLE == ENABLE else angle
 
     def _show(self, unit: int) -> None:
         if unit in DRIVES:
@@ -71,7 +71,7 @@ class Leg(DataHandler):
             angle, control = self.angle[j], self.words[unit][WRITE + 2]
             values = (
                 self.sample, self.clock_us, angle, (angle - self.last_angle[j]) * 20, int(angle / 50) + 1000, angle,
-                250 + self.sample % 10, control == ENABLE,
+                250 + self.sample % 10, control & ENABLE == ENABLE,  # halted, a drive is enabled still
             )  # fmt: skip
             raw = struct.pack(">IIiiiihH", *values)
         else:

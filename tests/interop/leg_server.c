@@ -40,7 +40,7 @@ static void latch(void) {
     clock_us += PERIOD_US;
     for (int j = 0; j < DRIVES; j++) {
         uint16_t *told = map[j]->tab_registers + WRITE;
-        enabled[j] = told[2] == ENABLE;
+        enabled[j] = (told[2] & ENABLE) == ENABLE; /* halted, a drive is enabled still */
         last_angle[j] = angle[j];
         if (enabled[j])
             angle[j] = (int32_t)((uint32_t)told[0] << 16 | told[1]);
