@@ -20,7 +20,7 @@ enum { ENABLE = 0x000F, READ_WRITE = 23, PERIOD_US = 5000 };
 static const int UNIT[DEVICES] = {1, 2, 11, 12, 13, 14};
 static modbus_mapping_t *map[DEVICES];
 static int32_t angle[DRIVES], last_angle[DRIVES]; /* microradians */
-static int exchanged[DRIVES], enabled[DRIVES];
+static int exchanged[DRIVES];
 static uint32_t sample = UINT32_MAX - 350, clock_us = UINT32_MAX - 1000000; /* both turn over within a run */
 
 static void put32(uint16_t *at, uint32_t value) {
@@ -35,14 +35,18 @@ static void put_float(uint16_t *at, float value) {
     put32(at, bits);
 }
 
+/* Halted, a drive is enabled still. */
+static int is_enabled(int j) {
+    return (map[j]->tab_registers[WRITE + 2] & ENABLE) == ENABLE;
+}
+
 static void latch(void) {
     sample += 1;
     clock_us += PERIOD_US;
     for (int j = 0; j < DRIVES; j++) {
         uint16_t *told = map[j]->tab_registers + WRITE;
-        enabled[j] = (told[2] & ENABLE) == ENABLE; /* halted, a drive is enabled still */
         last_angle[j] = angle[j];
-        if (enabled[j])
+        if (is_enabled(j))
             angle[j] = (int32_t)((uint32_t)told[0] << 16 | told[1]);
         exchanged[j] = 0;
     }
@@ -57,7 +61,7 @@ static void show_drive(int j) {
     put32(at + 8, (uint32_t)(angle[j] / 50 + 1000));            /* 0.1 mA */
     put32(at + 10, (uint32_t)angle[j]);
     at[12] = 250 + sample % 10; /* 0.1 degrees Celsius */
-    at[13] = (uint16_t)enabled[j];
+    at[13] = (uint16_t)is_enabled(j);
 }
 
 static void show_sensor(int device) {
