@@ -45,6 +45,9 @@ bench: $(INSTALLED) ## measure speed
 estimators: $(INSTALLED) ## what docs/estimators.md says of the methods, measured on simulated and real data; long
 	$(BIN)/python -m tests.estimators
 
+peers: $(VENV)/.peers ## the same recordings through exoid and other tools, and docs/peers.md from what came of it
+	$(BIN)/python -m tests.peers docs/peers.md
+
 fuzz: $(INSTALLED) ## hostile replies against the client, hostile requests against the rig: 60,000 of each
 	$(BIN)/python -m tests.fuzz
 
@@ -84,6 +87,11 @@ $(INSTALLED): pyproject.toml requirements.lock
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $@
+
+# What exoid is compared with is heavy, and nothing else needs it.
+$(VENV)/.peers: $(INSTALLED)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation -c requirements.lock --editable ".[peers]"
 	@touch $@
 
 clean: ## remove results and caches; the environment stays
