@@ -34,7 +34,7 @@ def leg(number: int, spring: bool, out: Path) -> dict[str, Any]:
 
 
 def double_pendulum(data: Path, out: Path) -> dict[str, Any]:
-    """Compare them on the double pendulum's Fourier run: no controller was logged, so MuJoCo cannot follow one."""
+    """Compare them on the double pendulum's Fourier run; no controller was logged for MuJoCo to follow."""
     kept = out / "double-pendulum.json"
     if not kept.exists():
         with tempfile.TemporaryDirectory() as folder:

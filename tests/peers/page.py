@@ -84,9 +84,9 @@ def _real(real: dict[str, Any]) -> str:
     return f"""## A real double pendulum
 
 `A0_fourier_75s.csv` through `exoid import` with `datasets/maps/double_pendulum_fourier.toml`: the first 70 % to train,
-the rest to validate, {rms} N·m rms at shoulder / elbow. Its controller was not logged, so that
-rollouts cannot follow it: MuJoCo is left out. IDIM-LS and FIGAROH get the irregular log on a uniform grid. The truth is
-not known.
+the rest to validate, {rms} N·m rms at shoulder / elbow. Its controller was not logged: MuJoCo's rollouts would have to
+run on the torque alone, in short windows, which was not tried. IDIM-LS and FIGAROH get the irregular log on a uniform
+grid. The truth is not known.
 
 {chr(10).join(rows)}
 """
