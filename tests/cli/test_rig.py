@@ -33,7 +33,9 @@ def test_a_rig_file_that_cannot_be_used_is_exit_code_2(exoid, tmp_path):
     assert exoid("rig", "check", rig).code == 2
 
 
-@pytest.mark.parametrize(("option", "words"), [("--move", "give --yes where a script starts it"), ("--by-hand", "is no terminal")])
+@pytest.mark.parametrize(
+    ("option", "words"), [("--move", "give --yes where a script starts it"), ("--by-hand", "is no terminal")]
+)
 def test_without_a_terminal_nobody_is_asked_and_nothing_moves(exoid, monkeypatch, option, words):
     monkeypatch.setattr("sys.stdin", io.StringIO("yes\n"))
     outcome = exoid("rig", "check", datasets() / "rigs" / "plain.toml", option)
