@@ -136,6 +136,7 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
     """Diagnose at the bandwidth that the motions have."""
     train, validate = _dealt(motions)
     baseline = baseline_of(train)
+    _refuse_without_floor(validate, baseline)
     bank = fill(train, baseline, lambda share, what: report(SEARCH_SHARE * share, what))
     empty = fit((), bank.runs, baseline, bank.weights)
     validate = tuple(with_load(like_trained(run, baseline), baseline, empty.values) for run in validate)
@@ -194,6 +195,18 @@ def _dealt(motions: Sequence[Motion]) -> tuple[tuple[Run, ...], tuple[Run, ...]]
         tuple(run for run in runs if run.motion.purpose == "train"),
         tuple(run for run in runs if run.motion.purpose == "validate"),
     )
+
+
+def _refuse_without_floor(validate: Sequence[Run], baseline: Baseline) -> None:
+    """Refuse validation runs of which too little is usable to tell noise from error."""
+    known = np.isfinite(noise_floor(validate, [run.measured for run in validate]).rms[: len(baseline.joints)])
+    if not known.all():
+        joint = baseline.joints[int(np.argmin(known))]
+        usable = sum(int(run.usable[:, int(np.argmin(known))].sum()) for run in validate)
+        raise InputError(
+            f"{', '.join(run.motion.file for run in validate)}: {usable} blocks away from the {joint}'s reversals, "
+            "too few in a row to tell noise from error; validate on longer runs"
+        )
 
 
 def _less(named: Ranked, label: str, bank: Bank, validate: Sequence[Run]) -> Extended:

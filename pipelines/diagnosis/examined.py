@@ -69,7 +69,8 @@ class Examined:
         hums = standing.hums(*tones)
         wanders = bool(np.any(slow_scatter(validate, after.residuals)[:J] > WANDERING))
         effects = [cause.effect for cause in made.causes]
-        foreign = (hums or (wanders and not any(effect.per_run for effect in effects))) and not standing.rings(effects)
+        doubtful = hums and not standing.is_minor(tones[1])
+        foreign = (doubtful or (wanders and not any(e.per_run for e in effects))) and not standing.rings(effects)
         # Play rings on as it likes, and a wearer pushes at will: what no model follows there is no reason to doubt
         # what was heard and felt in these runs too.
         known = {**heard_in(validate, before.residuals), **felt_in(validate, before.residuals)}

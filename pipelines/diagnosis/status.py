@@ -140,6 +140,15 @@ class Standing:
         was, left = (np.sum((tone / self.floor) ** 2) for tone in (before, after))
         return bool(np.any(loud) and left > FOREIGN * was)
 
+    def is_minor(self, tone: NDArray) -> bool:
+        """Tell whether a tone (J,) N·m is as small beside the error that there was as what may be left of a cause.
+
+        A resonance that one run happens to excite is something else that is missing; it is no reason to doubt what
+        explains several times as much. A tone that is slow enough to be in that error counts in full.
+        """
+        was = self.slow_before.excess[: len(self.floor)]
+        return bool(np.sum((tone / self.floor) ** 2) < FOREIGN * np.sum((was / self.floor) ** 2))
+
 
 def status_of(standing: Standing, named: bool, wandering: bool) -> str:
     """Return the verdict's status."""

@@ -153,6 +153,13 @@ def test_a_hum_that_the_causes_took_most_of_is_their_misfit_and_any_other_is_for
     assert made.hums(np.array([0.0, 2.0]), np.array([0.0, 1.9]))
 
 
+def test_a_hum_that_is_little_beside_what_there_was_is_no_reason_to_doubt_a_cause():
+    made = standing(5.0, 1.05)
+    assert made.is_minor(np.array([1.0, 0.5]))
+    assert not made.is_minor(np.array([3.0, 0.5]))
+    assert not standing(1.0, 1.0).is_minor(np.array([0.4, 0.0])), "nothing else was missing"
+
+
 @pytest.mark.parametrize(("speed_share", "absurd"), [(0.2, False), (3.0, True)])
 def test_a_large_amplitude_is_absurd_only_where_it_carries_most_of_the_joints_torque(run, speed_share, absurd):
     cause, J = Candidate(ViscousAsymmetry(joint="hip"), ((),)), 2

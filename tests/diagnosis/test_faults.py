@@ -98,6 +98,30 @@ def test_late_stamps_are_jitter_and_not_gaps(session):
     assert fault.what.startswith("clock jitter: irregular") and "only the stamps are wrong" in fault.what
 
 
+def uneven(frame, seed=3):
+    """Return the frame as it would be had its samples been taken up to a fifth of a period late, stamps and all."""
+    count = np.arange(len(frame))
+    taken = count + np.random.default_rng(seed).uniform(0.0, 0.2, len(frame))
+    made = {name: np.interp(taken, count, frame[name]) for name in frame.columns if name != "sequence"}
+    return frame.assign(**made)
+
+
+def test_samples_taken_unevenly_and_stamped_so_spoil_nothing(session):
+    frame, metadata = session[SPOILED]
+    session[SPOILED] = uneven(frame), metadata
+    fault = only_fault(session)
+    assert "the angles follow the stamps" in fault.what and not fault.spoils
+
+
+def test_angles_too_coarse_to_tell_whether_stamps_are_right_are_too_coarse_to_suffer_from_it(session):
+    frame, metadata = session[SPOILED]
+    coarse = {name: np.round(frame[name] / 0.02) * 0.02 for name in ("hip_angle_rad", "knee_angle_rad")}
+    late = frame["time_s"] + np.random.default_rng(4).uniform(0.0, 1e-3, len(frame))
+    session[SPOILED] = frame.assign(**coarse, time_s=late), metadata
+    fault = next(f for f in faults_of(session) if f.channel == "time_s")
+    assert "too coarse to tell" in fault.what and not fault.spoils
+
+
 def test_samples_taken_unevenly_under_even_stamps_are_jitter(session):
     frame, _ = session[SPOILED]
     count = np.arange(len(frame))
@@ -110,6 +134,22 @@ def test_samples_taken_unevenly_under_even_stamps_are_jitter(session):
 def test_a_clock_five_percent_slow_is_named_with_the_true_rate(session):
     session[SPOILED][0]["time_s"] *= 1.05
     assert "190.48 Hz in place of 200 Hz" in only_fault(session).what
+
+
+def test_a_rate_that_changes_within_the_run_is_no_wrong_clock(session):
+    """Two thirds of the samples 5 % closer than the mean, the others further apart."""
+    frame, metadata = session[SPOILED]
+    steps = np.where(np.arange(len(frame)) < 2 * len(frame) // 3, 0.95, 1.1) / metadata["sample_rate_hz"]
+    session[SPOILED] = frame.drop(columns="sequence").assign(time_s=np.cumsum(steps) - steps[0]), metadata
+    assert not any("another rate" in fault.what for fault in faults_of(session))
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.26, False), (1 / (2 * np.pi), True), (np.pi / 180, True)])
+def test_a_drive_that_follows_weakly_is_in_no_other_unit(session, share, told):
+    frame, metadata = session[SPOILED]
+    session[SPOILED] = frame.assign(hip_angle_rad=frame["hip_reference_rad"] * share), metadata
+    said = [fault.what for fault in faults_of(session) if fault.channel == "hip_angle_rad"]
+    assert any("in another unit" in what for what in said) == told
 
 
 def test_a_counter_that_starts_anew_is_named(sound):

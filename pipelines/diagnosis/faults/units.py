@@ -34,6 +34,8 @@ TORQUE_UNITS = {
     "N·mm": 1e3, "N·cm": 1e2, "kgf·cm": 10.197, "lbf·in": 8.851, "ozf·in": 141.6, "kgf·m": 0.10197, "kN·m": 1e-3,
 }  # fmt: skip
 SAME_UNIT = 1.3
+SMALLER_UNITS, NEAR = (1 / (2 * np.pi), np.pi / 180, 1 / 360), 1.25
+"""Turns under set-points in radians, radians under degrees, turns under degrees; and how near to one of these is it."""
 
 
 def angle_unit_faults(motion: Motion) -> Iterator[Fault]:
@@ -42,7 +44,7 @@ def angle_unit_faults(motion: Motion) -> Iterator[Fault]:
         q = motion.q[motion.valid, j]
         factor = _times_set_point(motion, j)
         channel = column(motion, j, "angle")
-        if factor and not 1 / WRONG < factor < WRONG:
+        if factor and _is_a_unit(factor):
             unit = "degrees" if 40 < factor < 80 else "another unit"
             yield Fault(
                 motion.file,
@@ -57,6 +59,15 @@ def angle_unit_faults(motion: Motion) -> Iterator[Fault]:
                 f"{channel} is not in radians, or its zero is lost: the {name} would reach {np.abs(q).max():.3g} rad; "
                 "if these are degrees, multiply by pi/180",
             )
+
+
+def _is_a_unit(factor: float) -> bool:
+    """Tell whether an angle is so many times its set-point that only a unit can be the reason.
+
+    A drive that is weak or soft moves less than it is told, but hardly by the factor of a turn or a degree; none moves
+    several times as far.
+    """
+    return factor > WRONG or any(1 / NEAR < factor / smaller < NEAR for smaller in SMALLER_UNITS)
 
 
 def _times_set_point(motion: Motion, joint: int) -> float | None:
