@@ -12,7 +12,7 @@ EXPERIMENT := $(MAKE) --no-print-directory -f datasets/experiments/experiment.mk
 SEEDS ?= tuning
 
 .DEFAULT_GOAL := help
-.PHONY: help all test test-slow invariants check format bench estimators fuzz blind blind-full blind-fixed blind-page docs lock clean install
+.PHONY: help all test test-slow invariants check format bench estimators real fuzz blind blind-full blind-fixed blind-page docs lock clean install
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | sort | expand -t 12
@@ -47,6 +47,9 @@ estimators: $(INSTALLED) ## what docs/estimators.md says of the methods, measure
 
 peers: $(VENV)/.peers ## the same recordings through exoid and other tools, and docs/peers.md from what came of it
 	$(BIN)/python -m tests.peers docs/peers.md
+
+real: $(INSTALLED) ## what docs/real-data.md says of other people's machines, measured on ../shared/data; some minutes
+	$(BIN)/python -m tests.real docs/real-data.md
 
 fuzz: $(INSTALLED) ## hostile replies against the client, hostile requests against the rig: 60,000 of each
 	$(BIN)/python -m tests.fuzz

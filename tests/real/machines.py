@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from exoid_cli.app import run
 from pipelines.contracts import PARAMETERS
 from pipelines.dynamics.replay import replay
+from pipelines.effects.rotor_inertia import RotorInertia
 from pipelines.effects.torque_offset import TorqueOffset
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.motion import Motion
@@ -107,6 +108,13 @@ def _exoid(*arguments: str) -> None:
 def of_purpose(among: list[Motion], purpose: str) -> list[Motion]:
     """Return the runs to train on, or those to validate on."""
     return [motion for motion in among if motion.purpose == purpose]
+
+
+def with_rotor(motion: Motion) -> Model:
+    """Return the model every lab starts with and the second joint's rotor, without values."""
+    machine = motion.machine
+    effects = [*baseline(machine, [motion.run]), RotorInertia(machine.names[1], on=machine)]
+    return Model(tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects))
 
 
 def symmetric(motion: Motion) -> Model:

@@ -1,5 +1,6 @@
 """100 |e| / |tau|, as the people who published these data count it, and the error in N·m beside it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,28 +40,25 @@ def torque_error(left: NDArray, torque: NDArray) -> TorqueError:
     return TorqueError(size / np.sqrt(len(left)), 100.0 * size / all_of_it)
 
 
-def slow_error(predicted: NDArray, motion: Motion) -> TorqueError:
-    """Return the error below 5 Hz, reversals included, of a predicted torque (n, J).
-
-    Torque and prediction go through the same zero-phase low-pass, on a uniform grid.
-    """
+def _slow(x: NDArray, motion: Motion) -> NDArray:
+    """Put (n, ...) behind a zero-phase low-pass of 5 Hz, on a uniform grid over the samples that are valid."""
     inside = np.flatnonzero(motion.valid)
-    first, last = motion.time[inside[0]], motion.time[inside[-1]]
     grid = np.arange(motion.time[0], motion.time[-1], 1.0 / motion.sample_rate_hz)
-    kept = (grid >= first) & (grid <= last)
-
-    def slow(x: NDArray) -> NDArray:
-        uniform = np.column_stack([np.interp(grid, motion.time, column) for column in x.T])
-        return low_pass(uniform, motion.sample_rate_hz, SLOW_HZ)[kept]
-
-    return torque_error(slow(motion.torque - predicted), slow(motion.torque))
+    kept = (grid >= motion.time[inside[0]]) & (grid <= motion.time[inside[-1]])
+    uniform = np.column_stack([np.interp(grid, motion.time, column) for column in x.reshape(len(x), -1).T])
+    return low_pass(uniform, motion.sample_rate_hz, SLOW_HZ)[kept].reshape(-1, *x.shape[1:])
 
 
-def pooled(errors: list[TorqueError]) -> TorqueError:
-    """Return the error over several runs of about one length."""
-    rms = np.sqrt(np.mean([e.rms**2 for e in errors], axis=0))
-    torque = np.sqrt(np.mean([(100.0 * e.rms / e.percent) ** 2 for e in errors], axis=0))
-    return TorqueError(rms, 100.0 * rms / torque)
+def slow_error(predicted: NDArray, motion: Motion) -> TorqueError:
+    """Return the error below 5 Hz, reversals included, of a predicted torque (n, J)."""
+    return torque_error(_slow(motion.torque - predicted, motion), _slow(motion.torque, motion))
+
+
+def slow_fit(model: Model, motions: Sequence[Motion]) -> Model:
+    """Return the model by ordinary least squares below 5 Hz, as the README of the data fits it."""
+    A = np.concatenate([_slow(model.regressor(motion), motion) for motion in motions])
+    b = np.concatenate([_slow(motion.torque, motion) for motion in motions])
+    return model.with_linear(np.linalg.lstsq(A.reshape(-1, A.shape[-1]), b.ravel(), rcond=None)[0])
 
 
 def fitted(model: Model, motion: Motion) -> Model:

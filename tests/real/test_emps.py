@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.real.machines import LOGS, motions, of_purpose, recordings, symmetric
+from tests.real.machines import LOGS, diagnosed, motions, of_purpose, recordings, symmetric
 from tests.real.published import EMPS, EMPS_ERRORS
 from tests.real.relative_error import decimated_error, fitted
 
@@ -10,6 +10,11 @@ from tests.real.relative_error import decimated_error, fitted
 @pytest.fixture(scope="module")
 def runs(real_data, tmp_path_factory):
     return motions(recordings(LOGS["emps"], real_data, tmp_path_factory.mktemp("emps")))
+
+
+@pytest.fixture(scope="module")
+def diagnosis(real_data, tmp_path_factory):
+    return diagnosed(LOGS["emps"], real_data, tmp_path_factory.mktemp("emps"))
 
 
 def _errors(model, runs):
@@ -24,3 +29,12 @@ def test_the_symmetric_model_is_the_published_one(runs):
     values = dict(zip((p.symbol for _, p in found.linear_parameters), found.linear_values, strict=True))
     assert values == pytest.approx(EMPS, rel=0.01)
     assert all(e <= asked for e, asked in zip(_errors(found, runs), EMPS_ERRORS["symmetric"], strict=True))
+
+
+def test_diagnose_names_the_worn_screw_and_reaches_the_published_error(diagnosis):
+    assert ("viscous_asymmetry", "axis") in diagnosis.causes
+    (train,) = of_purpose(diagnosis.motions, "train")
+    found = fitted(diagnosis.model, train)
+    relative, crossed = _errors(found, diagnosis.motions)
+    assert relative <= EMPS_ERRORS["asymmetric"][0]
+    assert crossed <= EMPS_ERRORS["asymmetric"][1]

@@ -1,0 +1,66 @@
+"""``make real``: what docs/real-data.md says of other people's machines, measured on ../shared/data.
+
+python -m tests.real docs/real-data.md --machines emps A0-fourier
+"""
+
+import argparse
+import os
+import re
+import shutil
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+# Before NumPy is loaded: one core is enough.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from tests.real import tables
+from tests.real.folder import real_data_folder
+from tests.real.machines import LOGS, Diagnosed, diagnosed
+
+END = "<!-- until here -->"
+IMAGES = {"emps": "verdict", "A0-fourier": "dependence", "xl330": "verdict"}
+"""Which figure of a machine's diagnosis the page shows."""
+
+
+def written(page: str, name: str, measured: str) -> str:
+    """Return the page with what was measured between the marks of that name."""
+    between = re.compile(f"(?<=<!-- measured: {re.escape(name)} -->\n).*?(?={re.escape(END)})", re.DOTALL)
+    return between.sub(lambda old: f"\n{measured}\n\n", page, count=1)
+
+
+def measured(found: dict[str, Diagnosed], data: Path) -> dict[str, str]:
+    """Return each table of the page whose machines were diagnosed."""
+    made = {"verdicts": tables.verdicts(found)} if set(found) == set(LOGS) else {}
+    if "emps" in found:
+        made |= {"emps": tables.emps(found), "emps-pulses": tables.flexibility(found["emps"])}
+    for name in ("A0", "C1"):
+        if any(key.startswith(name) for key in found):
+            made[name] = tables.pendulum(name, found, data)
+    if any(len(one.motions[0].joints) == 2 for one in found.values()):
+        made["timing"] = tables.timing(found)
+    for key, one in found.items():
+        made |= {f"{key}-depends": tables.depends(one), f"{key}-says": f"> {one.verdict['summary']}"}
+    return made
+
+
+def main() -> None:
+    """Measure, and write tables and figures in place of the old ones."""
+    parser = argparse.ArgumentParser(prog="python -m tests.real", description=__doc__)
+    parser.add_argument("page", type=Path, nargs="?", default=Path("docs/real-data.md"))
+    parser.add_argument("--machines", nargs="+", choices=list(LOGS), default=list(LOGS))
+    chosen, data = parser.parse_args(), real_data_folder()
+    if not data.is_dir():
+        parser.error(f"no real data in {data}; EXOID_REAL_DATA names their folder")
+    with TemporaryDirectory() as folder:
+        found = {name: diagnosed(LOGS[name], data, Path(folder) / name, figures=True) for name in chosen.machines}
+        text = chosen.page.read_text(encoding="utf-8")
+        for name, table in measured(found, data).items():
+            text = written(text, name, table)
+        for name, figure in IMAGES.items():
+            if name in found:
+                shutil.copy(found[name].folder / f"{figure}.png", chosen.page.parent / "images" / f"real-{name}.png")
+    chosen.page.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

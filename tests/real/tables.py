@@ -1,0 +1,136 @@
+"""The tables of docs/real-data.md."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.mechanics.motion import Motion
+from tests.real.machines import LOGS, Diagnosed, of_purpose, symmetric, with_rotor
+from tests.real.published import EMPS, EMPS_ERRORS, double_pendulum, their_torque
+from tests.real.relative_error import TorqueError, decimated_error, fitted, slow_error, slow_fit
+
+SHIFTS_S = np.linspace(-0.012, 0.012, 13)
+"""By which a prediction is moved along the stamps; positive where the angles are older than their stamps."""
+
+
+def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table as Markdown has it."""
+    lines = [f"| {' | '.join(headings)} |", f"|{'---|' * len(headings)}"]
+    return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)])
+
+
+def verdicts(found: Mapping[str, Diagnosed]) -> str:
+    """Return what the diagnosis says of each machine."""
+    headings = ("machine", "verdict", "named (probability)", "torque error, rigid + friction", "with the causes")
+    return table(headings, (_verdict(LOGS[name].title, d) for name, d in found.items()))
+
+
+def _verdict(title: str, d: Diagnosed) -> tuple[str, ...]:
+    told = d.verdict
+    causes = [
+        f"{c['effect']}@{c['joint']}" + "".join(f" or {t['effect']}@{t['joint']}" for t in c["indistinguishable_from"])
+        + f" ({c['probability']:.2f})"
+        for c in told["causes"]
+    ]  # fmt: skip
+    units = {joint: unit["torque"] for joint, unit in told["units"].items()}
+
+    def errors(key: str) -> str:
+        return ", ".join(f"{told[key][joint]:.3g} {unit}" for joint, unit in units.items())
+
+    return title, told["status"], "; ".join(causes) or "–", errors("baseline_rmse_nm"), errors("extended_rmse_nm")
+
+
+def emps(found: Mapping[str, Diagnosed]) -> str:
+    """Return parameters and errors beside the published ones."""
+    d = found["emps"]
+    (train,), (pulses,) = of_purpose(d.motions, "train"), of_purpose(d.motions, "validate")
+    plain = fitted(symmetric(train), train)
+    named = fitted(d.model, train)
+    values = dict(zip((p.symbol for _, p in plain.linear_parameters), plain.linear_values, strict=True))
+    rows = [
+        (symbol, f"{theirs:.4f}", f"{values[symbol]:.4f}", f"{100 * (values[symbol] / theirs - 1):+.2f} %")
+        for symbol, theirs in EMPS.items()
+    ]
+    said = [
+        ("symmetric friction", plain, "symmetric"),
+        ("what diagnose names, its own values", d.model, "asymmetric"),
+        ("what diagnose names, fitted as the authors fit", named, "asymmetric"),
+    ]
+    errors = [
+        (
+            title,
+            f"{decimated_error(model, train).percent[0]:.2f} % ({EMPS_ERRORS[kind][0]:.2f} %)",
+            f"{decimated_error(model, pulses).percent[0]:.2f} % ({EMPS_ERRORS[kind][1]:.2f} %)",
+        )
+        for title, model, kind in said
+    ]
+    return "\n\n".join(
+        [
+            table(("parameter", "published", "found", "difference"), rows),
+            table(("model", "relative error (asked for)", "cross-validation, pulses (asked for)"), errors),
+        ]
+    )
+
+
+def pendulum(name: str, found: Mapping[str, Diagnosed], data: Path) -> str:
+    """Return the torque error of every run of a double pendulum, beside that of its makers' parameters."""
+    theirs = double_pendulum(data / "double_pendulum" / f"{name}_published_parameters.yml")
+    rows = []
+    for key, d in found.items():
+        if not key.startswith(name):
+            continue
+        plain = slow_fit(with_rotor(d.motions[0]), of_purpose(d.motions, "train"))
+        for motion in d.motions:
+            predicted = (their_torque(theirs, motion), plain.torque(motion), d.model.torque(motion))
+            errors = [text for torque in predicted for text in _both(slow_error(torque, motion))]
+            rows.append((motion.file.removesuffix(".parquet"), motion.purpose, *errors))
+    models = ("published", "least squares", "extended")
+    headings = ("run", "for", *(f"{model}, {unit}" for model in models for unit in ("N·m", "%")))
+    return table(headings, rows)
+
+
+def _both(error: TorqueError) -> tuple[str, str]:
+    return " / ".join(f"{e:.3f}" for e in error.rms), " / ".join(f"{e:.1f}" for e in error.percent)
+
+
+def timing(found: Mapping[str, Diagnosed]) -> str:
+    """Return at which shift of the predicted torque each run's error is least, and how much less than as stamped."""
+    rows = []
+    for d in found.values():
+        for motion in d.motions if len(d.motions[0].joints) == 2 else []:
+            predicted = d.model.torque(motion)
+            errors = np.array([slow_error(_shifted(predicted, motion, s), motion).rms for s in SHIFTS_S])
+            best = errors.argmin(axis=0)
+            gain = 1.0 - errors.min(axis=0) / errors[len(SHIFTS_S) // 2]
+            told = " / ".join(f"{1e3 * SHIFTS_S[b]:+.0f} ms" for b in best)
+            rows.append((motion.file.removesuffix(".parquet"), told, " / ".join(f"{100 * g:.1f} %" for g in gain)))
+    return table(("run", "least error at a shift of", "which is less by"), rows)
+
+
+def _shifted(torque: NDArray, motion: Motion, by_s: float) -> NDArray:
+    return np.column_stack([np.interp(motion.time + by_s, motion.time, column) for column in torque.T])
+
+
+def depends(d: Diagnosed, most: int = 4) -> str:
+    """Return what the residual goes with, before and after, the strongest after first."""
+    rows = []
+    for joint, variables in d.verdict["depends_on"].items():
+        left = sorted(variables, key=lambda one: -one["share_after"])[:most]
+        rows += [(joint, v["variable"], f"{v['share_before']:.2f}", f"{v['share_after']:.2f}") for v in left]
+    return table(("joint", "variable", "share foretold before", "share foretold after"), rows)
+
+
+def flexibility(d: Diagnosed) -> str:
+    """Return where on the pulses run the force error is in frequency, and how large the acceleration's is."""
+    (train,), (pulses,) = of_purpose(d.motions, "train"), of_purpose(d.motions, "validate")
+    rows = []
+    for title, motion in (("without pulses", train), ("with pulses", pulses)):
+        left = (motion.torque - d.model.torque(motion))[motion.valid, 0]
+        mass = dict(zip((p.symbol for _, p in d.model.linear_parameters), d.model.linear_values, strict=True))["X1"]
+        acceleration = motion.ddq[motion.valid, 0]
+        share = 100.0 * np.linalg.norm(left) / mass / np.linalg.norm(acceleration)
+        replayed = d.strayed(motion)
+        rows.append((title, f"{np.sqrt(np.mean(left**2)):.2f} N", f"{share:.1f} %", f"{1e3 * replayed[0]:.2f} mm"))
+    return table(("run", "force error at full rate", "acceleration error", "1 s simulation"), rows)
