@@ -117,6 +117,8 @@ def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = s
     refuse_unfit(motions)
     faults = tuple(find_faults(motions))
     sound = [thinned(motion) for motion in excluding(motions, faults)]
+    if not any(fault.spoils for fault in faults):
+        _refuse_without_floor([observe(motion) for motion in sound if motion.purpose == "validate"])
     first = _look(sound, faults, report)
     if first.spoilt or not (first.status == "unknown_cause" or (first.unsteady and _rings(first))):
         return first
@@ -136,7 +138,6 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
     """Diagnose at the bandwidth that the motions have."""
     train, validate = _dealt(motions)
     baseline = baseline_of(train)
-    _refuse_without_floor(validate, baseline)
     bank = fill(train, baseline, lambda share, what: report(SEARCH_SHARE * share, what))
     empty = fit((), bank.runs, baseline, bank.weights)
     validate = tuple(with_load(like_trained(run, baseline), baseline, empty.values) for run in validate)
@@ -197,16 +198,19 @@ def _dealt(motions: Sequence[Motion]) -> tuple[tuple[Run, ...], tuple[Run, ...]]
     )
 
 
-def _refuse_without_floor(validate: Sequence[Run], baseline: Baseline) -> None:
+def _refuse_without_floor(validate: Sequence[Run]) -> None:
     """Refuse validation runs of which too little is usable to tell noise from error."""
-    known = np.isfinite(noise_floor(validate, [run.measured for run in validate]).rms[: len(baseline.joints)])
-    if not known.all():
-        joint = baseline.joints[int(np.argmin(known))]
-        usable = sum(int(run.usable[:, int(np.argmin(known))].sum()) for run in validate)
-        raise InputError(
-            f"{', '.join(run.motion.file for run in validate)}: {usable} blocks away from the {joint}'s reversals, "
-            "too few in a row to tell noise from error; validate on longer runs"
-        )
+    if not validate:
+        return
+    joints = validate[0].motion.joints
+    floor = noise_floor(validate, [run.measured for run in validate]).rms[: len(joints)]
+    for j, joint in enumerate(joints):
+        if not np.isfinite(floor[j]):
+            usable = sum(int(run.usable[:, j].sum()) for run in validate)
+            raise InputError(
+                f"{', '.join(run.motion.file for run in validate)}: {usable} blocks away from the {joint}'s reversals, "
+                "too few in a row to tell noise from error; validate on longer runs"
+            )
 
 
 def _less(named: Ranked, label: str, bank: Bank, validate: Sequence[Run]) -> Extended:
