@@ -140,7 +140,10 @@ def test_a_rate_that_changes_within_the_run_is_no_wrong_clock(session):
     """Two thirds of the samples 5 % closer than the mean, the others further apart."""
     frame, metadata = session[SPOILED]
     steps = np.where(np.arange(len(frame)) < 2 * len(frame) // 3, 0.95, 1.1) / metadata["sample_rate_hz"]
-    session[SPOILED] = frame.drop(columns="sequence", errors="ignore").assign(time_s=np.cumsum(steps) - steps[0]), metadata
+    session[SPOILED] = (
+        frame.drop(columns="sequence", errors="ignore").assign(time_s=np.cumsum(steps) - steps[0]),
+        metadata,
+    )
     assert not any("another rate" in fault.what for fault in faults_of(session))
 
 

@@ -56,7 +56,7 @@ def emps(found: Mapping[str, Diagnosed]) -> str:
     said = [
         ("symmetric friction", plain, "symmetric"),
         ("what diagnose names, its own values", d.model, "asymmetric"),
-        ("what diagnose names, fitted as the authors fit", named, "asymmetric"),
+        ("what diagnose names, refitted behind this filter", named, "asymmetric"),
     ]
     errors = [
         (
