@@ -68,6 +68,7 @@ class Supervisor:
         self.why: str | None = None
         """The first reason to stop early; None while there is none."""
         self.also: list[str] = []
+        self._finished = False
         """What else went wrong after that, in its order."""
         self.fault: BaseException | None = None
         """The first error that was exoid's own."""
@@ -314,6 +315,8 @@ class Supervisor:
             self.why = reason
         elif reason not in (self.why, *self.also):
             self.also.append(reason)
+            if self._finished:
+                self.why = f"{self.why}; then {reason}"
         if State.ABORT in TRANSITIONS[self.state]:
             self._go(State.ABORT)
 
@@ -357,6 +360,7 @@ class Supervisor:
 
         Disabled is what is known to be: with a complaint a run ends in abort.
         """
+        self._finished = True
         if self.why is not None:
             self.why = "; then ".join((self.why, *self.also))
         if not complaints:

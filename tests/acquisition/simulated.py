@@ -258,6 +258,8 @@ class SimulatedRig:
         if drive is None:
             values = {"sequence": self.count(), "force_x": self.force, "force_y": sin(self.count()), "force_z": 0.0}
             return self.sensor_block.encode(values)
+        if address == drive.write.address:
+            return drive.write.encode({"reference": drive.told, "control": drive.control, "heartbeat": 0})
         if count == drive.read.count:
             drive.latch()
         block = drive.words()
