@@ -8,14 +8,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from exoid_cli import completion
 from exoid_cli.aside import Aside
-from exoid_cli.confirm import confirm
+from exoid_cli.confirm import YesOption, ask_before, confirm
 from exoid_cli.console import console
 from exoid_cli.operator_view import OperatorView, plain_line
+from exoid_cli.place import ConfigOption, place_of
+from exoid_cli.steps import AgainOption, only
+from pipelines.errors import InputError
 
 if TYPE_CHECKING:
     from pipelines.acquisition.loop import Progress
     from pipelines.mechanics.trajectory import Trajectory
+    from pipelines.settings import Experiment
     from pipelines.settings.rig import RigSettings
 
 LINE_S = 5.0
@@ -23,26 +28,61 @@ LINE_S = 5.0
 
 
 def acquire(
-    config: Annotated[Path, typer.Option(help="The experiment's exoid.toml.")],
-    run: Annotated[str, typer.Option(help="Name of the [[run]] in it.")],
-    trajectory: Annotated[Path, typer.Option(help="The excitation, Parquet or TOML.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="The recording to write.")],
-    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before a run with somebody in the machine.")] = False,
+    context: typer.Context,
+    config: ConfigOption = None,
+    run: Annotated[
+        str | None,
+        typer.Option(
+            help="Name of the [[run]].", show_default="all that are missing or stale", autocompletion=completion.runs
+        ),
+    ] = None,
+    trajectory: Annotated[
+        Path | None,
+        typer.Option(help="The excitation, Parquet or TOML.", show_default="the run's own, or trajectory.parquet"),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="The recording to write.", show_default="recordings/RUN.parquet"),
+    ] = None,
+    again: AgainOption = False,
+    yes: YesOption = False,
     reset_faults: Annotated[
         bool, typer.Option("--reset-faults", help="First clear the faults that drives report.")
     ] = False,
 ) -> None:
     """Move the leg along an excitation and record every sample.
 
-    \b
-    Example:
-      exoid acquire --config exoid.toml --run with_human_train \\
-        --trajectory trajectory.parquet -o recordings/with_human_train.parquet
-    """
-    from pipelines.acquisition.acquire import acquire as record
-    from pipelines.settings import Experiment
+    Without --run, in an experiment's folder, it records every run that is
+    missing or stale, one after another.
 
-    experiment = Experiment.load(config)
+    \b
+    Examples:
+      exoid acquire
+      exoid acquire --run with_human_train
+      exoid acquire --run with_human_train --trajectory mine.toml -o a.parquet
+    """
+    place = place_of(config)
+    if run is None:
+        if trajectory or output:
+            raise InputError("--run: missing; --trajectory and -o are of one run, name it")
+        faults = ("--reset-faults",) if reset_faults else ()
+        only(
+            context, place, "acquire", again=again,
+            before=lambda step: (*ask_before(place.experiment, step, yes=yes), *faults),
+        )  # fmt: skip
+        return
+    place.experiment.run_named(run)
+    if trajectory is None or output is None:
+        step = place.step("acquire", run)
+        trajectory, output = trajectory or step.inputs[0], output or step.target
+    _record(place.experiment, run, trajectory, output, yes=yes, reset_faults=reset_faults)
+
+
+def _record(
+    experiment: "Experiment", run: str, trajectory: Path, output: Path, *, yes: bool, reset_faults: bool
+) -> None:
+    from pipelines.acquisition.acquire import acquire as record
+
     experiment.mechanism.refuse_all_but_the_leg("`exoid acquire`")
     settings, rate = experiment.run_named(run), experiment.acquire.sample_rate_hz
     reports: list[Callable[[Progress], None]] = []

@@ -10,13 +10,14 @@ import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, NoReturn
 
 import typer
 from typer.exceptions import TyperException
 
+from exoid_cli import usage
 from exoid_cli.acquire import acquire
 from exoid_cli.console import console
 from exoid_cli.design import design
@@ -25,40 +26,50 @@ from exoid_cli.diagnose import diagnose
 from exoid_cli.effects import effects
 from exoid_cli.export import export
 from exoid_cli.filter import filter_
+from exoid_cli.heeding import Command, JsonOption, QuietOption, heeding
 from exoid_cli.identify import identify
 from exoid_cli.import_ import import_
 from exoid_cli.init import init
 from exoid_cli.recover import recover
 from exoid_cli.rig_group import rig
+from exoid_cli.run import run as run_
 from exoid_cli.settings import settings
 from exoid_cli.show import show
 from exoid_cli.simulate import simulate
+from exoid_cli.status import status
 from pipelines import __version__
 from pipelines.errors import ExoidError
 
 app = typer.Typer(
     name="exoid",
     help="Identification experiments on an exoskeleton leg: what the model gets wrong, and why.\n\n"
-    "\b\nExample:\n  exoid init my_experiment\n  make -C my_experiment",
+    "\b\nExample:\n  exoid init my_experiment\n  cd my_experiment\n  exoid run\n  exoid status",
     # Plain text: brackets of [design] are no markup, and examples can be copied.
     rich_markup_mode=None,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+
+def _add(name: str, function: Callable[..., None], short_help: str) -> None:
+    app.command(name, cls=Command, short_help=short_help)(heeding(function))
+
+
 # In the order of an experiment. The short help fits on the one line that the list of commands has for it.
-app.command("init", short_help="Start a new experiment.")(init)
-app.command("design", short_help="Search an excitation, or judge a given one.")(design)
-app.command("acquire", short_help="Move the leg along an excitation; record every sample.")(acquire)
-app.command("recover", short_help="Make a recording of what a killed run left.")(recover)
-app.command("import", short_help="Make recordings of logs from elsewhere.")(import_)
-app.command("filter", short_help="Filter a recording's angles and differentiate them.")(filter_)
-app.command("identify", short_help="Fit the leg's parameters; judge them on other runs.")(identify)
-app.command("diagnose", short_help="Name what the model gets wrong, and measure the gain.")(diagnose)
-app.command("simulate", short_help="Simulate the identified leg, or replay a recording.")(simulate)
-app.command("export", short_help="Hand a model to MuJoCo, URDF, MATLAB, C or JSON.")(export)
-app.command("show", short_help="Say what a file is, and what is in it.")(show)
-app.command("effects", short_help="List the effects a model can have, or explain one.")(effects)
-app.command("detect", short_help="Say which causes a motion would reveal.")(detect)
+_add("init", init, "Start a new experiment.")
+_add("status", status, "Say which stages are done, stale or missing.")
+_add("run", run_, "Do what is missing or stale, as make does.")
+_add("design", design, "Search an excitation, or judge a given one.")
+_add("acquire", acquire, "Move the leg along an excitation; record every sample.")
+_add("recover", recover, "Make a recording of what a killed run left.")
+_add("import", import_, "Make recordings of logs from elsewhere.")
+_add("filter", filter_, "Filter a recording's angles and differentiate them.")
+_add("identify", identify, "Fit the leg's parameters; judge them on other runs.")
+_add("diagnose", diagnose, "Name what the model gets wrong, and measure the gain.")
+_add("simulate", simulate, "Simulate the identified leg, or replay a recording.")
+_add("export", export, "Hand a model to MuJoCo, URDF, MATLAB, C or JSON.")
+_add("show", show, "Say what a file is, and what is in it.")
+_add("effects", effects, "List the effects a model can have, or explain one.")
+_add("detect", detect, "Say which causes a motion would reveal.")
 app.add_typer(rig, name="rig", short_help="Check a rig, or serve a virtual one.")
 app.add_typer(settings, name="settings", short_help="Work with an experiment's settings.")
 
@@ -71,14 +82,14 @@ def _print_version(wanted: bool) -> None:
 
 @app.callback()
 def options(
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors and warnings only.")] = False,
-    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")] = False,
+    quiet: QuietOption = False,
+    json: JsonOption = False,
     version: Annotated[
         bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
     ] = False,
 ) -> None:
-    """Set what every command heeds; these options may also follow the command."""
-    console.configure(quiet=quiet, json=json)
+    """Set what every command heeds; --quiet and --json may also follow the command."""
+    console.heed(quiet=quiet, json=json)
 
 
 INTERRUPTED, TERMINATED = 128 + signal.SIGINT, 128 + signal.SIGTERM
@@ -101,7 +112,8 @@ def run(arguments: Sequence[str]) -> int:
         console.fail(str(error))
         return error.exit_code
     except TyperException as error:
-        return _usage_error(error)
+        console.fail(usage.told(error))
+        return error.exit_code
     except KeyboardInterrupt:
         console.fail("stopped by Ctrl-C")
         return INTERRUPTED
@@ -120,24 +132,10 @@ def run(arguments: Sequence[str]) -> int:
 def _command_line(arguments: Sequence[str]) -> int:
     command = typer.main.get_command(app)
     # Not standalone: typer would print a box of several lines for a mistyped option.
-    code = command.main(args=_global_options_first(arguments or ["--help"]), prog_name="exoid", standalone_mode=False)
+    code = command.main(args=list(arguments) or ["--help"], prog_name="exoid", standalone_mode=False)
     if code == INTERRUPTED:
         raise KeyboardInterrupt  # of which typer makes an exit code, and says nothing
     return code or 0
-
-
-def _global_options_first(arguments: Sequence[str]) -> list[str]:
-    """Let ``exoid show FILE --json`` mean ``exoid --json show FILE``."""
-    ours = [argument for argument in arguments if argument in ("--json", "--quiet", "-q")]
-    return ours + [argument for argument in arguments if argument not in ours]
-
-
-def _usage_error(error: TyperException) -> int:
-    context = getattr(error, "ctx", None)
-    message = error.format_message() if hasattr(error, "format_message") else str(error)
-    hint = f"; see `{context.command_path} --help`" if context else ""
-    console.fail(message.rstrip(".") + hint)
-    return getattr(error, "exit_code", 2)
 
 
 _REMEDIES = {

@@ -2,14 +2,20 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from exoid_cli.console import console
 
 if TYPE_CHECKING:
     from pipelines.mechanics.trajectory import Trajectory
+    from pipelines.settings import Experiment
     from pipelines.settings.acquire import RunSettings
     from pipelines.settings.rig import RigSettings
+    from pipelines.workflow.graph import Step
+
+YesOption = Annotated[bool, typer.Option("--yes", help="Do not ask before a real rig is moved.")]
 
 
 def confirm(
@@ -34,6 +40,23 @@ def confirm(
     lines.append(f"  force {cuffs}; ramps of {rig.safety.ramp_s:g} s or longer lead in and out; Ctrl-C stops it")
     console.err.print("\n".join(lines), markup=False, soft_wrap=True)
     _ask("Is everybody ready, and the emergency stop at hand?", f"run {run.name}")
+
+
+def ask_before(experiment: "Experiment", step: "Step", *, yes: bool) -> tuple[str, ...]:
+    """Ask before a step that would move a real rig though nobody named its run; return what its command is told."""
+    from pipelines.settings.rig import load_rig
+
+    if step.stage != "acquire" or step.run is None:
+        return ()
+    if yes:
+        return ("--yes",)
+    run = experiment.run_named(step.run)
+    # Before somebody is moved, the command itself asks, and tells the limits.
+    if run.run == "exo_alone" and not load_rig(experiment.file(experiment.acquire.rig)).embedded:
+        _refuse_nobody_to_ask(f"run {run.name} moves the empty machine, which wants to be confirmed on a terminal")
+        console.err.print(f"Run {run.name} moves the machine for {run.duration_s:g} s.", markup=False, soft_wrap=True)
+        _ask("Is nobody in the machine, and the emergency stop at hand?", f"run {run.name}")
+    return ()
 
 
 def confirm_move() -> None:

@@ -5,6 +5,7 @@ people's output is silent under ``--json``, and ``emit`` is silent without it.
 """
 
 import json
+import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -13,7 +14,7 @@ from typing import Any
 from rich.console import Console as RichConsole
 from rich.console import RenderableType
 from rich.live import Live
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -31,8 +32,14 @@ class Console:
         """Set what the global options ask for."""
         self.quiet = quiet
         self.json = json
+        self._gathered: list[Any] | None = None
         self.out = RichConsole(highlight=False)
         self.err = RichConsole(stderr=True, highlight=False)
+
+    def heed(self, *, quiet: bool, json: bool) -> None:
+        """Take notice of the global options where a command was given them; what was asked for before stays."""
+        self.quiet |= quiet
+        self.json |= json
 
     @property
     def speaks(self) -> bool:
@@ -60,8 +67,23 @@ class Console:
 
     def emit(self, data: Any) -> None:
         """Print a result for a program, where ``--json`` asked for it."""
-        if self.json:
+        if self._gathered is not None:
+            self._gathered.append(data)
+        elif self.json:
             print(json.dumps(data, ensure_ascii=False, indent=2, default=_plain), file=sys.stdout)
+
+    @contextmanager
+    def gathering(self) -> Iterator[list[Any]]:
+        """Keep what is emitted in the block, so that several commands can make one document."""
+        before, self._gathered = self._gathered, []
+        try:
+            yield self._gathered
+        finally:
+            self._gathered = before
+
+    def say_command(self, words: Sequence[str], why: str) -> None:
+        """Print a command that is about to be called, as a shell would take it, and why."""
+        self.say(Text.assemble((shlex.join(words), "bold"), f"\n  {why}" if why else ""))
 
     def warn(self, text: str) -> None:
         """Print a warning, in every mode."""
@@ -81,6 +103,14 @@ class Console:
         with Progress(*columns, console=self.err, transient=True, disable=not self._may_move) as bar:
             task = bar.add_task(what, total=total, note="")
             yield lambda done, note="": bar.update(task, completed=done, note=note)
+
+    @contextmanager
+    def working(self, what: str) -> Iterator[None]:
+        """Show that something goes on that may take a while, and for how long, where its end cannot be told."""
+        columns = (SpinnerColumn("line"), TextColumn("{task.description}"), TimeElapsedColumn())
+        with Progress(*columns, console=self.err, transient=True, disable=not self._may_move) as line:
+            line.add_task(what, total=None)
+            yield
 
     @contextmanager
     def live(self, picture: RenderableType) -> Iterator[None]:

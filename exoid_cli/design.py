@@ -6,14 +6,20 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from exoid_cli.console import console
+from exoid_cli.place import ConfigOption, place_of, settings_in_force
+from exoid_cli.steps import AgainOption, only
 
 if TYPE_CHECKING:
     from pipelines.design.quality import Quality
 
 
 def design(
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="The trajectory/1 file to write.")] = None,
-    config: Annotated[Path | None, typer.Option("--config", help="exoid.toml; [design] and [mechanism] count.")] = None,
+    context: typer.Context,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="The trajectory/1 file to write.", show_default="trajectory.parquet"),
+    ] = None,
+    config: ConfigOption = None,
     evaluate: Annotated[
         Path | None, typer.Option("--evaluate", metavar="FILE", help="Judge this excitation, Parquet or TOML.")
     ] = None,
@@ -22,29 +28,36 @@ def design(
     ] = None,
     harmonics: Annotated[int | None, typer.Option(min=1, max=20, help="Wins over exoid.toml's.")] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Wins over exoid.toml's.")] = None,
+    again: AgainOption = False,
 ) -> None:
     """Search the excitation that tells the parameters apart best, or judge a given one.
 
     \b
     Examples:
+      exoid design
       exoid design --config exoid.toml -o trajectory.parquet
       exoid design --evaluate trajectory.toml
     """
     from pipelines.errors import InputError
     from pipelines.mechanics.geometry import Geometry
     from pipelines.mechanics.read import geometry_from
-    from pipelines.settings import Experiment
 
-    experiment = Experiment.load(config) if config else Experiment()
+    if evaluate and output:
+        raise InputError("--evaluate and -o exclude each other: a judged excitation is not written; drop one")
+    if not evaluate and not output:
+        place = place_of(config, lacking="neither -o FILE nor --evaluate FILE is given")
+        if criterion is harmonics is seed is None:
+            only(context, place, "design", again=again)
+            return
+        output = place.step("design").target
+    experiment = settings_in_force(config)
     settings = experiment.design.changed(criterion=criterion, harmonics=harmonics, seed=seed)
     experiment.mechanism.refuse_all_but_the_leg("`exoid design`")
     geometry = geometry_from(experiment.mechanism) or Geometry()
-    if (evaluate is None) == (output is None):
-        raise InputError("give either --output FILE, to design an excitation, or --evaluate FILE, to judge one")
     if evaluate:
         _evaluate(evaluate, settings, geometry)
     elif output:
-        _design(output, settings, geometry)
+        _design(output, settings, geometry, experiment.sections("mechanism"))
 
 
 def _evaluate(file: Path, settings: Any, geometry: Any) -> None:
@@ -56,13 +69,13 @@ def _evaluate(file: Path, settings: Any, geometry: Any) -> None:
     _show(str(file), found)
 
 
-def _design(output: Path, settings: Any, geometry: Any) -> None:
+def _design(output: Path, settings: Any, geometry: Any, mechanism: dict[str, Any]) -> None:
     from pipelines.contracts import TRAJECTORY, describe
     from pipelines.design.excitation import design
 
     with console.progress("Designing", total=1.0) as report:
         found = design(settings, geometry, report)
-    config = {"design": settings.model_dump(mode="json"), "geometry": vars(geometry)}
+    config = {"design": settings.model_dump(mode="json"), "geometry": vars(geometry)} | mechanism
     TRAJECTORY.write(output, found.frame(), found.metadata() | describe(config=config))
     if found.stopped_by == "seconds":
         console.warn(

@@ -7,22 +7,39 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from exoid_cli.console import console
+from exoid_cli.place import ConfigOption, place_of, settings_in_force
+from exoid_cli.steps import AgainOption, only
 
 if TYPE_CHECKING:
     from pipelines.mechanics.machine import Machine
 
 
 def diagnose(
+    context: typer.Context,
     files: Annotated[
-        list[Path], typer.Argument(help="recording/1 or motion/1 files, some to train and some to validate.")
-    ],
-    output: Annotated[Path, typer.Option("-o", "--out", "--output", help="Folder for verdict, tables and figures.")],
-    config: Annotated[Path | None, typer.Option("--config", help="exoid.toml: geometry and [filter].")] = None,
+        list[Path] | None,
+        typer.Argument(
+            metavar="FILE",
+            help="recording/1 or motion/1 files, some to train, some to validate.",
+            show_default="recordings/RUN.parquet of every run",
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", "--out", help="Folder for verdict, tables and figures.", show_default="diagnosed/"
+        ),
+    ] = None,
+    config: ConfigOption = None,
+    again: AgainOption = False,
     figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Whether to draw the figures.")] = True,
 ) -> None:
     """Name what rigid body and friction get wrong, extend the model with it, and measure the gain.
 
-    Example: exoid diagnose recordings/*.parquet --out diagnosed/
+    \b
+    Examples:
+      exoid diagnose
+      exoid diagnose recordings/*.parquet -o diagnosed/
     """
     from pipelines.contracts import CANDIDATES, PARAMETERS, RESIDUALS, describe
     from pipelines.contracts.atomic import open_folder, write_text
@@ -32,9 +49,15 @@ def diagnose(
     from pipelines.diagnosis.figures import FIGURES, draw
     from pipelines.diagnosis.verdict import verdict
     from pipelines.mechanics.read import geometry_from, read_motions, refuse_another_mechanism
-    from pipelines.settings import Experiment
 
-    settings = Experiment.load(config) if config else Experiment()
+    if not files and output is None and figures:
+        only(context, place_of(config, lacking="no recording is given"), "diagnose", again=again)
+        return
+    if not files:
+        files = list(place_of(config, lacking="no recording is given").step("diagnose").inputs)
+    if output is None:
+        output = place_of(config, lacking="-o: missing").step("diagnose").target.parent
+    settings = settings_in_force(config)
     tables = {"parameters": PARAMETERS, "residuals": RESIDUALS, "candidates": CANDIDATES}
     for name, contract in tables.items():
         contract.refuse_place(output / f"{name}.parquet")
@@ -44,8 +67,7 @@ def diagnose(
     with console.progress("diagnosing", 1.0) as report:
         found = find(motions, report)
     said = verdict(found)
-    used = {"mechanism": settings.mechanism.model_dump(mode="json"), "filter": settings.filter.model_dump(mode="json")}
-    shared = {"joints": motions[0].joint_metadata} | describe(inputs=files, config=used)
+    shared = {"joints": motions[0].joint_metadata} | describe(files, settings.sections("mechanism", "filter"))
     model = {
         "covariance": found.covariance.tolist(),
         "mechanism": motions[0].machine.mechanism.name,

@@ -4,6 +4,7 @@ from typing import Annotated
 
 import typer
 
+from exoid_cli import completion
 from exoid_cli.console import console
 
 LINE = "{effect:<24}{side:<11}{joints:<20}{typical}"
@@ -11,7 +12,10 @@ LINE = "{effect:<24}{side:<11}{joints:<20}{typical}"
 
 
 def effects(
-    name: Annotated[str | None, typer.Argument(help="One effect, for its page; without it the list of all.")] = None,
+    name: Annotated[
+        str | None,
+        typer.Argument(help="One effect, for its page; without it the list of all.", autocompletion=completion.effects),
+    ] = None,
 ) -> None:
     """List the effects a model can have, or say all about one: equation, parameters, how to confirm it.
 

@@ -5,12 +5,13 @@ from typing import Annotated
 
 import typer
 
+from exoid_cli import completion
 from exoid_cli.console import console
 
 
 def export(
     model: Annotated[Path, typer.Argument(help="A parameters/1 file, as `exoid identify` or `diagnose` writes it.")],
-    to: Annotated[str, typer.Option("--to", help="mjcf, urdf, json, matlab or c.")],
+    to: Annotated[str, typer.Option("--to", help="mjcf, urdf, json, matlab or c.", autocompletion=completion.formats)],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="The file, or a folder for it; beside the model unless given.")
     ] = None,

@@ -6,7 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from exoid_cli import completion
 from exoid_cli.console import console
+from exoid_cli.place import ConfigOption, place_of, settings_in_force
+from exoid_cli.steps import AgainOption, only
 
 if TYPE_CHECKING:
     from pipelines.identification import Identified
@@ -14,17 +17,35 @@ if TYPE_CHECKING:
 
 
 def identify(
-    files: Annotated[list[Path], typer.Argument(help="motion/1 files, or recording/1 files to be filtered first.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for parameters, residuals and figures.")],
-    config: Annotated[Path | None, typer.Option("--config", help="exoid.toml: geometry, [filter], [identify].")] = None,
+    context: typer.Context,
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="FILE", help="motion/1 or recording/1 files.", show_default="motions/RUN.parquet of every run"
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="Folder for parameters, residuals and figures.", show_default="identified/"
+        ),
+    ] = None,
+    config: ConfigOption = None,
+    again: AgainOption = False,
     method: Annotated[
-        str | None, typer.Option(help="Estimator, weighted_least_squares unless [identify] says otherwise.")
+        str | None,
+        typer.Option(
+            help="Estimator; docs/estimators.md tells of each.",
+            show_default="[identify] method, weighted_least_squares",
+            autocompletion=completion.methods,
+        ),
     ] = None,
 ) -> None:
     """Fit the leg's parameters to training runs and measure the torque error on validation runs.
 
     \b
-    Example:
+    Examples:
+      exoid identify
       exoid identify motions/*.parquet -o identified/
       exoid identify motions/*.parquet -o iv/ --method instrumental_variables
     """
@@ -33,17 +54,21 @@ def identify(
     from pipelines.identification import identify as fit
     from pipelines.identification.validation import residuals
     from pipelines.mechanics.read import geometry_from, read_runs, refuse_another_mechanism
-    from pipelines.settings import Experiment
 
-    settings = Experiment.load(config) if config else Experiment()
+    if not files and output is None and method is None:
+        only(context, place_of(config, lacking="no motion is given"), "identify", again=again)
+        return
+    if not files:
+        files = list(place_of(config, lacking="no motion is given").step("identify").inputs)
+    if output is None:
+        output = place_of(config, lacking="-o: missing").step("identify").target.parent
+    settings = settings_in_force(config)
     estimator = estimator_named(method or settings.identify.method)
     runs = read_runs(files, settings.filter, geometry_from(settings.mechanism))
     refuse_another_mechanism(settings.mechanism, runs)
     found = fit(runs, estimator)
-    config_used = {
-        "mechanism": settings.mechanism.model_dump(mode="json"),
-        "filter": settings.filter.model_dump(mode="json"),
-        "identify": settings.identify.changed(method=estimator.name).model_dump(mode="json"),
+    config_used = settings.sections("mechanism", "filter") | {
+        "identify": settings.identify.changed(method=estimator.name).model_dump(mode="json")
     }
     shared = {"joints": runs[0].joint_metadata} | describe(inputs=files, config=config_used)
     described = {

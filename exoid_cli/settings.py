@@ -6,11 +6,24 @@ from typing import Annotated
 import typer
 
 from exoid_cli.console import console
+from exoid_cli.heeding import Command, JsonOption, QuietOption, heeding
 
-settings = typer.Typer(help="Work with an experiment's settings.", rich_markup_mode=None)
+settings = typer.Typer(rich_markup_mode=None)
 
 
-@settings.command("check", short_help="Say whether an experiment's file can be used.")
+@settings.callback()
+def options(quiet: QuietOption = False, json: JsonOption = False) -> None:
+    """Work with an experiment's settings.
+
+    \b
+    Example:
+      exoid settings check exoid.toml
+    """
+    console.heed(quiet=quiet, json=json)
+
+
+@settings.command("check", cls=Command, short_help="Say whether an experiment's file can be used.")
+@heeding
 def check(config: Annotated[Path, typer.Argument(help="The experiment's exoid.toml.")]) -> None:
     """Say whether an experiment's file can be used; print it complete with --json.
 
@@ -26,18 +39,19 @@ def check(config: Annotated[Path, typer.Argument(help="The experiment's exoid.to
     console.say(f"{config}: {len(experiment.run)} runs, all settings are valid")
 
 
-@settings.command("split", short_help="Write one file a section, for make.")
+@settings.command("split", cls=Command, short_help="Write one file a section, for make.")
+@heeding
 def split(
     config: Annotated[Path, typer.Argument(help="The experiment's exoid.toml.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for one file a section, written if changed.")],
 ) -> None:
-    """Write one file a section, so that make re-runs only what a change touches.
+    """Write one file a section and the graph's rules, so that make re-runs only what a change touches.
 
     \b
     Example:
       exoid settings split exoid.toml --out .settings
     """
     from pipelines.settings import Experiment
-    from pipelines.settings.split import split as split_settings
+    from pipelines.workflow.split import split as split_settings
 
     split_settings(Experiment.load(config), out)

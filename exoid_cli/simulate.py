@@ -1,11 +1,13 @@
 """``exoid simulate``: the identified leg under the adaptive controller, or beside a recording."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from exoid_cli.console import console
+from exoid_cli.place import ConfigOption, place_of, settings_in_force
+from exoid_cli.steps import AgainOption, only
 
 if TYPE_CHECKING:
     from pipelines.contracts import Joint, Table
@@ -13,12 +15,26 @@ if TYPE_CHECKING:
 
 
 def simulate(
-    parameters: Annotated[Path, typer.Argument(help="A parameters/1 file, as `exoid identify` writes it.")],
+    context: typer.Context,
+    parameters: Annotated[
+        Path | None,
+        typer.Argument(metavar="FILE", help="A parameters/1 file.", show_default="identified/parameters.parquet"),
+    ] = None,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="Folder for the loop's table and figures; with --replay, a file.")
-    ],
-    config: Annotated[Path | None, typer.Option("--config", help="exoid.toml: geometry, [simulate].")] = None,
-    run: Annotated[str, typer.Option("--run", help="Whose parameters: exo_alone or with_human.")] = "with_human",
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            help="Folder for the loop's table and figures; with --replay, a file.",
+            show_default="simulated/",
+        ),
+    ] = None,
+    config: ConfigOption = None,
+    again: AgainOption = False,
+    run: Annotated[
+        Literal["exo_alone", "with_human"] | None,
+        typer.Option("--run", help="Whose parameters; with_human unless given, and a replay's own."),
+    ] = None,
     reference: Annotated[
         Path | None, typer.Option("--reference", help="What to follow: trajectory/1 or TOML; a gait unless given.")
     ] = None,
@@ -28,24 +44,36 @@ def simulate(
 ) -> None:
     """Simulate the leg under adaptive RBF control, or replay a recording on the model.
 
+    Without a file, in an experiment's folder, it does both, and replays every
+    validation run.
+
     \b
     Examples:
+      exoid simulate
+      exoid simulate --replay recordings/with_human_validate.parquet
       exoid simulate identified/parameters.parquet -o simulated/
       exoid simulate identified/parameters.parquet -o simulated/replay.parquet \\
         --replay recordings/with_human_validate.parquet
     """
     from pipelines.contracts import PARAMETERS
     from pipelines.errors import SettingsError
-    from pipelines.settings import Experiment
 
     if replay and reference:
         raise SettingsError("--reference and --replay exclude each other: a replay follows its recording; drop one")
-    settings = Experiment.load(config) if config else Experiment()
+    if parameters is output is run is reference is replay is None:
+        only(context, place_of(config, lacking="no parameters are given"), "simulate", "replay", again=again)
+        return
+    if parameters is None:
+        (parameters,) = place_of(config, lacking="no parameters are given").step("simulate").inputs
+    if output is None:
+        folder = place_of(config, lacking="-o: missing").step("simulate").target.parent
+        output = folder / f"replay-{replay.stem}.parquet" if replay else folder
+    settings = settings_in_force(config)
     table = PARAMETERS.read(parameters)
     if replay:
         _replay(table, replay, settings, output)
     else:
-        _track(table, run, reference, settings, output)
+        _track(table, run or "with_human", reference, settings, output)
 
 
 def _track(table: "Table", run: str, reference: Path | None, settings: "Experiment", output: Path) -> None:
@@ -75,7 +103,8 @@ def _track(table: "Table", run: str, reference: Path | None, settings: "Experime
         )
     gains = sweep(plant, chosen, wanted, chosen.sweep_nm_s_rad)
     frame = loop.frame()
-    described = describe([path for path in (table.path, reference) if path], chosen.model_dump(mode="json")) | {
+    inputs = [path for path in (table.path, reference) if path]
+    described = describe(inputs, settings.sections("simulate", "mechanism")) | {
         "joints": [{"name": joint.name, "kind": joint.kind} for joint in plant.joints],
         "plant": plant.metadata(),
         "controller": {"type": "rbf", "reference": str(reference.name) if reference else "gait"},
@@ -126,7 +155,7 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
     replayed = replay(plant.model, motion)
     open_loop, closed_loop = recorded.open_loop_frame(replayed, motion, plant.joints), None
     inputs = [path for path in (table.path, recording) if path]
-    shared: dict[str, Any] = describe(inputs, settings.simulate.model_dump(mode="json")) | {
+    shared: dict[str, Any] = describe(inputs, settings.sections("filter", "mechanism")) | {
         "joints": motion.joint_metadata,
         "plant": plant.metadata(),
     }

@@ -1,7 +1,8 @@
 """A pydantic complaint as one line a person can act on."""
 
 import difflib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from pydantic import ValidationError
@@ -35,8 +36,27 @@ def explain(error: ValidationError, data: Any, known_keys: Callable[[str], list[
 
 def suggestion(word: str, known: list[str]) -> str:
     """Return ``did you mean ...?`` or, with nothing close, the list of what is known."""
-    close = difflib.get_close_matches(word, known, n=1)
-    return f"did you mean {close[0]}?" if close else f"known are {', '.join(known)}"
+    near = closest(word, known)
+    return f"did you mean {near}?" if near else f"known are {', '.join(known)}"
+
+
+def closest(word: str, known: Sequence[str]) -> str | None:
+    """Return what a mistyped or shortened word was most likely meant to be, or None if nothing is near enough."""
+    return max((name for name in known if _likeness(word, name) > LIKE), key=partial(_likeness, word), default=None)
+
+
+LIKE = 0.6
+"""Likeness from which on a name is suggested, as in difflib."""
+
+
+def _likeness(word: str, name: str) -> float:
+    """Return how like two words are, 0 to 1; the beginning of a name, or one of its words, is nearly as like."""
+
+    def ratio(part: str) -> float:
+        return difflib.SequenceMatcher(None, word.lower(), part.lower()).ratio()
+
+    parts = [name[: len(word)], *name.split("_")]
+    return max([ratio(name), *(0.8 * ratio(part) for part in parts if len(part) > 2)])
 
 
 def _sentence(path: str, faults: list[dict[str, Any]], known_keys: Callable[[str], list[str]]) -> str:
@@ -55,7 +75,7 @@ def _sentence(path: str, faults: list[dict[str, Any]], known_keys: Callable[[str
     if kind == "value_error":
         return f"{path}: {faults[0]['ctx']['error']}" if path else str(faults[0]["ctx"]["error"])
     # A union ("auto" or a number) complains once for each of its members.
-    expected = " or ".join(dict.fromkeys(_expectation(fault["msg"]) for fault in faults))
+    expected = " or ".join(dict.fromkeys(expectation(fault["msg"]) for fault in faults))
     return f"{path}: found {_found(faults[0]['input'])}, expected {expected}"
 
 
@@ -77,7 +97,8 @@ def _key_path(fault: Any, data: Any) -> str:
     return path
 
 
-def _expectation(message: str) -> str:
+def expectation(message: str) -> str:
+    """Return what pydantic says was expected, as the end of a sentence."""
     expected = message.removeprefix("Input should be ").split(", unable to")[0]
     return expected.replace("String should match pattern", "text matching")
 

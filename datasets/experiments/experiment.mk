@@ -1,4 +1,4 @@
-# One experiment as a graph of files: `make` brings every result up to date and does nothing where nothing changed.
+# One experiment: `make` brings every result up to date and does nothing where nothing changed.
 # A setting counts, not the time of exoid.toml: touching one re-runs only what depends on it.
 
 EXOID ?= exoid
@@ -9,46 +9,22 @@ SETTINGS := $(OUT)/.settings
 .PHONY: all clean
 .DELETE_ON_ERROR:
 
-all: # the rest of what it needs stands below, once the runs are known
+all: # the rest of what it needs stands below, once its graph is known
 
-# Make writes this file first, from the settings, and reads it again: RUNS, VALIDATE_RUNS, a trajectory for each run.
+# Make writes these rules first, from the settings, and reads them again. Which file comes from which is written in
+# exoid, once: `exoid status` tells it too, and `exoid run` does the same without make.
 ifneq ($(MAKECMDGOALS),clean)
 include $(SETTINGS)/graph.mk
 endif
 
-$(SETTINGS)/graph.mk: $(CONFIG) $(wildcard $(dir $(CONFIG))rigs/*.toml $(dir $(CONFIG))../rigs/*.toml)
+$(SETTINGS)/graph.mk: $(firstword $(MAKEFILE_LIST)) $(CONFIG) \
+    $(wildcard $(dir $(CONFIG))rigs/*.toml $(dir $(CONFIG))../rigs/*.toml)
 	@$(EXOID) settings split $(CONFIG) --out $(SETTINGS)
 
 $(SETTINGS)/%.json: # only where one was deleted by hand
 	@$(EXOID) settings split $(CONFIG) --out $(SETTINGS)
 
-# A diagnosis measures its gain on validation runs; without one there is none.
-all: $(OUT)/identified/parameters.parquet $(if $(VALIDATE_RUNS),$(OUT)/diagnosed/verdict.json) \
-     $(OUT)/simulated/rbf.parquet $(VALIDATE_RUNS:%=$(OUT)/simulated/replay-%.parquet)
-
-$(OUT)/trajectory.parquet: $(SETTINGS)/design.json $(SETTINGS)/mechanism.json
-	$(EXOID) design --config $(CONFIG) -o $@
-
-$(OUT)/recordings/%.parquet: $(SETTINGS)/acquire.json
-	$(EXOID) acquire --config $(CONFIG) --run $* --trajectory $(TRAJECTORY) -o $@
-
-$(OUT)/motions/%.parquet: $(OUT)/recordings/%.parquet $(SETTINGS)/filter.json
-	$(EXOID) filter $< --config $(CONFIG) -o $@
-
-RECORDINGS := $(RUNS:%=$(OUT)/recordings/%.parquet)
-MOTIONS := $(RUNS:%=$(OUT)/motions/%.parquet)
-
-$(OUT)/identified/parameters.parquet: $(MOTIONS) $(SETTINGS)/identify.json $(SETTINGS)/mechanism.json
-	$(EXOID) identify $(MOTIONS) --config $(CONFIG) -o $(@D)/
-
-$(OUT)/diagnosed/verdict.json: $(RECORDINGS) $(SETTINGS)/filter.json $(SETTINGS)/mechanism.json
-	$(EXOID) diagnose $(RECORDINGS) --config $(CONFIG) --out $(@D)/
-
-$(OUT)/simulated/rbf.parquet: $(OUT)/identified/parameters.parquet $(SETTINGS)/simulate.json $(SETTINGS)/mechanism.json
-	$(EXOID) simulate $< --config $(CONFIG) -o $(@D)/
-
-$(OUT)/simulated/replay-%.parquet: $(OUT)/identified/parameters.parquet $(OUT)/recordings/%.parquet
-	$(EXOID) simulate $< --replay $(OUT)/recordings/$*.parquet --config $(CONFIG) -o $@
+all: $(RESULTS)
 
 # Kept: a recording and a motion are results, not steps on the way.
 .SECONDARY:

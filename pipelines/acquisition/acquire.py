@@ -92,7 +92,10 @@ def acquire(
         recorded_hz = sample_rate_hz * rig.samples_per_cycle(sample_rate_hz)
     metadata = _metadata(rig, run, trajectory, recorded_hz, mechanism or MechanismSettings())
     metadata |= {"trajectory": trajectory_path.name}
-    metadata |= describe([trajectory_path, rig_path], {"run": run.model_dump(mode="json"), "rig": rig.public()})
+    config = {
+        "run": run.model_dump(mode="json"), "acquire": {"sample_rate_hz": sample_rate_hz}, "rig": rig.public()
+    }  # fmt: skip
+    metadata |= describe([trajectory_path, rig_path], config)
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # what it would print, our errors say
     place = embedded(rig, rig_path, run, sample_rate_hz) if rig.embedded else nullcontext(rig)
     with place as present, nullcontext() if rig.clock == "lockstep" else urgent(), _signals() as stopped_by:

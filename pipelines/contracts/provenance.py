@@ -1,12 +1,15 @@
 """Where a file came from: who made it, when, from which inputs, with which settings."""
 
 import hashlib
+import json
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from pipelines import __version__
+from pipelines.contracts import parquet
+from pipelines.errors import ContractError
 
 
 def describe(inputs: Iterable[Path] = (), config: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -37,3 +40,13 @@ def sha256(path: Path) -> str:
     """Return the SHA-256 of a file's bytes, in hexadecimal."""
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def provenance_of(path: Path) -> dict[str, Any]:
+    """Return the metadata of a table, or the ``provenance`` of a JSON document; ContractError where there is none."""
+    if path.suffix != ".json":
+        return parquet.header(path)[1]
+    try:
+        return dict(json.loads(path.read_text(encoding="utf-8"))["provenance"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise ContractError(f"{path}: does not say where it came from; make it again") from error

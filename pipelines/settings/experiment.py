@@ -1,7 +1,7 @@
 """``exoid.toml``: one experiment, section by section."""
 
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 from pydantic import Field, PrivateAttr, field_validator
 
@@ -61,8 +61,12 @@ class Experiment(Settings):
         """Return the path of a file that the settings name."""
         return self._path.parent / name
 
-    def refuse_what_cannot_run(self) -> None:
-        """Refuse what only other files or other sections show: a file that is not there, a cut-off above Nyquist's."""
+    def sections(self, *names: str) -> dict[str, Any]:
+        """Return some sections as JSON would hold them: what a result records of its settings."""
+        return {name: getattr(self, name).model_dump(mode="json") for name in names}
+
+    def refuse_missing_files(self) -> None:
+        """Refuse to name a file that is not there."""
         named = {"acquire.rig": self.acquire.rig}
         named |= {f"run {run.name}.trajectory": run.trajectory for run in self.run if run.trajectory}
         for key, name in named.items():
@@ -70,6 +74,10 @@ class Experiment(Settings):
                 raise SettingsError(
                     f"{self._path}: {key}: {self.file(name)}: no such file; name one relative to the experiment's file"
                 )
+
+    def refuse_what_cannot_run(self) -> None:
+        """Refuse what only other files or other sections show: a file that is not there, a cut-off above Nyquist's."""
+        self.refuse_missing_files()
         cutoff_hz, rate_hz = self.filter.cutoff_hz, self.acquire.sample_rate_hz
         if cutoff_hz != "auto" and cutoff_hz >= rate_hz / 2:
             raise SettingsError(

@@ -112,10 +112,23 @@ def test_a_fault_of_exoid_keeps_its_traceback_in_a_file(exoid, monkeypatch, tmp_
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        (["shw"], "exoid: No such command 'shw'. Did you mean 'show'?; see `exoid --help`\n"),
-        (["settings"], "exoid: Missing command; see `exoid settings --help`\n"),
-        (["show"], "exoid: Missing argument 'file'; see `exoid show --help`\n"),
-        (["show", "a", "--fast"], "exoid: No such option: --fast; see `exoid show --help`\n"),
+        (["shw"], "exoid: shw: no such command; did you mean show?\n"),
+        (["settings"], "exoid: missing command; see `exoid settings --help`\n"),
+        (["show"], "exoid: file: missing; see `exoid show --help`\n"),
+        (["show", "a", "--fast"], "exoid: --fast: no such option; `exoid show --help` lists those there are\n"),
+        (["filter", "--cutof-hz", "3"], "exoid: --cutof-hz: no such option; did you mean --cutoff-hz?\n"),
+        (["rig", "chek", "rig.toml"], "exoid: chek: no such command; did you mean check?\n"),
+        (["export", "x"], "exoid: --to: missing; see `exoid export --help`\n"),
+        (
+            ["design", "--criterion", "logdet"],
+            "exoid: --criterion: found logdet, expected log_det, condition, scaled_condition; did you mean log_det?; "
+            "see `exoid design --help`\n",
+        ),
+        (
+            ["detect", "x", "--power", "2"],
+            "exoid: --power: expected less than or equal to 0.999; see `exoid detect --help`\n",
+        ),
+        (["effects", "stribek"], "exoid: there is no effect 'stribek'; did you mean stribeck_friction?\n"),
     ],
 )
 def test_a_mistyped_command_line_is_one_line_too(exoid, arguments, line):

@@ -196,14 +196,25 @@ def test_a_recording_is_not_overwritten_by_its_motion(exoid, recordings, tmp_pat
 def test_an_output_that_cannot_be_written_ends_in_one_line_that_names_it(exoid, recordings, tmp_path):
     recording = recordings / "exo_alone_train.parquet"
     (tmp_path / "file").write_text("in the way")
+    (tmp_path / "folder" / recording.name).mkdir(parents=True)
     inside = tmp_path / "file" / "motion.parquet"
-    for output, words in {tmp_path: "is a folder", inside: "a file stands where a folder should"}.items():
+    for output, words in {tmp_path / "folder": "is a folder", inside: "a file stands where a folder should"}.items():
         outcome = exoid("filter", recording, "-o", output)
         assert outcome.code == 2
         assert outcome.err.count("\n") == 1
         assert f"{tmp_path}" in outcome.err
         assert words in outcome.err
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "folder"]
+
+
+def test_several_recordings_are_filtered_into_a_folder(exoid, recordings, tmp_path):
+    files = sorted(recordings.iterdir())
+    outcome = exoid("filter", *files, "-o", tmp_path / "motions", "--json")
+    assert outcome.code == 0, outcome.err
+    assert [one["file"] for one in json.loads(outcome.out)] == [str(tmp_path / "motions" / f.name) for f in files]
+    twice = exoid("filter", files[0], files[0], "-o", tmp_path / "motions")
+    assert (twice.code, twice.err.count("\n")) == (2, 1)
+    assert "found two files named exo_alone_train.parquet" in twice.err
 
 
 def test_settings_that_are_not_there_end_in_one_line(exoid, recordings, tmp_path):

@@ -1,14 +1,17 @@
 """A new experiment from `exoid init` to the simulated leg, over Modbus TCP, on a rig that hides nothing."""
 
+import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 
-from pipelines.contracts import PARAMETERS
+from exoid_cli.app import run
+from pipelines.contracts import MOTION, PARAMETERS
 from pipelines.settings.rig import load_rig
 
 CHANGES = {
@@ -19,17 +22,28 @@ CHANGES = {
     "duration_s = 40.0\n": "duration_s = 15.0\n",
     "figures = true": "figures = false",
 }
+OTHER_GAIN = ("feedback_gain_nm_s_rad = 300.0", "feedback_gain_nm_s_rad = 200.0")
+RUNS = [f"{kind}_{purpose}" for kind in ("exo_alone", "with_human") for purpose in ("train", "validate")]
 AT_99_9 = 3.29 / 1.96
 """From the half-width of a 95 % interval to that of a 99.9 % one."""
 
 
-@pytest.fixture
-def experiment(exoid, tmp_path):
-    folder = tmp_path / "experiment"
-    assert exoid("init", folder).code == 0
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """An experiment that make has made, and the stages that ran."""
+    folder = tmp_path_factory.mktemp("whole") / "experiment"
+    assert run(["init", str(folder), "--quiet"]) == 0
     for old, new in CHANGES.items():
         change(folder / "exoid.toml", old, new)
     change(folder / "rigs" / "plain.toml", "ramp_s = 3.0", "ramp_s = 1.0")
+    return folder, make(folder)[1]
+
+
+@pytest.fixture
+def experiment(made, tmp_path, monkeypatch):
+    """The current folder: a copy of it, with the times of its files."""
+    folder = shutil.copytree(made[0], tmp_path / "experiment")
+    monkeypatch.chdir(folder)
     return folder
 
 
@@ -52,9 +66,8 @@ def written(folder):
     return {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
 
 
-def test_a_new_experiment_finds_the_truth_of_a_rig_that_hides_nothing_and_does_nothing_twice(experiment):
-    _, stages = make(experiment)
-    assert sorted(stages) == sorted(["design", *["acquire", "filter"] * 4, "identify", "diagnose", *["simulate"] * 3])
+def test_a_new_experiment_finds_the_truth_of_a_rig_that_hides_nothing(made, experiment):
+    assert sorted(made[1]) == sorted(["design", *["acquire", "filter"] * 4, "identify", "diagnose", *["simulate"] * 3])
     found = PARAMETERS.read(experiment / "identified" / "parameters.parquet").frame
     middle, half = found["value"], AT_99_9 * (found["ci95_high"] - found["ci95_low"]) / 2
     apart = np.abs(middle - truth(experiment)) / half
@@ -63,17 +76,82 @@ def test_a_new_experiment_finds_the_truth_of_a_rig_that_hides_nothing_and_does_n
     body = found["effect"] == "rigid_body"
     assert (half[body] < 0.15 * middle[body] + 0.02).all()
 
+
+def test_make_does_nothing_twice_and_after_a_change_only_what_depends_on_it(experiment):
     before = written(experiment)
     said, stages = make(experiment)
     assert (stages, written(experiment)) == ([], before)
     assert "Nothing to be done" in said
-
-    change(experiment / "exoid.toml", "feedback_gain_nm_s_rad = 300.0", "feedback_gain_nm_s_rad = 200.0")
+    change(experiment / "exoid.toml", *OTHER_GAIN)
     _, stages = make(experiment)
     changed = {path for path, when in written(experiment).items() if before.get(path) != when}
     names = {path.name for path in changed if ".settings" not in path.parts}
     assert stages == ["simulate"]
     assert names == {"exoid.toml", "rbf.parquet", "kv-sweep.csv"}
+
+
+def test_what_make_has_done_exoid_takes_for_done_and_the_other_way_round(exoid, experiment):
+    before = written(experiment)
+    assert {one["state"] for one in json.loads(exoid("status", "--json").out)} == {"done"}
+    assert exoid("run").out == "Everything is up to date.\n"
+    assert written(experiment) == before
+    change(experiment / "exoid.toml", *OTHER_GAIN)
+    said = exoid("status").out
+    assert "simulate.feedback_gain_nm_s_rad was 300.0, is 200.0" in " ".join(said.split())
+    assert "1 of 14 steps is to do" in said
+    assert max(map(len, said.splitlines())) <= 80
+    (done,) = json.loads(exoid("run", "--json").out)
+    assert (done["stage"], set(done["result"]["peak_torque_nm"])) == ("simulate", {"hip", "knee"})
+    assert make(experiment)[1] == []
+
+
+def test_a_command_alone_leaves_what_is_up_to_date(exoid, experiment):
+    for command, *results in (
+        ("design", "trajectory.parquet"),
+        ("acquire", *(f"recordings/{name}.parquet" for name in RUNS)),
+        ("diagnose", "diagnosed/verdict.json"),
+    ):
+        assert exoid(command).out.splitlines() == [f"{result}: up to date; --again makes it anew" for result in results]
+
+
+def test_a_command_alone_does_its_stage_and_warns_of_what_it_builds_on(exoid, experiment):
+    change(experiment / "exoid.toml", "order = 4\n", "order = 2\n")
+    outcome = exoid("identify")
+    assert outcome.code == 0
+    assert outcome.err == (
+        "warning: filter is stale: filter.order was 4, is 2; `exoid run identify` brings it up to date too\n"
+    )
+    outcome = exoid("filter")
+    assert outcome.code == 0
+    assert [line for line in outcome.out.splitlines() if line.startswith("exoid ")] == [
+        f"exoid filter recordings/{name}.parquet --config exoid.toml -o motions/{name}.parquet" for name in RUNS
+    ]
+    assert all(MOTION.read(f"motions/{name}.parquet").metadata["config"]["filter"]["order"] == 2 for name in RUNS)
+    done = json.loads(exoid("run", "simulate", "--json").out)
+    assert [one["stage"] for one in done] == ["identify", "simulate"]
+    stale = {one["stage"] for one in json.loads(exoid("status", "--json").out) if one["state"] == "stale"}
+    assert stale == {"diagnose", "replay"}
+
+
+def test_a_command_alone_says_which_command_makes_what_is_missing(exoid, experiment):
+    (experiment / "motions" / "exo_alone_train.parquet").unlink()
+    outcome = exoid("identify")
+    assert outcome.code == 2
+    assert outcome.err == (
+        "exoid: motions/exo_alone_train.parquet: no such file yet; `exoid filter` makes it, `exoid run identify` "
+        "makes all that is needed\n"
+    )
+
+
+def test_what_is_not_told_comes_from_the_experiment(exoid, experiment):
+    change(experiment / "exoid.toml", "order = 4\n", "order = 3\n")
+    assert exoid("filter", "recordings/with_human_train.parquet", "--cutoff-hz", "7").code == 0
+    config = MOTION.read("motions/with_human_train.parquet").metadata["config"]
+    assert config["filter"] == {"cutoff_hz": 7.0, "order": 3, "block_s": 0.025}
+    assert exoid("identify", "-o", "elsewhere").code == 0
+    assert len(PARAMETERS.read("elsewhere/parameters.parquet").metadata["inputs"]) == 4
+    assert exoid("simulate", "--replay", "recordings/with_human_train.parquet").code == 0
+    assert (experiment / "simulated" / "replay-with_human_train.parquet").is_file()
 
 
 def truth(experiment):

@@ -49,7 +49,7 @@ def test_tracking_writes_the_loop_the_sweep_and_every_figure(exoid, parameters_f
         "effect": "rigid_body", "X1": 10.3016, "X2": 3.0157, "X3": 2.2664, "X4": 5.5354
     }  # fmt: skip
     assert about["controller"] == {"type": "rbf", "reference": "gait"}
-    assert about["config"]["feedback_gain_nm_s_rad"] == 300.0 and about["seed"] == 0
+    assert about["config"]["simulate"]["feedback_gain_nm_s_rad"] == 300.0 and about["seed"] == 0
     assert [made["name"] for made in about["inputs"]] == ["parameters.parquet"]
     assert (tmp_path / "out" / "kv-sweep.csv").read_text().startswith("feedback_gain_nm_s_rad,hip_error_rad,")
     for figure in FIGURES:

@@ -6,18 +6,21 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pyarrow as pa
 import pytest
 
+from pipelines.contracts import parquet
 from pipelines.errors import SettingsError
-from pipelines.settings import datasets
+from pipelines.settings import Experiment, datasets
 from pipelines.settings.template import create
+from pipelines.workflow.graph import graph
 
 # Settings are split by exoid itself; every other command only writes the file it was asked for.
 STAND_IN = f"""#!/bin/sh
 case "$1" in
   settings) exec {sys.executable} -m exoid_cli.app "$@" ;;
 esac
-echo "$1 $2" >> "$LOG"
+echo "$@" >> "$LOG"
 for last in "$@"; do :; done
 case "$last" in
   */) mkdir -p "$last"; touch "$last/parameters.parquet" "$last/rbf.parquet" "$last/verdict.json" ;;
@@ -34,10 +37,14 @@ class Make:
         self.log = folder / "log"
 
     def __call__(self, *arguments: str) -> list[str]:
+        return [line.split()[0] for line in self.commands(*arguments)]
+
+    def commands(self, *arguments: str) -> list[str]:
+        """Return the whole commands that ran."""
         self.log.write_text("")
         environment = {**os.environ, "LOG": str(self.log), "MAKEFLAGS": ""}
         subprocess.run(["make", "-C", str(self.folder), *arguments], check=True, env=environment, capture_output=True)
-        return [line.split()[0] for line in self.log.read_text().splitlines()]
+        return self.log.read_text().splitlines()
 
     def change(self, old: str, new: str) -> None:
         path = self.folder / "exoid.toml"
@@ -66,6 +73,24 @@ ALL_FROM_RECORDINGS = [*["filter"] * 4, "diagnose", *FIT]
 def test_a_first_make_runs_every_stage_and_a_second_none(make):
     assert sorted(make()) == sorted(["design", *["acquire"] * 4, *ALL_FROM_RECORDINGS])
     assert make() == []
+
+
+def test_make_calls_the_commands_of_the_graph_each_after_those_it_needs(make):
+    config = make.folder / "exoid.toml"
+    steps = graph(Experiment.load(config), Path("exoid.toml"), Path("."))
+    called = [line.replace("./", "") for line in make.commands()]
+    assert sorted(called) == sorted(" ".join(step.command).replace("./", "") for step in steps)
+    place = {step.target: called.index(" ".join(step.command).replace("./", "")) for step in steps}
+    for step in steps:
+        assert all(place[file] < place[step.target] for file in step.inputs if file in place)
+
+
+def test_an_imported_recording_is_nobodys_to_make(make):
+    path = make.folder / "recordings" / "exo_alone_train.parquet"
+    parquet.save(path, [pa.table({"time_s": [0.0]})], {"contract": "recording/1", "imported": {}})
+    assert make().count("acquire") == 3
+    path.touch()
+    assert sorted(make()) == sorted(["filter", "diagnose", *FIT])
 
 
 def test_only_what_depends_on_a_change_runs_again(make):

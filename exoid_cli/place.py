@@ -1,0 +1,73 @@
+"""The experiment that a command is about: the exoid.toml that is named, else the one in the current folder."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pipelines.errors import InputError
+
+if TYPE_CHECKING:
+    from pipelines.settings import Experiment
+    from pipelines.workflow.graph import Step
+
+NAME = "exoid.toml"
+
+ConfigOption = Annotated[
+    Path | None, typer.Option("--config", help="The experiment's settings.", show_default="exoid.toml")
+]
+OutOption = Annotated[
+    Path | None, typer.Option("--out", help="Folder of the results.", show_default="that of exoid.toml")
+]
+
+
+def settings_in_force(config: Path | None) -> "Experiment":
+    """Return the settings in the named file, else in ./exoid.toml, else the defaults."""
+    from pipelines.settings import Experiment
+
+    here = config or (Path(NAME) if Path(NAME).is_file() else None)
+    return Experiment.load(here) if here else Experiment()
+
+
+@dataclass(frozen=True)
+class Place:
+    """An experiment with the place of its settings and its results."""
+
+    experiment: "Experiment"
+    steps: "tuple[Step, ...]"
+    out: Path
+
+    def of_stage(self, *stages: str) -> "list[Step]":
+        """Return the steps of some stages."""
+        return [step for step in self.steps if step.stage in stages]
+
+    def step(self, stage: str, run: str | None = None) -> "Step":
+        """Return the step of a stage, or its step for one run."""
+        for step in self.of_stage(stage):
+            if step.run == run:
+                return step
+        raise InputError(f"{self.out / NAME}: {_why_absent(stage, run)}; say what to read and, with -o, what to write")
+
+
+def _why_absent(stage: str, run: str | None) -> str:
+    if run:
+        return f"the recording of run {run} was imported, and no command makes it"
+    return f"no [[run]] has purpose validate, without which `exoid {stage}` has nothing to do here"
+
+
+def place_of(config: Path | None, out: Path | None = None, lacking: str = "") -> Place:
+    """Return the experiment to work in; where there is none, ``lacking`` begins what is said of it."""
+    from pipelines.settings import Experiment
+    from pipelines.workflow.graph import graph, imported_runs
+
+    file = config or Path(NAME)
+    if not config and not file.is_file():
+        begin = f"{lacking}, and " if lacking else ""
+        raise InputError(
+            f"{begin}there is no {NAME} in {Path.cwd()}; go to an experiment's folder, name one with --config, "
+            "or start one with `exoid init DIR`"
+        )
+    experiment = Experiment.load(file)
+    folder = out or file.parent
+    return Place(experiment, graph(experiment, file, folder, imported_runs(experiment, folder)), folder)

@@ -1,0 +1,63 @@
+"""``exoid run``: an experiment brought up to date, without make."""
+
+from functools import partial
+from typing import Annotated
+
+import typer
+
+from exoid_cli import completion
+from exoid_cli.confirm import YesOption, ask_before
+from exoid_cli.console import console
+from exoid_cli.place import ConfigOption, OutOption, Place, place_of
+from exoid_cli.steps import bring_up_to_date
+
+
+def run(
+    context: typer.Context,
+    stages: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="STAGE",
+            help="Stages wanted, with all they need.",
+            show_default="all",
+            autocompletion=completion.stages,
+        ),
+    ] = None,
+    config: ConfigOption = None,
+    out: OutOption = None,
+    yes: YesOption = False,
+) -> None:
+    """Do every step of an experiment that is missing or stale, as make does.
+
+    \b
+    Examples:
+      exoid run
+      exoid run identify
+      exoid run --config my_experiment/exoid.toml
+    """
+    from pipelines.workflow.freshness import Judge
+    from pipelines.workflow.graph import needed_for
+    from pipelines.workflow.split import split
+
+    place = place_of(config, out)
+    place.experiment.refuse_what_cannot_run()
+    wanted = needed_for(place.of_stage(*_known(stages or [], place)) if stages else place.steps, place.steps)
+    if all(one.done for one in Judge(place.out).all(place.steps) if one.step in wanted):
+        console.emit([])
+        console.say("Everything is up to date.")
+        return
+    split(place.experiment, place.out / ".settings")  # so that make, called next, finds nothing to do
+    done = bring_up_to_date(context, place, wanted, before=partial(ask_before, place.experiment, yes=yes))
+    console.emit([one.as_json() for one in done])
+    console.say(f"\n{len(done)} of {len(wanted)} steps done in {sum(one.seconds for one in done):.0f} s")
+
+
+def _known(stages: list[str], place: Place) -> list[str]:
+    from pipelines.errors import InputError
+    from pipelines.validation import suggestion
+
+    known = list(dict.fromkeys(step.stage for step in place.steps))
+    for stage in stages:
+        if stage not in known:
+            raise InputError(f"{stage}: there is no such stage in this experiment; {suggestion(stage, known)}")
+    return stages

@@ -1,0 +1,57 @@
+"""``exoid status``: how far an experiment is, a line for each stage."""
+
+from collections import Counter
+from collections.abc import Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from exoid_cli.console import console
+from exoid_cli.place import ConfigOption, OutOption, place_of
+
+if TYPE_CHECKING:
+    from pipelines.workflow.freshness import Judged
+
+
+def status(config: ConfigOption = None, out: OutOption = None) -> None:
+    """Say of each stage of an experiment whether it is done, stale and why, or missing.
+
+    A result is stale where an input or a setting is another one than it was made of.
+
+    \b
+    Examples:
+      exoid status
+      exoid status --config my_experiment/exoid.toml
+    """
+    from pipelines.workflow.freshness import Judge
+
+    place = place_of(config, out)
+    judged = Judge(place.out).all(place.steps)
+    console.emit([_as_json(one) for one in judged])
+    stages = [list(group) for _, group in groupby(judged, lambda one: one.step.stage)]
+    console.table(("stage", "state", "result", "why"), [_line(stage, place.out) for stage in stages])
+    todo = sum(not one.done for one in judged)
+    to_do = f"{todo} of {len(judged)} steps {'is' if todo == 1 else 'are'} to do; `exoid run` does what is to do."
+    console.say(f"\n{to_do if todo else 'Everything is up to date.'}")
+
+
+def _line(stage: "Sequence[Judged]", out: Path) -> tuple[str, ...]:
+    count = Counter(one.state.value for one in stage)
+    state = next(iter(count)) if len(count) == 1 else ", ".join(f"{n} {word}" for word, n in count.items())
+    reasons = list(dict.fromkeys(reason for one in stage for reason in one.why))
+    why = reasons[0] + (f" (and {len(reasons) - 1} more)" if len(reasons) > 1 else "") if reasons else ""
+    return stage[0].step.stage, state, _result([one.step.target.relative_to(out) for one in stage]), why
+
+
+def _result(targets: Sequence[Path]) -> str:
+    return targets[0].as_posix() if len(targets) == 1 else f"{len(targets)} in {targets[0].parent.as_posix()}/"
+
+
+def _as_json(one: "Judged") -> dict[str, Any]:
+    return {
+        "stage": one.step.stage,
+        "target": one.step.target,
+        "state": one.state.value,
+        "why": list(one.why),
+        "command": ["exoid", *one.step.command],
+    }

@@ -1,0 +1,115 @@
+"""Whether a step of an experiment is done, and if not, why: what its file was made of, against what is there.
+
+A result tells the hashes of its inputs and its settings, so it is judged by content. Times count only for what no
+result may tell of; a folder that was copied, or a setting that was changed and changed back, makes nothing stale.
+"""
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+from pipelines.contracts.provenance import provenance_of, sha256
+from pipelines.errors import ContractError
+from pipelines.workflow.graph import Step
+
+
+class Freshness(Enum):
+    """What can be said of a step."""
+
+    DONE = "done"
+    STALE = "stale"
+    MISSING = "missing"
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A step, and what is to be said of it."""
+
+    step: Step
+    state: Freshness
+    why: tuple[str, ...] = ()
+    """One phrase for each reason that it is not done."""
+
+    @property
+    def done(self) -> bool:
+        """Whether there is nothing to do."""
+        return self.state is Freshness.DONE
+
+
+@dataclass
+class Judge:
+    """Judges the steps of one experiment, in the order of its graph; what has been done since is judged anew."""
+
+    out: Path
+    """Folder of the results, from which they are named."""
+    _seen: dict[Path, Judged] = field(default_factory=dict)
+
+    def all(self, steps: Sequence[Step]) -> list[Judged]:
+        """Return every step with its state."""
+        return [self.judge(step) for step in steps]
+
+    def judge(self, step: Step) -> Judged:
+        """Return a step with its state; the steps that make its inputs have been judged before."""
+        state = Freshness.STALE if step.target.exists() else Freshness.MISSING
+        why = tuple(self._reasons(step) if step.target.exists() else self._left_behind(step.target))
+        judged = Judged(step, state if why or state is Freshness.MISSING else Freshness.DONE, why)
+        self._seen[step.target] = judged
+        return judged
+
+    def _reasons(self, step: Step) -> Iterator[str]:
+        try:
+            told = provenance_of(step.target)
+        except ContractError as error:
+            yield str(error).removeprefix(f"{step.target}: ")
+            return
+        yield from self._other_inputs(step, {entry["name"]: entry["sha256"] for entry in told.get("inputs", [])})
+        yield from _other_settings(told.get("config", {}), step.settings)
+        if step.watched and step.watched.stat().st_mtime_ns > step.target.stat().st_mtime_ns:
+            yield f"{self._name(step.watched)} is newer"
+
+    def _other_inputs(self, step: Step, recorded: Mapping[str, str]) -> Iterator[str]:
+        for file in step.inputs:
+            maker = self._seen.get(file)
+            if maker and not maker.done:
+                yield f"waits for {maker.step.stage}"
+            elif not file.exists():
+                yield f"{self._name(file)} is missing"
+            elif file.name not in recorded:
+                yield f"{self._name(file)} was not among its inputs"
+            elif recorded[file.name] != sha256(file):
+                yield f"{self._name(file)} has changed"
+        for name in recorded.keys() - {file.name for file in step.inputs}:
+            yield f"{name} is no input any more"
+
+    def _left_behind(self, target: Path) -> Iterator[str]:
+        """Yield what the last try left in the place of a recording."""
+        journal, aborted = (
+            target.with_name(f"{target.name}.journal"),
+            target.with_name(f"{target.stem}.aborted.parquet"),
+        )
+        if journal.exists():
+            yield f"a killed run left {self._name(journal)}; `exoid recover` makes a recording of it"
+        if aborted.exists():
+            yield f"a run was stopped early: {self._name(aborted)}"
+
+    def _name(self, file: Path) -> str:
+        file = Path(os.path.normpath(file))
+        return (file.relative_to(self.out) if file.is_relative_to(self.out) else file).as_posix()
+
+
+def _other_settings(then: Mapping[str, Any], now: Mapping[str, Any], at: str = "") -> Iterator[str]:
+    """Yield the settings that have another value; one that the file is silent about cannot be compared."""
+    for key in sorted(then.keys() & now.keys()):
+        old, new = then[key], now[key]
+        if isinstance(old, Mapping) and isinstance(new, Mapping):
+            yield from _other_settings(old, new, f"{at}{key}.")
+        elif old != new:
+            yield f"{at}{key} was {_short(old)}, is {_short(new)}"
+
+
+def _short(value: Any) -> str:
+    text = "unset" if value is None else str(value)
+    return text if len(text) <= 30 else f"{text[:27]}..."

@@ -1,0 +1,146 @@
+"""One experiment as a graph of files: which comes from which, by which command, under which settings.
+
+It is written here and nowhere else: ``exoid run``, ``exoid status``, a command that is given no files, and make, by the
+rules that ``split`` writes, all go by it.
+"""
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pipelines.contracts.provenance import provenance_of
+from pipelines.errors import ContractError
+from pipelines.settings.acquire import RunSettings
+from pipelines.settings.experiment import Experiment
+from pipelines.settings.rig import load_rig
+
+
+@dataclass(frozen=True)
+class Step:
+    """One call of one command."""
+
+    stage: str
+    """The stage it belongs to; a stage has one step, or one for each run."""
+    target: Path
+    """The file that tells whether it is done, and of what it was made."""
+    inputs: tuple[Path, ...]
+    """Files whose content counts: targets of other steps, or the user's own."""
+    settings: Mapping[str, Any]
+    """Settings that count, by the section they are recorded under in the target."""
+    command: tuple[str, ...]
+    """What to call exoid with; the output is the last word."""
+    run: str | None = None
+    """The run it is for, where it is for one."""
+    watched: Path | None = None
+    """A file that counts too, though no result may tell its hash."""
+
+    @property
+    def settings_files(self) -> tuple[str, ...]:
+        """Names of the small files by which make sees that a setting has changed."""
+        return tuple(f"run-{self.run}" if name == "run" else name for name in self.settings)
+
+
+def graph(experiment: Experiment, config: Path, out: Path, imported: Collection[str] = ()) -> tuple[Step, ...]:
+    """Return an experiment's steps, each after those it needs.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    config : Path
+        Its file, as the commands are to be told.
+    out : Path
+        Folder of the results.
+    imported : collection of str
+        Names of runs whose recordings came from elsewhere: no step makes those, see ``imported_runs``.
+    """
+    told, runs = ("--config", config.as_posix()), experiment.run
+    validate = [run for run in runs if run.purpose == "validate"]
+    recordings = {run.name: out / "recordings" / f"{run.name}.parquet" for run in runs}
+    motions = {name: out / "motions" / path.name for name, path in recordings.items()}
+    trajectory, parameters = out / "trajectory.parquet", out / "identified" / "parameters.parquet"
+
+    recorded = [_recorded(experiment, run, recordings[run.name], trajectory, told) for run in runs
+                if run.name not in imported]  # fmt: skip
+
+    def step(
+        stage: str, target: Path, inputs: Iterable[Path], settings: Sequence[str], *command: str, run: str | None = None
+    ) -> Step:
+        counted = experiment.sections(*settings)
+        return Step(stage, target, tuple(inputs), counted, (*command, *told, "-o", _output(stage, target)), run)
+
+    steps = list(recorded)
+    if any(trajectory in one.inputs for one in recorded):
+        steps.insert(0, step("design", trajectory, (), ("design", "mechanism"), "design"))
+    for name, recording in recordings.items():
+        called: tuple[str, ...] = ("filter", recording.as_posix())
+        steps.append(step("filter", motions[name], [recording], ["filter"], *called, run=name))
+    steps.append(
+        step("identify", parameters, motions.values(), ("identify", "mechanism"), "identify", *_words(motions))
+    )
+    if validate:  # a diagnosis measures its gain on validation runs; without one there is none
+        verdict, counted, words = out / "diagnosed" / "verdict.json", ("filter", "mechanism"), _words(recordings)
+        steps.append(step("diagnose", verdict, recordings.values(), counted, "diagnose", *words))
+    simulate, loop = ("simulate", parameters.as_posix()), out / "simulated" / "rbf.parquet"
+    steps.append(step("simulate", loop, [parameters], ("simulate", "mechanism"), *simulate))
+    for name in (run.name for run in validate):
+        again, recording = out / "simulated" / f"replay-{name}.parquet", recordings[name]
+        called = (*simulate, "--replay", recording.as_posix())
+        steps.append(step("replay", again, [parameters, recording], ("filter", "mechanism"), *called, run=name))
+    return tuple(steps)
+
+
+FOLDERS = ("identify", "diagnose", "simulate")
+"""Stages whose command is told a folder to write into."""
+
+
+def _output(stage: str, target: Path) -> str:
+    return f"{target.parent.as_posix()}/" if stage in FOLDERS else target.as_posix()
+
+
+def _words(files: Mapping[str, Path]) -> list[str]:
+    return [file.as_posix() for file in files.values()]
+
+
+def _recorded(experiment: Experiment, run: RunSettings, target: Path, designed: Path, told: tuple[str, ...]) -> Step:
+    """Return the step that records one run: its rig and its excitation count by their content."""
+    excitation = experiment.file(run.trajectory) if run.trajectory else designed
+    rig = experiment.file(experiment.acquire.rig)
+    return Step(
+        "acquire",
+        target,
+        (excitation, rig),
+        # Of [acquire] the rig counts by its content, as an input does: it may stand elsewhere on another computer.
+        {"acquire": {"sample_rate_hz": experiment.acquire.sample_rate_hz}, "run": run.model_dump(mode="json")},
+        ("acquire", *told, "--run", run.name, "--trajectory", excitation.as_posix(), "-o", target.as_posix()),
+        run=run.name,
+        watched=sealed_file(rig),
+    )
+
+
+def imported_runs(experiment: Experiment, out: Path) -> frozenset[str]:
+    """Return the names of the runs whose recordings, in the folder of the results, were imported."""
+
+    def imported(path: Path) -> bool:
+        with suppress(ContractError):  # whoever reads it says what is wrong with it
+            return path.is_file() and "imported" in provenance_of(path)
+        return False
+
+    return frozenset(run.name for run in experiment.run if imported(out / "recordings" / f"{run.name}.parquet"))
+
+
+def sealed_file(rig: Path) -> Path | None:
+    """Return the file of what a rig hides, where there is one; a rig that lacks it says so when it is started."""
+    plant = load_rig(rig).plant if rig.is_file() else None
+    sealed = rig.parent / plant.sealed if plant and plant.sealed else None
+    return sealed if sealed and sealed.is_file() else None
+
+
+def needed_for(wanted: Sequence[Step], steps: Sequence[Step]) -> list[Step]:
+    """Return the wanted steps and all that make their inputs, in the order of the graph."""
+    files = {file for step in wanted for file in (step.target, *step.inputs)}
+    for step in reversed(steps):
+        if step.target in files:
+            files.update(step.inputs)
+    return [step for step in steps if step.target in files]

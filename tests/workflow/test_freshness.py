@@ -1,0 +1,109 @@
+"""Done, stale and missing: what a step's file was made of, against what is there now."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from pipelines.contracts import describe
+from pipelines.workflow.freshness import Freshness, Judge
+from pipelines.workflow.graph import Step, needed_for
+
+
+class Chain:
+    """Two steps, first -> second, from one input of the user's."""
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+        self.source, self.order = folder / "source.json", 4
+        self.source.write_text("1")
+
+    @property
+    def steps(self) -> tuple[Step, Step]:
+        first, second = self.folder / "first.json", self.folder / "second.json"
+        settings = {"filter": {"order": self.order, "cutoff_hz": "auto"}}
+        return (
+            Step("one", first, (self.source,), settings, ("one",), watched=self.folder / "sealed"),
+            Step("two", second, (first,), {}, ("two",)),
+        )
+
+    def make(self) -> None:
+        (self.folder / "sealed").touch()
+        for step in self.steps:
+            told = describe(step.inputs, step.settings)
+            step.target.write_text(json.dumps({"contract": "x/1", "provenance": told}))
+
+    def states(self) -> dict[str, tuple[str, tuple[str, ...]]]:
+        return {one.step.stage: (one.state.value, one.why) for one in Judge(self.folder).all(self.steps)}
+
+
+@pytest.fixture
+def chain(tmp_path):
+    chain = Chain(tmp_path)
+    chain.make()
+    return chain
+
+
+def test_what_was_made_of_what_is_there_is_done_whatever_the_times(chain):
+    os.utime(chain.source)
+    assert chain.states() == {"one": ("done", ()), "two": ("done", ())}
+
+
+def test_another_input_makes_stale_what_was_made_of_it_and_what_follows(chain):
+    chain.source.write_text("2")
+    assert chain.states() == {"one": ("stale", ("source.json has changed",)), "two": ("stale", ("waits for one",))}
+
+
+def test_another_setting_is_named_with_both_values_and_changed_back_it_is_forgotten(chain):
+    chain.order = 2
+    assert chain.states()["one"] == ("stale", ("filter.order was 4, is 2",))
+    chain.order = 4
+    assert chain.states()["one"] == ("done", ())
+
+
+def test_what_is_not_there_is_missing_and_what_follows_waits(chain):
+    chain.steps[0].target.unlink()
+    assert chain.states() == {"one": ("missing", ()), "two": ("stale", ("waits for one",))}
+
+
+def test_an_input_that_nobody_makes_and_is_gone_is_named(chain):
+    chain.source.unlink()
+    assert chain.states()["one"] == ("stale", ("source.json is missing",))
+
+
+def test_a_newer_sealed_file_counts_though_no_result_tells_its_hash(chain):
+    newer = chain.steps[0].target.stat().st_mtime + 10
+    os.utime(chain.folder / "sealed", (newer, newer))
+    assert chain.states()["one"] == ("stale", ("sealed is newer",))
+
+
+def test_another_set_of_inputs_is_told(chain):
+    step = chain.steps[1]
+    step.target.write_text(json.dumps({"provenance": describe([chain.source])}))
+    assert chain.states()["two"] == (
+        "stale", ("first.json was not among its inputs", "source.json is no input any more"),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("content", ["", "{", "{}", "[1]"])
+def test_a_damaged_result_is_stale(chain, content):
+    chain.steps[1].target.write_text(content)
+    assert chain.states()["two"] == ("stale", ("does not say where it came from; make it again",))
+
+
+def test_what_a_killed_or_stopped_run_left_is_told(tmp_path):
+    (tmp_path / "a.parquet.journal").touch()
+    (tmp_path / "a.aborted.parquet").touch()
+    judged = Judge(tmp_path).judge(Step("acquire", tmp_path / "a.parquet", (), {}, ("acquire",)))
+    assert judged.state is Freshness.MISSING
+    assert judged.why == (
+        "a killed run left a.parquet.journal; `exoid recover` makes a recording of it",
+        "a run was stopped early: a.aborted.parquet",
+    )
+
+
+def test_a_stage_needs_what_makes_its_inputs_and_nothing_else(chain):
+    first, second = chain.steps
+    assert needed_for([second], chain.steps) == [first, second]
+    assert needed_for([first], chain.steps) == [first]
