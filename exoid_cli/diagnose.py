@@ -99,7 +99,7 @@ def _show(said: dict[str, Any], machine: "Machine", output: Path) -> None:
     for caveat in said["caveats"]:
         console.say(f"But {caveat}.")
     console.say("")
-    unit, digits = machine.joints[0].unit("torque"), ".3f" if machine.is_exoskeleton else ".4g"
+    first, digits = machine.joints[0], ".3f" if machine.is_exoskeleton else ".4g"
     told = ("noise_floor_nm", "baseline_rmse_nm", "extended_rmse_nm")
     console.table(
         ("joint", "noise floor", "rigid + friction", "with the causes", "excess left"),
@@ -108,7 +108,7 @@ def _show(said: dict[str, Any], machine: "Machine", output: Path) -> None:
              "at the floor" if said["unexplained"][joint] is None else f"{said['unexplained'][joint]:.0%}")
             for joint in machine.names
         ],
-        title=f"{'force' if unit == 'N' else 'torque'} error on runs no fit has seen, {unit}",
+        title=f"{first.effort} error on runs no fit has seen, {first.unit('torque')}",
         numbers="noise floor, rigid + friction, with the causes, excess left",
     )  # fmt: skip
     if said["causes"]:

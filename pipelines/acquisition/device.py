@@ -1,7 +1,7 @@
 """A Modbus device: what can be asked of it, and every way to fail turned into one sentence."""
 
 from collections.abc import Awaitable, Callable, Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from pymodbus.constants import ExcCodes
 from pymodbus.exceptions import ModbusException
@@ -11,7 +11,7 @@ from pipelines.acquisition.line import Line
 from pipelines.acquisition.reply import NoReply
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.registers import Block
-from pipelines.settings.rig import Identity
+from pipelines.settings.rig import Identity, SafetySettings
 
 MEANING: dict[int, str] = {
     ExcCodes.ILLEGAL_FUNCTION: "it does not know this function",
@@ -24,17 +24,25 @@ MEANING: dict[int, str] = {
 }
 
 
+class Wait(NamedTuple):
+    """How long a reply is awaited, and what in a rig file's ``safety`` sets that."""
+
+    seconds: float
+    setting: str
+
+
 class Device:
     """One device on a line. Several may be asked side by side; those on one line are answered one after the other."""
 
-    def __init__(self, name: str, unit: int, line: Line, timeout_s: float, reply_s: float) -> None:
-        """Join a line; while the leg moves a reply is awaited for ``reply_s``, else for ``timeout_s``."""
+    def __init__(self, name: str, unit: int, line: Line, safety: SafetySettings) -> None:
+        """Join a line; a rig's safety settings tell how long a reply is awaited."""
         self.label = line.join(name, unit)
         self.line = line
         self._client = line.client
         self._unit = unit
-        self._timeout_s = timeout_s
-        self._reply_s = reply_s
+        self._at_rest = Wait(safety.connect_s, "connect_s")
+        self._in_motion = Wait(safety.longest_reply_s, "reply_s or watchdog_s")
+        self._to_tell = Wait(safety.watchdog_s, "watchdog_s")
 
     async def check_identity(self, identity: Iterable[Identity]) -> None:
         """Refuse a device that is not the one that the rig file describes."""
@@ -48,14 +56,15 @@ class Device:
 
     async def read(self, address: int, count: int, *, in_motion: bool = False) -> list[int]:
         """Return words read by FC03."""
-        what, within_s = f"reading registers {address} to {address + count - 1}", self._within(in_motion)
+        what = f"reading registers {address} to {address + count - 1}"
+        wait = self._in_motion if in_motion else self._at_rest
         request = self._client.read_holding_registers
-        return await self._ask(what, count, within_s, request, address=address, count=count)
+        return await self._ask(what, count, wait, request, address=address, count=count)
 
     async def read_fifo(self, address: int, words: int) -> list[int]:
         """Return what a queue holds, read by FC24: whole records of so many words, or nothing."""
         what = f"reading the queue at register {address}"
-        response = await self._request(what, self._within(True), self._client.read_fifo_queue, address=address)
+        response = await self._request(what, self._in_motion, self._client.read_fifo_queue, address=address)
         found = list(getattr(response, "values", []))
         if len(found) % words:
             raise DeviceError(
@@ -68,7 +77,7 @@ class Device:
         """Write a block by FC16."""
         what = f"writing registers {_range(block)}"
         request = self._client.write_registers
-        await self._ask(what, None, self._timeout_s, request, address=block.address, values=list(words))
+        await self._ask(what, None, self._to_tell, request, address=block.address, values=list(words))
 
     async def exchange(self, write: Block, words: Sequence[int], read: Block) -> list[int]:
         """Write one block and read another in one FC23 exchange."""
@@ -76,7 +85,7 @@ class Device:
         return await self._ask(
             what,
             read.count,
-            self._within(True),
+            self._in_motion,
             self._client.readwrite_registers,
             read_address=read.address,
             read_count=read.count,
@@ -84,19 +93,16 @@ class Device:
             values=list(words),
         )
 
-    def _within(self, in_motion: bool) -> float:
-        return self._reply_s if in_motion else self._timeout_s
-
     async def _ask(
         self,
         what: str,
         words: int | None,
-        within_s: float,
+        wait: Wait,
         request: Callable[..., Awaitable[ModbusPDU]],
         **arguments: Any,
     ) -> list[int]:
         """Send a request and return the words of the answer, ``words`` of them where it is to bring any."""
-        response = await self._request(what, within_s, request, **arguments)
+        response = await self._request(what, wait, request, **arguments)
         if words is not None and len(response.registers) != words:
             raise DeviceError(
                 f"{self.label}: answered {what} with {len(response.registers)} registers, expected {words}; "
@@ -105,16 +111,16 @@ class Device:
         return list(response.registers)
 
     async def _request(
-        self, what: str, within_s: float, request: Callable[..., Awaitable[ModbusPDU]], **arguments: Any
+        self, what: str, wait: Wait, request: Callable[..., Awaitable[ModbusPDU]], **arguments: Any
     ) -> ModbusPDU:
         """Send a request and return its answer; raise DeviceError where there is none, or a refusal."""
         try:
-            response = await self.line.ask(within_s, request, **arguments, device_id=self._unit)
+            response = await self.line.ask(wait.seconds, request, **arguments, device_id=self._unit)
         except (ModbusException, OSError) as error:
             silent = Unanswered if self._client.connected else DeviceError
             raise silent(
-                f"{self.label}: did not answer {what} within {within_s:.3g} s; check cable and power, "
-                "or raise safety.watchdog_s in the rig file"
+                f"{self.label}: did not answer {what} within {wait.seconds:.3g} s; check cable and power, "
+                f"or raise safety.{wait.setting} in the rig file"
             ) from error
         if isinstance(response, NoReply):
             raise DeviceError(

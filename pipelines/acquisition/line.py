@@ -160,7 +160,7 @@ class Line:
 
 def lines_of(rig: RigSettings) -> Callable[[DeviceSettings], Line]:
     """Return what finds the line that a device of a rig is on, the same one for all devices that share it."""
-    timeout_s = rig.safety.watchdog_s
+    timeout_s = rig.safety.connect_s
     shared = {name: Line(settings, timeout_s, name) for name, settings in rig.line.items()}
     return lambda device: shared[device.line] if device.line is not None else Line(rig.line_of(device), timeout_s)
 
@@ -207,7 +207,7 @@ def _explained(error: OSError) -> str:
             "and in host the name that it is made out to"
         )
     if isinstance(error, TimeoutError):
-        return "no TLS connection within safety.watchdog_s; check that the rig is on, and that the port speaks TLS"
+        return "no TLS connection within safety.connect_s; check that the rig is on, and that the port speaks TLS"
     if isinstance(error, ssl.SSLError):
         return f"no TLS connection ({error.reason or error}); check that the port speaks TLS, and certificate and key"
     if error.errno == errno.ENOENT:

@@ -6,7 +6,8 @@ from math import floor
 from pipelines.acquisition.pace import SLOW
 from pipelines.errors import SettingsError
 from pipelines.registers import Block
-from pipelines.settings.rig import DriveMap, RigSettings, SensorMap, registers_of
+from pipelines.settings.line import LineSettings
+from pipelines.settings.rig import MOST_QUEUED, MOST_REGISTERS, DriveMap, RigSettings, SensorMap, registers_of
 
 
 def refuse_slow_lines(rig: RigSettings, sample_rate_hz: float, *, with_sensors: bool) -> None:
@@ -29,21 +30,44 @@ def refuse_slow_lines(rig: RigSettings, sample_rate_hz: float, *, with_sensors: 
 def highest_rate(rig: RigSettings, *, with_sensors: bool) -> tuple[float, str | None]:
     """Return the most samples a second, Hz, and the line that a sample waits for longest.
 
-    A cycle looks at the first drive's counter, exchanges the drives, then reads the sensors. Lines work side by
-    side, devices on one line take turns. Infinity and None where the speed of no line is known.
+    A cycle looks at the first drive's counter, exchanges the drives, then reads the sensors and, where drives record
+    themselves, drains each. Lines work side by side, devices on one line take turns. Infinity and None where the speed
+    of no line is known.
     """
     first = rig.drive[0]
     look = rig.line_of(first).exchange_s(read_characters(rig.map.drive[first.map].read.sequence.registers))
-    drives, sensors = defaultdict[str | None, float](float), defaultdict[str | None, float](float)
+    drives, sensors, drains, records = (defaultdict[str | None, float](float) for _ in range(4))
     for drive in rig.drive:
         drives[drive.line] += rig.line_of(drive).exchange_s(exchange_characters(rig.map.drive[drive.map]))
+        if rig.sampling == "recorder":
+            assert rig.record_rate_hz  # as its drives have rings
+            took_s, brings = drain(rig.line_of(drive), rig.map.drive[drive.map])
+            drains[drive.line] += took_s
+            records[drive.line] += took_s / brings * rig.record_rate_hz
     for sensor in rig.sensor if with_sensors else ():
         sensors[sensor.line] += rig.line_of(sensor).exchange_s(read_characters(_count(rig.map.sensor[sensor.map])))
-    # An answer later than this share of a sample is too old to build on: see PhaseLock.
-    longest = max(look + max(drives.values()) + max(sensors.values(), default=0.0), look / SLOW)
-    busy = {name: drives.get(name, 0.0) + sensors.get(name, 0.0) for name in rig.line}
+    cycle = look + max(drives.values()) + max(sensors.values(), default=0.0)
+    left = 1.0 - max(records.values(), default=0.0)
+    longest = max(
+        cycle + max(drains.values(), default=0.0),
+        cycle / left if left > 0.0 else float("inf"),
+        look / SLOW,  # an answer later than this share of a sample is too old to build on: see PhaseLock
+    )
+    busy = {name: sum(step.get(name, 0.0) for step in (drives, sensors, drains)) for name in rig.line}
     slowest = max(busy, key=lambda name: busy[name], default=None)
     return (1.0 / longest, slowest) if longest else (float("inf"), None)
+
+
+def drain(line: LineSettings, registers: DriveMap) -> tuple[float, int]:
+    """Return how long a line carries one full read of a drive's own record, s, and how many samples that brings."""
+    ring = registers.ring
+    assert ring  # a rig file that asks for recorders has one for every drive
+    if ring.newest is None:
+        brings = MOST_QUEUED // ring.words
+        return line.exchange_s(queue_characters(brings * ring.words)), brings
+    brings = MOST_REGISTERS["read"] // ring.words
+    newest = line.exchange_s(read_characters(ring.newest.registers))
+    return line.exchange_s(read_characters(brings * ring.words)) + newest, brings
 
 
 def exchange_characters(registers: DriveMap) -> int:
@@ -54,6 +78,11 @@ def exchange_characters(registers: DriveMap) -> int:
 def read_characters(registers: int) -> int:
     """Return how many characters an FC03 reading takes as RTU frames, request and reply together."""
     return 8 + 5 + 2 * registers
+
+
+def queue_characters(registers: int) -> int:
+    """Return how many characters an FC24 reading takes as RTU frames, request and reply together."""
+    return 6 + 8 + 2 * registers
 
 
 def _count(registers: DriveMap | SensorMap) -> int:

@@ -63,14 +63,13 @@ class Drive:
         self.settings = settings
         self.in_lockstep = rig.clock == "lockstep"
         self.map = rig.map.drive[settings.map]
-        safety = rig.safety
-        self.device = Device(f"drive {settings.joint}", settings.unit, line, safety.watchdog_s, safety.longest_reply_s)
+        self.device = Device(f"drive {settings.joint}", settings.unit, line, rig.safety)
         self.told = Block(registers_of(self.map.read))
         self.tell = Block(registers_of(self.map.write))
         self._counter = Block({"sequence": self.map.read.sequence})
         self._status = Block({"status": self.map.read.status or self.map.read.sequence})
         self._beats, self._beats_span = 0, int(self.tell.span("heartbeat")) if self.map.write.heartbeat else 1
-        self._patience_s = rig.safety.watchdog_s
+        self._control_s = rig.safety.control_s
         self._sequence = Counter(self.told.span("sequence"))
         self._time = Counter(self.told.span("time"))
         self.bounds: Bounds | None = None
@@ -209,7 +208,7 @@ class Drive:
 
     async def _until(self, has_taken: Callable[[int], bool], what: str, remedy: str) -> None:
         """Read the status word until it shows that a control word was taken."""
-        until = time.monotonic() + self._patience_s
+        until = time.monotonic() + self._control_s
         while True:
             words = await self.device.read(self._status.address, self._status.count)
             status = int(self._decoded(self._status, words)["status"])
@@ -218,7 +217,7 @@ class Drive:
             if time.monotonic() > until:
                 raise DeviceError(
                     f"{self.device.label}: was told {what}, but its status word is still 0x{status:04X} after "
-                    f"{self._patience_s:g} s; {remedy}"
+                    f"{self._control_s:g} s (safety.control_s); {remedy}"
                 )
             await asyncio.sleep(STATUS_PAUSE_S)
 
@@ -284,10 +283,9 @@ class Sensor:
     def __init__(self, rig: RigSettings, settings: SensorSettings, line: Line) -> None:
         self.settings = settings
         self.map = rig.map.sensor[settings.map]
-        safety = rig.safety
-        self.device = Device(f"sensor {settings.cuff}", settings.unit, line, safety.watchdog_s, safety.longest_reply_s)
+        self.device = Device(f"sensor {settings.cuff}", settings.unit, line, rig.safety)
         self.block = Block(registers_of(self.map.read))
-        self._patience = Patience(safety.watchdog_s)
+        self._patience = Patience(rig.safety.watchdog_s)
         self._last: float | None = None
         self._owes = False
         """Whether an answer of it may still come that another request's would be taken for."""

@@ -23,8 +23,6 @@ from pipelines.settings.rig import RigSettings, SensorSettings
 
 REST_RAD = 0.02
 """How far the leg may have moved between the plan and the moment at which the drives are enabled."""
-
-
 SLACK_SAMPLES = 2
 """How far set-points may be ahead of their speed limit for a moment: they come in step with samples, which the host
 sees up to one sample late or early."""
@@ -68,7 +66,6 @@ class Supervisor:
         self.why: str | None = None
         """The first reason to stop early; None while there is none."""
         self.also: list[str] = []
-        self._finished = False
         """What else went wrong after that, in its order."""
         self.fault: BaseException | None = None
         """The first error that was exoid's own."""
@@ -139,11 +136,11 @@ class Supervisor:
         if silent and waited_s > self.rig.safety.watchdog_s:
             raise silent[0]
         idle = [drive for drive, enabled in zip(self.rig.drive, self._enabled, strict=True) if enabled is False]
-        if idle and waited_s > self.rig.safety.watchdog_s:
+        if idle and waited_s > self.rig.safety.control_s:
             raise DeviceError(
                 f"drive {idle[0].joint}: was told to enable, but its status word does not say that it is after "
-                f"{self.rig.safety.watchdog_s:g} s; see the drive's manual, or correct enabled_mask and enabled_value "
-                "in the rig file"
+                f"{self.rig.safety.control_s:g} s; see the drive's manual, correct enabled_mask and enabled_value in "
+                "the rig file, or raise safety.control_s there"
             )
         if why := self._limits.violation(answers) or self._limits.straying(answers, self._start):
             raise DeviceError(why)
@@ -315,7 +312,7 @@ class Supervisor:
             self.why = reason
         elif reason not in (self.why, *self.also):
             self.also.append(reason)
-            if self._finished:
+            if self.still_enabled or self.state is State.DISABLED:  # the others have been told already
                 self.why = f"{self.why}; then {reason}"
         if State.ABORT in TRANSITIONS[self.state]:
             self._go(State.ABORT)
@@ -360,7 +357,6 @@ class Supervisor:
 
         Disabled is what is known to be: with a complaint a run ends in abort.
         """
-        self._finished = True
         if self.why is not None:
             self.why = "; then ".join((self.why, *self.also))
         if not complaints:

@@ -55,6 +55,16 @@ class Joint:
         pattern = QUANTITIES[quantity]
         return pattern.revolute_unit if self.kind == "revolute" else pattern.prismatic_unit
 
+    @property
+    def place(self) -> str:
+        """What its encoder tells, in a word."""
+        return "angle" if self.kind == "revolute" else "position"
+
+    @property
+    def effort(self) -> str:
+        """What its drive exerts, in a word."""
+        return "torque" if self.kind == "revolute" else "force"
+
 
 HIP_AND_KNEE = (Joint("hip"), Joint("knee"))
 

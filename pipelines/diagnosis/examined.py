@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from pipelines.diagnosis.floor import Floor, noise_floor, slow_scatter
 from pipelines.diagnosis.gain import Errors, errors_of
 from pipelines.diagnosis.impacts import evidence_of_play
 from pipelines.diagnosis.observations import Baseline, Run
-from pipelines.diagnosis.slow import slow_error
+from pipelines.diagnosis.slow import SlowError, slow_error
 from pipelines.diagnosis.status import WANDERING, Standing
 from pipelines.diagnosis.tone import strongest_tone
 from pipelines.diagnosis.volition import evidence_of_will
@@ -33,15 +34,32 @@ class Extended:
     """A set of causes, fitted, and what it leaves of the validation runs."""
 
     fit: Fit
+    runs: Sequence[Run]
+    """The validation runs."""
     residuals: tuple[NDArray, ...]
-    """(m, O) of each validation run."""
+    """(m, O) of each of them."""
     errors: Errors
 
     @classmethod
     def of(cls, made: Fit, validate: Sequence[Run], baseline: Baseline) -> "Extended":
         """Evaluate a fit on the validation runs."""
         residuals = tuple(evaluate(made, validate, baseline))
-        return cls(made, residuals, errors_of(validate, residuals))
+        return cls(made, validate, residuals, errors_of(validate, residuals))
+
+    @cached_property
+    def slow(self) -> SlowError:
+        """What is left in averages over 0.1 s."""
+        return slow_error(self.runs, self.residuals)
+
+    @cached_property
+    def tone(self) -> NDArray:
+        """(J,) N·m rms of the strongest line at each joint."""
+        return strongest_tone(self.runs, self.residuals)[: len(self.runs[0].motion.joints)]
+
+    @cached_property
+    def perceived(self) -> dict[str, float]:
+        """Log likelihood that is known of causes besides what they do to the mean torque, by label."""
+        return heard_in(self.runs, self.residuals) | felt_in(self.runs, self.residuals)
 
 
 @dataclass(frozen=True)
@@ -64,23 +82,21 @@ class Examined:
         made, J = choice.named.fit, len(baseline.joints)
         after = Extended.of(made, validate, baseline)
         floor = noise_floor(validate, after.residuals)
-        standing = _standing(before, after, floor, validate)
-        tones = [strongest_tone(validate, extended.residuals)[:J] for extended in (before, after)]
-        hums = standing.hums(*tones)
+        standing = _standing(before, after, floor)
+        hums = standing.hums(before.tone, after.tone)
         wanders = bool(np.any(slow_scatter(validate, after.residuals)[:J] > WANDERING))
         effects = [cause.effect for cause in made.causes]
-        doubtful = hums and not standing.is_minor(tones[1])
+        doubtful = hums and not standing.is_minor(after.tone)
         foreign = (doubtful or (wanders and not any(e.per_run for e in effects))) and not standing.rings(effects)
         # Play rings on as it likes, and a wearer pushes at will: what no model follows there is no reason to doubt
         # what was heard and felt in these runs too.
-        known = {**heard_in(validate, before.residuals), **felt_in(validate, before.residuals)}
-        sure = tuple(cause.label for cause in made.causes if known.get(cause.label, 0.0) > NEEDED)
+        sure = tuple(cause.label for cause in made.causes if before.perceived.get(cause.label, 0.0) > NEEDED)
         all_sure = bool(sure) and len(sure) == len(made.causes)
         holds_up = all_sure or ((bool(sure) or not foreign) and standing.held_up(effects))
         if not holds_up and not foreign and choice.freer is not None:
             # What is left may be the cause's own, in a form that takes two of ours.
             freer = Extended.of(choice.freer, validate, baseline)
-            holds_up = standing.takes_enough and _standing(before, freer, floor, validate).held_up(effects)
+            holds_up = standing.takes_enough and _standing(before, freer, floor).held_up(effects)
         return cls(after, floor, standing, wanders or hums, holds_up, sure)
 
 
@@ -99,9 +115,9 @@ def _by_label(effect: type[Effect], runs: Sequence[Run], gains: NDArray) -> dict
     return {effect(joint=joint).label: float(gain) for joint, gain in zip(joints, gains, strict=True)}
 
 
-def _standing(before: Extended, after: Extended, floor: Floor, validate: Sequence[Run]) -> Standing:
-    J = len(validate[0].motion.joints)
-    count = np.maximum(sum(run.usable.sum(axis=0) for run in validate), 1)
-    squares = sum(np.sum(np.where(run.usable, run.measured, 0.0) ** 2, axis=0) for run in validate)
-    slow, left = (slow_error(validate, extended.residuals) for extended in (before, after))
-    return Standing(floor.rms[:J], before.errors.rms, after.errors.rms, slow, left, np.sqrt(squares / count))
+def _standing(before: Extended, after: Extended, floor: Floor) -> Standing:
+    J, runs = len(before.runs[0].motion.joints), before.runs
+    count = np.maximum(sum(run.usable.sum(axis=0) for run in runs), 1)
+    squares = sum(np.sum(np.where(run.usable, run.measured, 0.0) ** 2, axis=0) for run in runs)
+    torque = np.sqrt(squares / count)
+    return Standing(floor.rms[:J], before.errors.rms, after.errors.rms, before.slow, after.slow, torque)

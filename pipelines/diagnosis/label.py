@@ -24,11 +24,6 @@ def amount(machine: Machine, joint: str, torque: float) -> str:
     return f"{number(machine, torque)} {machine.joint(joint).unit('torque')}"
 
 
-def quantity(machine: Machine, joint: str) -> str:
-    """Return what a drive exerts at a joint: a torque, or a force."""
-    return "force" if machine.joint(joint).kind == "prismatic" else "torque"
-
-
 def title_in_words(effect: Effect) -> str:
     """Return an effect's title as it stands within a sentence."""
     return effect.title if effect.title.startswith(NAMES) else effect.title.lower()

@@ -12,7 +12,7 @@ from pipelines.diagnosis.error_budget import error_budget
 from pipelines.diagnosis.examined import PERCEIVED
 from pipelines.diagnosis.faults import Fault
 from pipelines.diagnosis.gain import gain
-from pipelines.diagnosis.label import amount, effect_labelled, in_words, number, quantity
+from pipelines.diagnosis.label import amount, effect_labelled, in_words, number
 from pipelines.diagnosis.status import AT_FLOOR, EXPLAINED
 from pipelines.diagnosis.ties import tie_between
 from pipelines.diagnosis.unknown import Unknown, unknown
@@ -153,7 +153,7 @@ def _evidence(d: Diagnosis, label: str, effect: Effect, worth: float, joint: str
     before = d.without[label].errors.rms[d.baseline.joints.index(joint)]
     machine = d.baseline.machine
     sentences = [
-        f"it takes {number(machine, worth)} of {amount(machine, joint, before)} of {quantity(machine, joint)} error "
+        f"it takes {number(machine, worth)} of {amount(machine, joint, before)} of {machine.joint(joint).effort} error "
         f"at the {joint} on runs no fit has seen"
     ]
     if label in d.perceived:
@@ -213,7 +213,7 @@ def _finding(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -
     floor, before, after = d.standing.floor, d.standing.baseline, d.standing.extended
     worst = int((before / floor).argmax())
     joint = d.baseline.joints[worst]
-    machine, exerted = d.baseline.machine, quantity(d.baseline.machine, joint)
+    machine, exerted = d.baseline.machine, d.baseline.machine.joint(joint).effort
     size = f"{amount(machine, joint, before[worst])}, {before[worst] / floor[worst]:.2f} times the noise floor"
     if d.status == "nothing_missing":
         return f"Nothing is missing that these data could show: the largest {exerted} error, at the {joint}, is {size}."
@@ -228,7 +228,7 @@ def _finding(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -
     joint = d.baseline.joints[most]
     return (
         f"Missing from the simulation: {named}. With {'it' if len(causes) == 1 else 'them'} the "
-        f"{joint}'s {quantity(machine, joint)} error falls from {amount(machine, joint, before[most])}, "
+        f"{joint}'s {machine.joint(joint).effort} error falls from {amount(machine, joint, before[most])}, "
         f"{before[most] / floor[most]:.2f} times the noise floor, to {amount(machine, joint, after[most])}, "
         f"{_remains(d, most)}."
     )

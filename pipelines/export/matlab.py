@@ -8,30 +8,10 @@ from pipelines.export.exported import Exported
 from pipelines.export.format import Format
 from pipelines.export.language import Language, function_name, one_line
 
-KEYWORDS = frozenset(
-    (
-        "break",
-        "case",
-        "catch",
-        "classdef",
-        "continue",
-        "else",
-        "elseif",
-        "end",
-        "for",
-        "function",
-        "global",
-        "if",
-        "otherwise",
-        "parfor",
-        "persistent",
-        "return",
-        "spmd",
-        "switch",
-        "try",
-        "while",
-    )
-)
+KEYWORDS = frozenset((
+    "break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function", "global",
+    "if", "otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "while",
+))  # fmt: skip
 
 LANGUAGE = Language(
     names={},

@@ -4,7 +4,7 @@ A leg moves in the x-z plane, x forward and z up; its joints turn about -y, so t
 ``qpos`` is what its encoder gives, an actuator's ``ctrl`` what its torque channel would say.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -12,15 +12,14 @@ import numpy as np
 from pipelines.contracts import Joint
 from pipelines.effects.joint_elasticity import DAMPING_RATIO
 from pipelines.export.bodies import Body, bodies
-from pipelines.export.exported import Exported, shift_of
+from pipelines.export.exported import Exported
 from pipelines.export.format import Format, Holding, approximate, exact, left_out
+from pipelines.export.holding import Held, looked_up
 from pipelines.export.language import one_line, unique
 from pipelines.export.xml_text import document, number, numbers
 from pipelines.model import Term
 
 TIMESTEP_S = 0.001
-
-NO_ELEMENT = "MJCF has no element for it"
 
 
 def _friction(term: Term) -> Holding:
@@ -34,7 +33,7 @@ def _elasticity(term: Term) -> Holding:
     return exact("a second joint, its stiffness and damping; the motor's inertia is the first one's armature")
 
 
-HELD: Mapping[str, Callable[[Term], Holding]] = {
+HELD: Held = {
     "rigid_body": lambda term: exact("bodies of nominal masses that have these X"),
     "friction": _friction,
     "quadratic_drag": lambda term: exact("second coefficient of the joint's damping (read by MuJoCo 4.0)"),
@@ -45,14 +44,6 @@ HELD: Mapping[str, Callable[[Term], Holding]] = {
     "torque_gain": lambda term: exact("gain of the actuator"),
     "torque_offset": lambda term: exact("bias of the actuator"),
 }
-
-
-def holding(term: Term) -> Holding:
-    """Return what becomes of a term in MJCF."""
-    if shift_of(term) is not None:
-        return exact("orientation of the joint's frame")
-    held = HELD.get(term.effect.name)
-    return held(term) if held else left_out(NO_ELEMENT)
 
 
 def write(exported: Exported, stem: str) -> Mapping[str, str]:
@@ -173,4 +164,4 @@ def _comes_before(exported: Exported, first: Term, second: Term) -> bool:
     return next(term for term in exported.terms if term is first or term is second) is first
 
 
-MJCF = Format("mjcf", "MuJoCo model", ".xml", holding, write)
+MJCF = Format("mjcf", "MuJoCo model", ".xml", looked_up(HELD, "orientation of the joint's frame", "MJCF"), write)

@@ -4,20 +4,19 @@ A leg moves in the x-z plane, x forward and z up; its joints turn about -y, so t
 position is what its encoder gives. URDF tells neither gravity nor rotors.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from math import pi
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from pipelines.export.bodies import Body, bodies
-from pipelines.export.exported import Exported, shift_of
+from pipelines.export.exported import Exported
 from pipelines.export.format import Format, Holding, exact, left_out
+from pipelines.export.holding import Held, looked_up
 from pipelines.export.language import one_line, unique
 from pipelines.export.xml_text import document, number, numbers
 from pipelines.model import Term
-
-NO_ELEMENT = "URDF has no element for it"
 
 
 def _friction(term: Term) -> Holding:
@@ -26,19 +25,11 @@ def _friction(term: Term) -> Holding:
     return exact("dynamics of the joint: damping and friction; not every reader heeds them")
 
 
-HELD: Mapping[str, Callable[[Term], Holding]] = {
+HELD: Held = {
     "rigid_body": lambda term: exact("links of nominal masses that have these X"),
     "friction": _friction,
     "mass_off_axis": lambda term: exact("place of the link's centre of mass"),
 }
-
-
-def holding(term: Term) -> Holding:
-    """Return what becomes of a term in URDF."""
-    if shift_of(term) is not None:
-        return exact("origin of the joint")
-    held = HELD.get(term.effect.name)
-    return held(term) if held else left_out(NO_ELEMENT)
 
 
 def write(exported: Exported, stem: str) -> Mapping[str, str]:
@@ -86,4 +77,4 @@ def _joint(root: ET.Element, name: str, parent: str, link: str, body: Body, expo
         ET.SubElement(joint, "dynamics", damping=number(viscous), friction=number(coulomb))
 
 
-URDF = Format("urdf", "URDF model", ".urdf", holding, write)
+URDF = Format("urdf", "URDF model", ".urdf", looked_up(HELD, "origin of the joint", "URDF"), write)

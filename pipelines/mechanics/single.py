@@ -13,6 +13,7 @@ Gravity pulls a prismatic joint with the same force wherever it stands. Counterw
 do so too, and mostly are there where it matters; so X2 of a lift is that force, and not X1 times gravity.
 """
 
+from dataclasses import replace
 from math import cos, sin
 
 import numpy as np
@@ -114,50 +115,31 @@ PENDULUM = Mechanism(
     absorbs=_ABSORBED,
 )
 
-TURNTABLE = Mechanism(
-    name="single",
+TURNTABLE = replace(
+    PENDULUM,
     title="one revolute joint that gravity does not turn: its axis is vertical, or its load balanced",
-    kinds=("revolute",),
-    places=("joint",),
     has_gravity=False,
     parameters=(_INERTIA,),
     along=_inertia_along,
     bends=False,
     reactions={"rigid_body": _inertia},
-    broken=_broken_inertia,
     inertia_forms=_inertia_forms,
-    absorbs=_ABSORBED,
 )
 
-LIFT = Mechanism(
-    name="single",
+SLIDE = replace(
+    TURNTABLE, title="one level prismatic joint", kinds=("prismatic",), parameters=(_MASS,), broken=_broken_mass
+)
+
+LIFT = replace(
+    SLIDE,
     title="one prismatic joint that gravity pulls along",
-    kinds=("prismatic",),
-    places=("joint",),
     has_gravity=True,
     parameters=(
         _MASS,
         Inertial("X2", "N", "force that holds it still: its weight less a counterweight's", (-500.0, 500.0)),
     ),
     along=_lift_along,
-    bends=False,
     reactions={"rigid_body": _lift},
-    broken=_broken_mass,
     inertia_forms=_inertia_forms_under_gravity,
     absorbs=_ABSORBED | dict.fromkeys(("torque_offset", "coulomb_asymmetry"), "X2"),
-)
-
-SLIDE = Mechanism(
-    name="single",
-    title="one level prismatic joint",
-    kinds=("prismatic",),
-    places=("joint",),
-    has_gravity=False,
-    parameters=(_MASS,),
-    along=_inertia_along,
-    bends=False,
-    reactions={"rigid_body": _inertia},
-    broken=_broken_mass,
-    inertia_forms=_inertia_forms,
-    absorbs=_ABSORBED,
 )

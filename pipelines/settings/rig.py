@@ -428,6 +428,8 @@ class SafetySettings(Settings):
     reply_s: float | None = Field(
         None, gt=0.0, description="Longest wait for one reply in motion, then it is a gap; else 0.3 of watchdog_s."
     )
+    connect_s: float = Field(5.0, gt=0.0, description="Longest wait, before anything moves, for a line or a reply.")
+    control_s: float = Field(1.0, gt=0.0, description="Longest a drive may take to do what a control word tells it.")
     deceleration_rad_s2: float = Field(8.0, gt=0.0, description="How a stop slows the set-points down.")
     ramp_s: float = Field(3.0, gt=0.0, description="Shortest time to go from rest into the motion and back.")
     settle_s: float = Field(1.0, ge=0.0, description="Motion before the recording begins, for transients to fade.")

@@ -45,6 +45,9 @@ def rig_file(tmp_path):
         text = (datasets() / "rigs" / f"{shipped}.toml").read_text().replace("embedded = true", "embedded = false", 1)
         if port:
             text = re.sub(r"^(map = .*)$", rf"\1\nport = {port}", text, flags=re.MULTILINE)
+        # Hardly a shipped file names these.
+        silent = {key: changes.pop(key) for key in ("connect_s", "control_s") if key in changes}
+        text = text.replace("[safety]\n", "[safety]\n" + "".join(f"{key} = {value}\n" for key, value in silent.items()))
         for key, value in {"ramp_s": 0.8, "settle_s": 0.2, "watchdog_s": 1.0, **changes}.items():
             text, count = re.subn(rf"^{key} = [^#\n]*", f"{key} = {value} ", text, flags=re.MULTILINE)
             assert count, key

@@ -156,7 +156,7 @@ class SimulatedRig:
         self.events = sorted(events, key=lambda event: event.at)
         self.drives = [SimulatedDrive(j, d, rig.map.drive[d.map], self, angle=rest[j]) for j, d in enumerate(rig.drive)]
         self.sensor_block = Block(registers_of(rig.map.sensor["force"].read))
-        self.force, self.lost_any = 0.0, False
+        self.force = 0.0
         self.exchanged, self.dead = set(), {}
         self.told: list[Told] = []
         self.raised: list[tuple[float, BaseException]] = []
@@ -226,7 +226,6 @@ class SimulatedRig:
         kind = event.kind if event else ""
         if self.dead.get(device.label):
             kind = self.dead[device.label].pop()
-        self.lost_any |= kind != ""
         arrived = kind in ("", "late", "no answer")
         if write is not None and drive:
             block, words = write

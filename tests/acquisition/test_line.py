@@ -21,7 +21,7 @@ from pipelines.errors import DeviceError, SettingsError, Unanswered
 from pipelines.rig.null_modem import null_modem
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.line import RtuLine, RtuOverTcpLine
-from pipelines.settings.rig import load_rig
+from pipelines.settings.rig import SafetySettings, load_rig
 
 from .conftest import free_port
 
@@ -279,10 +279,10 @@ def test_a_client_without_a_certificate_is_turned_away(serve, on_line, line_of):
 
 
 def test_a_port_that_does_not_speak_tls_is_told(serve, on_line, line_of):
-    path = on_line(line_of("tcp"), watchdog_s=1.0)
+    path = on_line(line_of("tcp"), connect_s=1.0)
     port = re.search(r"port = (\d+)", path.read_text())[1]
     with serve(path, None):
-        assert "no TLS connection" in connecting(on_line(f"transport = 'tls'\nport = {port}\n", watchdog_s=1.0))
+        assert "no TLS connection" in connecting(on_line(f"transport = 'tls'\nport = {port}\n", connect_s=1.0))
 
 
 def test_a_certificate_that_is_none_is_refused(on_line, tmp_path):
@@ -353,7 +353,9 @@ class Slow:
             line = Line(RtuOverTcpLine(transport="rtu_over_tcp", port=port), 5.0, "leg")
             await line.connect()
             try:
-                return await ask(Device("sensor thigh_front", 11, line, 5.0, reply_s))
+                return await ask(
+                    Device("sensor thigh_front", 11, line, SafetySettings(watchdog_s=5.0, reply_s=reply_s))
+                )
             finally:
                 line.close()
                 server.close()

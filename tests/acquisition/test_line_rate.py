@@ -47,6 +47,22 @@ def test_sensors_on_a_line_take_their_share_of_every_sample_that_reads_them(rig_
     assert highest_rate(rig, with_sensors=True) == (pytest.approx(1 / (look + drives + sensors)), "leg")
 
 
+def test_what_drives_record_themselves_takes_its_share_of_a_line(rig_file):
+    def highest(baud_rate, **changes):
+        table = f'[line.leg]\ntransport = "rtu"\nserial_port = "x"\nbaud_rate = {baud_rate}\nsilence_s = 0.0002\n'
+        on_it = {'map = "servo"': 'map = "servo"\nline = "leg"', "[map.drive.servo]\n": table + "[map.drive.servo]\n"}
+        return highest_rate(load_rig(rig_file(shipped="recorder", replace=on_it, **changes)), with_sensors=False)[0]
+
+    # 12 records of 10 registers a read, and the number of the newest after it: 253 and 17 characters of 11 bits.
+    character = 11 / 1e6
+    cycle = (17 + 2 * 52) * character + 3 * 4e-4
+    drain = 2 * ((253 + 17) * character + 2 * 4e-4)
+    assert highest(1000000) == pytest.approx(min(1 / (cycle + drain), (1 - drain * 1000 / 12) / cycle))
+    # At 115200 baud a second of records takes longer than a second, however seldom set-points go out.
+    assert highest(115200) == 0.0
+    assert 0.0 < highest(115200, record_rate_hz=100) < 1000 / 12
+
+
 def test_nothing_is_said_of_the_speed_of_a_network(rig_file):
     table = '[line.leg]\ntransport = "tcp"\n'
     changes = {'map = "servo"': 'map = "servo"\nline = "leg"', "[map.drive.servo]\n": table + "[map.drive.servo]\n"}

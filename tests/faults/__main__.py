@@ -12,21 +12,23 @@ from pipelines.acquisition.recover import recover
 from pipelines.contracts import RECORDING
 from tests.faults.faults import Case, cases
 from tests.faults.process import fill_the_disk, send, strike
+from tests.faults.proxy import Frame, RtuFrame, TcpFrame
 from tests.faults.runs import run_through, wrong_rows
 
 TABLE = """\
 ## Each fault
-| fault | the run | samples missing | samples wrong | what is said |
-|---|---|---|---|---|
+| line | fault | the run | samples missing | samples wrong | what is said |
+|---|---|---|---|---|---|
 """
 """The end of the page, which is measured; what stands above it is written by hand."""
 
 
 def rows() -> Iterator[str]:
     """Yield a line of the table for each fault."""
-    for case in cases():
-        with TemporaryDirectory() as folder:
-            yield _row(case, Path(folder))
+    for name, frames in (("TCP", TcpFrame), ("RTU", RtuFrame)):
+        for case in cases(frames):
+            with TemporaryDirectory() as folder:
+                yield _row(name, frames, case, Path(folder))
     for name, blow in (
         ("Ctrl-C (SIGINT)", send(signal.SIGINT)),
         ("SIGTERM", send(signal.SIGTERM)),
@@ -40,17 +42,17 @@ def rows() -> Iterator[str]:
                 made = recover(journal)
                 missing, wrong = made.account.missed, _wrong(made.path, ended.latched)
                 fate = "is killed, then `exoid recover`" if ended.code < 0 else "stops, then `exoid recover`"
-                yield f"| {name} | {fate} | {missing} | {wrong} | {_plain(ended.said) or made.account.abort} |\n"
+                yield f"| TCP | {name} | {fate} | {missing} | {wrong} | {_plain(ended.said) or made.account.abort} |\n"
             else:
                 kept = Path(folder) / "run.aborted.parquet"
-                yield f"| {name} | stops | 0 | {_wrong(kept, ended.latched)} | {_plain(ended.said)} |\n"
+                yield f"| TCP | {name} | stops | 0 | {_wrong(kept, ended.latched)} | {_plain(ended.said)} |\n"
 
 
-def _row(case: Case, folder: Path) -> str:
-    result = run_through(case.fault, folder, case.run)
+def _row(line: str, frames: type[Frame], case: Case, folder: Path) -> str:
+    result = run_through(case.fault, folder, case.run, frames=frames)
     wrong = f"{result.wrong}, the last {result.wrong_s:g} s" if result.wrong else "0"
     fate = "goes on" if result.why is None else "stops"
-    return f"| {case.name} | {fate} | {result.missing} | {wrong} | {_plain(result.why or '')} |\n"
+    return f"| {line} | {case.name} | {fate} | {result.missing} | {wrong} | {_plain(result.why or '')} |\n"
 
 
 def _wrong(path: Path, latched: dict) -> int:
@@ -73,8 +75,8 @@ def main() -> None:
     for row in rows():
         print(row, end="", flush=True)
         table.append(row)
-    by_hand, heading, _ = page.read_text(encoding="utf-8").partition(TABLE)
-    page.write_text(by_hand + (heading or TABLE) + "".join(table), encoding="utf-8")
+    by_hand, _, _ = page.read_text(encoding="utf-8").partition(TABLE.partition("\n")[0])
+    page.write_text(by_hand + TABLE + "".join(table), encoding="utf-8")
 
 
 main()

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from tests.faults.proxy import Fault, Frame, Late, Link
+from tests.faults.proxy import Fault, Frame, Late, Link, RtuFrame, TcpFrame
 
 EXCHANGE = 23
 HIP, KNEE, CUFF = 1, 2, 11
@@ -64,21 +64,40 @@ def cut(frame: Frame, link: Link) -> list[bytes]:
     return [frame.raw[:-5]]
 
 
-def replace(place: int, new: bytes) -> Fault:
-    return lambda frame, link: [frame.with_bytes(place, new)]
+def another_unit(frame: Frame, link: Link) -> list[bytes]:
+    return [frame.with_body(b"\x07" + frame.body[1:])]
 
 
-def other_transaction(frame: Frame, link: Link) -> list[bytes]:
-    return [frame.with_bytes(0, (frame.transaction + 1).to_bytes(2, "big"))]
+def another_function(frame: Frame, link: Link) -> list[bytes]:
+    return [frame.with_body(frame.body[:1] + b"\x03" + frame.body[2:])]
 
 
-def longer(frame: Frame, link: Link) -> list[bytes]:
-    return [frame.with_bytes(4, (len(frame.raw) + 40).to_bytes(2, "big"))]
+def garble(frame: Frame, link: Link) -> list[bytes]:
+    """Turn a bit on the line, which a checksum would tell."""
+    middle = len(frame.raw) // 2
+    return [frame.raw[:middle] + bytes([frame.raw[middle] ^ 4]) + frame.raw[middle + 1 :]]
+
+
+def noise(frame: Frame, link: Link) -> list[bytes]:
+    """Put bytes before a frame that nobody sent."""
+    return [b"\x00\xff\x5a" + frame.raw]
+
+
+def head(place: int, new: bytes) -> Fault:
+    return lambda frame, link: [frame.with_head(place, new)]
+
+
+def other_transaction(frame: TcpFrame, link: Link) -> list[bytes]:
+    return [frame.with_head(0, (frame.transaction + 1).to_bytes(2, "big"))]
+
+
+def longer(frame: TcpFrame, link: Link) -> list[bytes]:
+    return [frame.with_head(4, (len(frame.raw) + 40).to_bytes(2, "big"))]
 
 
 def refuse(code: int) -> Fault:
     def exception(frame: Frame, link: Link) -> list[bytes]:
-        return [frame.raw[:4] + b"\x00\x03" + bytes([frame.unit, frame.function | 0x80, code])]
+        return [frame.with_body(bytes([frame.unit, frame.function | 0x80, code]))]
 
     return exception
 
@@ -182,11 +201,13 @@ class Case:
     """Whether samples are missing then."""
     either: bool = False
     """Whether it may go on too: what a device makes of half a request nobody can know."""
+    frames: type[Frame] = Frame
+    """Which it befalls: of all kinds, or those that have what it damages."""
 
 
-def cases() -> list[Case]:
-    """Return all faults, new ones at each call: they remember what they have seen."""
-    return [
+def cases(frames: type[Frame]) -> list[Case]:
+    """Return the faults of a kind of frame, new ones at each call: they remember what they have seen."""
+    everything = [
         Case("none", nothing),
         Case("a reply is lost", From(lose), gap=True),
         Case("a request is lost", From(lose, replies=False), gap=True),
@@ -203,13 +224,15 @@ def cases() -> list[Case]:
         Case("two replies are reordered", From(Reorder(), times=2), gap=True),
         Case("a reply is truncated", From(cut), gap=True),
         Case("a request is truncated", From(cut, replies=False), "", either=True),
-        Case("a reply has another transaction id", From(other_transaction), gap=True),
-        Case("every reply has another transaction id", From(other_transaction, times=ALWAYS), "did not answer"),
-        Case("a reply has transaction id 0", From(replace(0, b"\0\0")), "transaction 0, expected"),
-        Case("a reply has another unit id", From(replace(6, b"\x07")), gap=True),
-        Case("a reply has another protocol id", From(replace(2, b"\x12\x34")), gap=True),
-        Case("a reply tells a wrong length", From(longer), gap=True),
-        Case("a reply has another function", From(replace(7, b"\x03")), "function 3, expected 23"),
+        Case("a reply has another transaction id", From(other_transaction), gap=True, frames=TcpFrame),
+        Case("every reply has another transaction id", From(other_transaction, times=ALWAYS), "did not answer",
+             frames=TcpFrame),
+        Case("a reply has transaction id 0", From(head(0, b"\0\0")), "transaction 0, expected",
+             frames=TcpFrame),
+        Case("a reply has another unit id", From(another_unit), gap=True),
+        Case("a reply has another protocol id", From(head(2, b"\x12\x34")), gap=True, frames=TcpFrame),
+        Case("a reply tells a wrong length", From(longer), gap=True, frames=TcpFrame),
+        Case("a reply has another function", From(another_function), "function 3, expected 23"),
         Case("exception reply 4, device failure", From(refuse(4)), "Modbus exception 4: it failed"),
         Case("exception reply 6, device busy", From(refuse(6)), "Modbus exception 6: it is busy"),
         Case("a bit of the counter is flipped", From(flip(1, 1)), "counter"),
@@ -235,4 +258,8 @@ def cases() -> list[Case]:
         Case("the clock steps back by 1 s", From(add(TIME, -1_000_000), times=ALWAYS), "its clock went from"),
         Case("the knee's clock steps forward by 20 ms", From(add(TIME, 20_000), unit=KNEE, times=ALWAYS),
              "one of the two leapt"),
+        Case("a bit of a reply is flipped on the line", From(garble), gap=True, frames=RtuFrame),
+        Case("a bit of a request is flipped on the line", From(garble, replies=False), gap=True, frames=RtuFrame),
+        Case("noise comes before a reply", From(noise), frames=RtuFrame),
     ]  # fmt: skip
+    return [case for case in everything if issubclass(frames, case.frames)]

@@ -1,52 +1,104 @@
-"""A Modbus TCP proxy that lets a fault loose on the frames that pass through it."""
+"""A proxy that lets a fault loose on the Modbus frames that pass through it, be they TCP's or RTU's."""
 
 import asyncio
 import threading
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import ClassVar, Self
 
-HEADER = 7
-"""Transaction id, protocol id, length, and the unit id that the length counts already."""
+from pymodbus.framer import FramerRTU
 
 
 @dataclass(frozen=True)
-class Frame:
+class Frame(ABC):
     """One frame on its way, to the device or, a reply, from it."""
 
     raw: bytes
     is_reply: bool
+    HEAD: ClassVar[int]
+    """Bytes before the unit id."""
+    TAIL: ClassVar[int]
+    """Bytes after the data."""
+
+    @classmethod
+    @abstractmethod
+    async def read(cls, reader: asyncio.StreamReader, *, is_reply: bool) -> Self:
+        """Wait for the next one."""
+
+    @abstractmethod
+    def with_body(self, body: bytes) -> bytes:
+        """Return the frame with another unit id, function and data, sealed as a device would."""
+
+    @property
+    def body(self) -> bytes:
+        """Unit id, function and data."""
+        return self.raw[self.HEAD : len(self.raw) - self.TAIL]
+
+    @property
+    def unit(self) -> int:
+        return self.body[0]
+
+    @property
+    def function(self) -> int:
+        return self.body[1]
+
+    @property
+    def written(self) -> list[int]:
+        """The registers that a request writes."""
+        start = {16: 7, 23: 11}.get(self.function) if not self.is_reply else None
+        return [] if start is None else _words(self.body[start:])
+
+    @property
+    def words(self) -> list[int]:
+        """The registers in a reply to a reading function."""
+        return _words(self.body[3:])
+
+    def with_words(self, words: Iterable[int]) -> bytes:
+        """Return the reply with other registers."""
+        return self.with_body(self.body[:3] + b"".join(word.to_bytes(2, "big") for word in words))
+
+
+class TcpFrame(Frame):
+    """Transaction id, protocol id and length before the body."""
+
+    HEAD, TAIL = 6, 0
+
+    @classmethod
+    async def read(cls, reader: asyncio.StreamReader, *, is_reply: bool) -> Self:
+        head = await reader.readexactly(cls.HEAD)
+        return cls(head + await reader.readexactly(int.from_bytes(head[4:6], "big")), is_reply)
 
     @property
     def transaction(self) -> int:
         return int.from_bytes(self.raw[0:2], "big")
 
-    @property
-    def unit(self) -> int:
-        return self.raw[6]
+    def with_body(self, body: bytes) -> bytes:
+        return self.raw[:4] + len(body).to_bytes(2, "big") + body
 
-    @property
-    def function(self) -> int:
-        return self.raw[7]
-
-    @property
-    def written(self) -> list[int]:
-        """The registers that a request writes."""
-        start = {16: 13, 23: 17}.get(self.function, len(self.raw)) if not self.is_reply else len(self.raw)
-        return _words(self.raw[start:])
-
-    @property
-    def words(self) -> list[int]:
-        """The registers in a reply to a reading function."""
-        return _words(self.raw[9:])
-
-    def with_bytes(self, place: int, new: bytes) -> bytes:
-        """Return the frame with bytes replaced from a place on."""
+    def with_head(self, place: int, new: bytes) -> bytes:
+        """Return the frame with bytes of its head replaced from a place on."""
         return self.raw[:place] + new + self.raw[place + len(new) :]
 
-    def with_words(self, words: Iterable[int]) -> bytes:
-        """Return the reply with other registers."""
-        return self.raw[:9] + b"".join(word.to_bytes(2, "big") for word in words)
+
+class RtuFrame(Frame):
+    """A checksum behind the body; its function tells how long that is."""
+
+    HEAD, TAIL = 0, 2
+
+    @classmethod
+    async def read(cls, reader: asyncio.StreamReader, *, is_reply: bool) -> Self:
+        raw = await reader.readexactly(2)
+        if is_reply:
+            fixed, counted = {16: (4, False), 3: (1, True), 23: (1, True)}.get(raw[1], (1, False))
+        else:
+            fixed, counted = {16: (5, True), 23: (9, True)}.get(raw[1], (4, False))
+        raw += await reader.readexactly(fixed)
+        return cls(raw + await reader.readexactly(cls.TAIL + (raw[-1] if counted else 0)), is_reply)
+
+    def with_body(self, body: bytes) -> bytes:
+        return body + FramerRTU.compute_CRC(body).to_bytes(2, "big")
 
 
 def _words(raw: bytes) -> list[int]:
@@ -82,11 +134,11 @@ Fault = Callable[[Frame, Link], Iterable[bytes | Late]]
 class Proxy:
     """Listens on a port of its own for as long as the block lasts."""
 
-    def __init__(self, device_port: int, fault: Fault) -> None:
+    def __init__(self, device_port: int, fault: Fault, frames: type[Frame] = TcpFrame) -> None:
         self.port = 0
         self.written: dict[int, list[int]] = {}
         """Of each unit the words that it was told last."""
-        self._device_port, self._fault = device_port, fault
+        self._device_port, self._fault, self._frames = device_port, fault, frames
         self._listening = threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()))
 
@@ -149,9 +201,7 @@ class Proxy:
         self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, link: Link, *, is_reply: bool
     ) -> None:
         while True:
-            head = await reader.readexactly(HEADER)
-            body = await reader.readexactly(int.from_bytes(head[4:6], "big") - 1)
-            frame = Frame(head + body, is_reply)
+            frame = await self._frames.read(reader, is_reply=is_reply)
             passing = list(self._fault(frame, link))
             for chunk in () if link.dead else passing:
                 if frame.written and chunk == frame.raw:

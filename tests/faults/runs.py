@@ -22,7 +22,7 @@ from pipelines.settings import datasets
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import load_rig
 from tests.faults.faults import REPLY_S, WATCHDOG_S
-from tests.faults.proxy import Fault, Proxy
+from tests.faults.proxy import Fault, Frame, Proxy, RtuFrame, TcpFrame
 
 CONTROL, DISABLE = 2, 0
 """Which of the words that a drive is told is the control word, and which one takes the torque away."""
@@ -67,10 +67,13 @@ class Result:
         return sum(count for _, count in self.metadata.get("gaps", []))
 
 
-def rig_file(folder: Path, port: int, **changes: float) -> Path:
-    """Write the plain rig, all on one port, with short ramps."""
+def rig_file(folder: Path, port: int, frames: type[Frame] = TcpFrame, **changes: float) -> Path:
+    """Write the plain rig, all on one port or on one RTU line through it, with short ramps."""
     text = (datasets() / "rigs" / "plain.toml").read_text().replace("embedded = true", "embedded = false", 1)
-    text = re.sub(r"^(map = .*)$", rf"\1\nport = {port}", text, flags=re.MULTILINE)
+    place = f"port = {port}" if frames is TcpFrame else 'line = "leg"'
+    text = re.sub(r"^(map = .*)$", rf"\1\n{place}", text, flags=re.MULTILINE)
+    if frames is RtuFrame:
+        text += f'\n[line.leg]\ntransport = "rtu_over_tcp"\nport = {port}\n'
     text = text.replace("[safety]\n", "[safety]\nreply_s = 0\n")
     short = {"ramp_s": 0.4, "settle_s": 0.1, "watchdog_s": WATCHDOG_S, "reply_s": REPLY_S}
     for key, value in {**short, **changes}.items():
@@ -82,9 +85,9 @@ def rig_file(folder: Path, port: int, **changes: float) -> Path:
 
 
 @contextmanager
-def served(folder: Path, run: str) -> Iterator[tuple[int, dict[int, Latched]]]:
+def served(folder: Path, run: str, frames: type[Frame] = TcpFrame) -> Iterator[tuple[int, dict[int, Latched]]]:
     """Serve the rig; yields its port, and all that it latches by number."""
-    path = rig_file(folder, 502)
+    path = rig_file(folder, 502, frames)
     rig = load_rig(path)
     plant, latched = server.build_plant(rig, path, run, SEED, RATE), dict[int, Latched]()
     advance = plant.run
@@ -124,16 +127,17 @@ def run_through(
     run: str = "exo_alone",
     duration_s: float = 1.0,
     motion: str = EXCITATION,
+    frames: type[Frame] = TcpFrame,
     **changes: float,
 ) -> Result:
     """Record a run with a fault between client and rig; ``changes`` are of the rig file."""
     excitation, output = folder / "excitation.toml", folder / "run.parquet"
     excitation.write_text(motion)
     settings = RunSettings(name="run", run=run, purpose="train", duration_s=duration_s, seed=SEED)
-    with served(folder, run) as (port, latched), Proxy(port, fault) as proxy:
+    with served(folder, run, frames) as (port, latched), Proxy(port, fault, frames) as proxy:
         why = None
         try:
-            acquire(rig_file(folder, proxy.port, **changes), settings, excitation, output, RATE)
+            acquire(rig_file(folder, proxy.port, frames, **changes), settings, excitation, output, RATE)
         except DeviceError as error:
             why = str(error)
     disabled = are_disabled(proxy)

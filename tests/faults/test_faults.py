@@ -5,6 +5,7 @@ import re
 import pytest
 
 from tests.faults.faults import WATCHDOG_S, cases
+from tests.faults.proxy import RtuFrame, TcpFrame
 from tests.faults.runs import RATE, run_through
 
 
@@ -14,12 +15,19 @@ def told_s(why):
     return float(found[1]) if found else 0.0
 
 
-EVERY_CASE = pytest.mark.parametrize("case", cases(), ids=lambda case: case.name)
+EVERY_CASE = pytest.mark.parametrize(
+    ("frames", "case"),
+    [
+        pytest.param(frames, case, id=f"{name}: {case.name}")
+        for frames, name in ((TcpFrame, "TCP"), (RtuFrame, "RTU"))
+        for case in cases(frames)
+    ],
+)
 
 
 @EVERY_CASE
-def test_a_fault_leaves_a_gap_that_is_told_or_stops_the_run_with_its_reason(case, tmp_path):
-    result = run_through(case.fault, tmp_path, case.run)
+def test_a_fault_leaves_a_gap_that_is_told_or_stops_the_run_with_its_reason(frames, case, tmp_path):
+    result = run_through(case.fault, tmp_path, case.run, frames=frames)
     assert result.wrong == 0 or "frozen" in str(result.why)  # that is known only when others have moved on
     assert result.wrong_s <= told_s(result.why)
     assert result.disabled or "could not be disabled" in str(result.why)

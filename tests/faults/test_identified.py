@@ -11,7 +11,7 @@ from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table
 from pipelines.settings.filter import FilterSettings
 from pipelines.settings.rig import load_rig
-from tests.faults.faults import EXCHANGE, cut, delay, lose, nothing, other_transaction, replace, twice
+from tests.faults.faults import EXCHANGE, another_unit, cut, delay, lose, nothing, other_transaction, twice
 from tests.faults.runs import RATE, rig_file, run_through
 
 DURATION_S = 10.0
@@ -29,7 +29,6 @@ class BadLine:
     """Every so many replies something befalls one that a run survives, one thing after the other."""
 
     def __init__(self, every):
-        another_unit = replace(6, b"\x09")
         late = delay(1.5 * REPLY_S), delay(0.2 * REPLY_S)
         self.befalls = [lose, *late, twice, cut, other_transaction, another_unit]
         self.every, self.seen, self.struck = every, 0, 0

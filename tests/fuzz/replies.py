@@ -231,7 +231,8 @@ class Client:
 def hostile_rigs() -> list[RigSettings]:
     """Return the plain rig, with floats in place of its integers, and all on one RTU line; all of little patience."""
     text = (datasets() / "rigs" / "plain.toml").read_text()
-    text = re.sub(r"^watchdog_s = [^#\n]*", f"watchdog_s = {TIMEOUT_S} ", text, flags=re.MULTILINE)
+    patience = "".join(f"{key} = {TIMEOUT_S}\n" for key in ("watchdog_s", "connect_s", "control_s"))
+    text = re.sub(r"^watchdog_s = [^#\n]*\n", patience, text, flags=re.MULTILINE)
     shared = re.sub(r"^(map = .*)$", r'\1\nline = "leg"', text, flags=re.MULTILINE)
     with TemporaryDirectory() as folder:
         return [

@@ -46,10 +46,8 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
             [_line(key, share, total, units[joint]) for key, share in shares.items()],
             loc="center left", bbox_to_anchor=(1.01, 0.5),
         )  # fmt: skip
-    unit = units[list(budget)[-1]]
-    axes[-1, 0].set_xlabel(
-        f"mean square of the {'force' if unit == 'N' else 'torque'} error on runs no fit has seen, ({unit})²"
-    )
+    last = d.baseline.machine.joints[-1]
+    axes[-1, 0].set_xlabel(f"mean square of the {last.effort} error on runs no fit has seen, ({last.unit('torque')})²")
     drawn.suptitle("What the error is made of", x=0.02, ha="left", fontweight="bold")
     drawn.tight_layout()
     return drawn

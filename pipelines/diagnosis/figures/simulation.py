@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from pipelines.diagnosis.diagnose import Diagnosis
 from pipelines.diagnosis.examined import Extended
 from pipelines.diagnosis.figures.palette import AFTER, BEFORE, MEASURED, NOISE
-from pipelines.diagnosis.label import number, quantity
+from pipelines.diagnosis.label import number
 from pipelines.diagnosis.replayed import Stretch, simulated_error, worst_stretch
 
 NARROWEST = 8.0
@@ -38,7 +38,9 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
         column[3].axhspan(-d.floor.rms[j], d.floor.rms[j], color=NOISE, alpha=0.6, lw=0, label="noise floor")
         column[0].set_title(f"{joint}: 1 s simulations stray {_strayed(said, joint)}", loc="left", fontsize=9)
         column[2].set_title(
-            f"{joint}: {quantity(d.baseline.machine, joint)} is off by {_off(d, said, joint)}", loc="left", fontsize=9
+            f"{joint}: {d.baseline.machine.joint(joint).effort} is off by {_off(d, said, joint)}",
+            loc="left",
+            fontsize=9,
         )
         column[-1].set_xlabel("time, s")
     for name, colour, made in models:
@@ -49,7 +51,8 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
         error.set_ylim(max(low, -FAR_MRAD), min(high, FAR_MRAD))
     # All joints of the mechanisms there are, are of one kind.
     angle, torque = (said["units"][joints[0]][quantity] for quantity in ("angle", "torque"))
-    where, push = ("position", "force") if torque == "N" else ("angle", "torque")
+    first = d.baseline.machine.joints[0]
+    where, push = first.place, first.effort
     words = (f"{where}, {angle}", f"{where} error, m{angle}", f"{push}, {torque}", f"{push} error, {torque}")
     for row, label in zip(axes, words, strict=True):
         row[0].set_ylabel(label)

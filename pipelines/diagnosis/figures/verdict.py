@@ -14,7 +14,7 @@ from pipelines.diagnosis.diagnose import Diagnosis
 from pipelines.diagnosis.figures.against import against, draw, reach
 from pipelines.diagnosis.figures.budget import colours_of, highest, lowest, rms, stack, words_of
 from pipelines.diagnosis.figures.palette import AFTER, BEFORE, NOISE
-from pipelines.diagnosis.label import effect_labelled, in_words, quantity
+from pipelines.diagnosis.label import effect_labelled, in_words
 from pipelines.effects import RUNS
 from pipelines.model import effect_named
 
@@ -75,7 +75,7 @@ def _shape(axis: Axes, d: Diagnosis, said: dict[str, Any]) -> None:
     floor = float(d.floor.rms[j])
     seen = against(variable, d, joint, kinds)
     draw(axis, seen, floor, max(reach(seen.before, seen.after), 2 * floor), bool(d.causes))
-    axis.set_ylabel(f"{joint} {quantity(d.baseline.machine, joint)} error, {said['units'][joint]['torque']}")
+    axis.set_ylabel(f"{joint} {d.baseline.machine.joint(joint).effort} error, {said['units'][joint]['torque']}")
     lines = [("rigid body and friction", BEFORE)]
     named = " and ".join(in_words(effect_labelled(label)) for label in d.causes)
     lines += [(f"with {named}", AFTER)] if d.causes else []
