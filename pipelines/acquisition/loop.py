@@ -213,6 +213,8 @@ class Loop:
             self.supervisor.begin_stop(joint, drive.told_reference)
         stopping = self.supervisor.stopping(joint)
         try:
+            if drive.latest is not None:  # it came beside what ended the run, perhaps, and nobody has judged it
+                self.supervisor.heed(joint, drive.latest)
             while True:
                 # On the host's clock: the device's counter may be what has failed. What is late is not caught up
                 # with, so that set-points never come faster than samples.

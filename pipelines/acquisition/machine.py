@@ -82,6 +82,8 @@ class Drive:
         self._counted = 0
         self.told_reference: float | None = None
         """The last set-point on its way to it, rad; None while it has been told nothing, and need not be disabled."""
+        self.latest: Reading | None = None
+        """What it told last, though whoever asked may not have come to hear it."""
 
     def _its_ring(self) -> Ring | Queue:
         settings = self.map.ring
@@ -239,7 +241,7 @@ class Drive:
         told = self._decoded(self.told, words)
         status = int(told.get("status", 0))
         self._temperature = told.get("temperature", np.nan)
-        return Reading(
+        self.latest = Reading(
             sequence=self._newest(told["sequence"], sent),
             time=self._time(told["time"]),
             angle=told["angle"],
@@ -251,6 +253,7 @@ class Drive:
             enabled=self._is_enabled(status) if self.map.enabled_mask else None,
             fault=self._fault(status),
         )
+        return self.latest
 
     def _fault(self, status: int) -> str | None:
         """Return in words the fault that a status word tells; None where it tells none."""

@@ -180,8 +180,7 @@ class Supervisor:
         DeviceError
             The drive is no longer enabled.
         """
-        if why := self._heed_enabled(joint, reading):
-            raise DeviceError(why)
+        self.heed(joint, reading)
         drive, sent = self.rig.drive[joint], self.sent[joint]
         if self.rig.map.drive[drive.map].read.reference is not None:
             reach = drive.speed_rad_s * silent_s
@@ -340,13 +339,17 @@ class Supervisor:
             self.sent[joint] = self.base[joint] = reference
             yield reference, halt
 
+    def heed(self, joint: int, reading: Reading) -> None:
+        """Note what a drive says of being enabled; raise DeviceError where it no longer is."""
+        if why := self._heed_enabled(joint, reading):
+            raise DeviceError(why)
+
     def feel(self, joint: int, reading: Reading) -> None:
         """Heed what a drive tells that is being stopped; raise DeviceError where it is no longer enabled."""
         drive, error = self.rig.drive[joint], reading.angle - self.base[joint]
         self.pressing |= not abs(reading.torque) <= drive.torque_nm
         self.pressing |= not abs(error) <= self.rig.safety.following_error_rad
-        if why := self._heed_enabled(joint, reading):
-            raise DeviceError(why)
+        self.heed(joint, reading)
 
     def feel_cuffs(self, forces: NDArray) -> None:
         """Heed the cuff forces (4, 3) N while the drives are being stopped."""

@@ -136,9 +136,12 @@ class SimulatedDrive:
             self.velocity = (self.angle - self.seen) * RATE / (self.count - self.latched)
             self.latched, self.seen = self.count, self.angle
 
-    def words(self):
+    def say(self):
+        """Be heard to tell the status word."""
         self.said_idle |= self.was_enabled and not self.says_enabled
         self.was_enabled |= self.says_enabled
+
+    def words(self):
         values = {
             "sequence": max(self.count + self.ahead, 0), "time": max(self.count / RATE + self.clock_ahead, 0.0),
             "angle": self.seen, "velocity": self.velocity, "current": 0.1 * sin(self.count), "temperature": 20.0,
@@ -261,6 +264,8 @@ class SimulatedRig:
             return drive.write.encode({"reference": drive.told, "control": drive.control, "heartbeat": 0})
         if count == drive.read.count:
             drive.latch()
+        if address <= drive.map.read.status.address < address + count:
+            drive.say()
         block = drive.words()
         start = address - drive.read.address
         if write is not None and self.rig.clock == "lockstep":

@@ -93,7 +93,7 @@ def identify(log: Log, given: Given) -> Answer:
     )  # fmt: skip
     residual = sysid.build_residual_fn(models_sequences=[sequences])
     with contextlib.redirect_stdout(io.StringIO()):
-        found, result = sysid.optimize(_parameters(), residual, optimizer="mujoco", verbose=False)
+        found, result = sysid.optimize(_parameters(), residual, optimizer="scipy", verbose=False, x_scale="jac")
     left, *_ = residual(found.as_vector(), found)
     _, half_width = sysid.calculate_intervals([r.ravel() for r in left], result.jac)
     insights = AutomatedInsights("Automated Insights", found).get_context()["insights"]
