@@ -31,6 +31,7 @@ from exoid_cli.identify import identify
 from exoid_cli.import_ import import_
 from exoid_cli.init import init
 from exoid_cli.recover import recover
+from exoid_cli.report import report
 from exoid_cli.rig_group import rig
 from exoid_cli.run import run as run_
 from exoid_cli.settings import settings
@@ -66,6 +67,7 @@ _add("filter", filter_, "Filter a recording's angles and differentiate them.")
 _add("identify", identify, "Fit the leg's parameters; judge them on other runs.")
 _add("diagnose", diagnose, "Name what the model gets wrong, and measure the gain.")
 _add("simulate", simulate, "Simulate the identified leg, or replay a recording.")
+_add("report", report, "Write one page that shows all that was found.")
 _add("export", export, "Hand a model to MuJoCo, URDF, MATLAB, C or JSON.")
 _add("show", show, "Say what a file is, and what is in it.")
 _add("effects", effects, "List the effects a model can have, or explain one.")

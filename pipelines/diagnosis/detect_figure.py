@@ -8,7 +8,7 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 
 from pipelines.diagnosis.detect import Detectable
-from pipelines.diagnosis.label import effect_labelled, title_in_words
+from pipelines.label import effect_labelled, title_in_words
 from pipelines.plots import BLUE, GREY, ORANGE, STYLE, save
 
 

@@ -25,7 +25,6 @@ from pipelines.diagnosis.faults import Fault, excluding, find_faults
 from pipelines.diagnosis.fit import Fit, fit, residuals_on
 from pipelines.diagnosis.fitted_model import model_of_run
 from pipelines.diagnosis.floor import Floor, noise_floor
-from pipelines.diagnosis.label import effect_labelled
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, like_trained, observe, with_load
 from pipelines.diagnosis.search import imperfection
 from pipelines.diagnosis.second_look import slower
@@ -36,6 +35,7 @@ from pipelines.diagnosis.ties import ALIKE
 from pipelines.diagnosis.uncertainty import Uncertainty, uncertainty
 from pipelines.dynamics.replay import replay
 from pipelines.errors import ExoidError, InputError
+from pipelines.label import effect_labelled
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.scale import on_one_scale
 

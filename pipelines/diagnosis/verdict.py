@@ -12,12 +12,12 @@ from pipelines.diagnosis.error_budget import error_budget
 from pipelines.diagnosis.examined import PERCEIVED
 from pipelines.diagnosis.faults import Fault
 from pipelines.diagnosis.gain import gain
-from pipelines.diagnosis.label import amount, effect_labelled, in_words, number
 from pipelines.diagnosis.status import AT_FLOOR, EXPLAINED
 from pipelines.diagnosis.ties import tie_between
 from pipelines.diagnosis.unknown import Unknown, unknown
 from pipelines.effects import Effect
 from pipelines.estimation.regression import mask_in_words
+from pipelines.label import amount, effect_labelled, in_words, number
 from pipelines.model import effect_named
 
 HIGHEST = 0.96

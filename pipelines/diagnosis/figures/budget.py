@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 from pipelines.diagnosis.diagnose import Diagnosis
 from pipelines.diagnosis.error_budget import FLOOR, LEFT, REPEATS, WANDERS
 from pipelines.diagnosis.figures.palette import AFTER, CAUSE, NOISE
-from pipelines.diagnosis.label import effect_labelled, in_words
+from pipelines.label import effect_labelled, in_words
 
 WORDS = {
     FLOOR: "noise floor",

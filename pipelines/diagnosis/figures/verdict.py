@@ -14,8 +14,8 @@ from pipelines.diagnosis.diagnose import Diagnosis
 from pipelines.diagnosis.figures.against import against, draw, reach
 from pipelines.diagnosis.figures.budget import colours_of, highest, lowest, rms, stack, words_of
 from pipelines.diagnosis.figures.palette import AFTER, BEFORE, NOISE
-from pipelines.diagnosis.label import effect_labelled, in_words
 from pipelines.effects import RUNS
+from pipelines.label import effect_labelled, in_words
 from pipelines.model import effect_named
 
 WIDTH = 125

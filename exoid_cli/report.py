@@ -1,0 +1,54 @@
+"""``exoid report``: everything that was found, on one page that opens offline."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from exoid_cli.console import console
+
+Folders = Annotated[
+    list[Path] | None, typer.Argument(metavar="DIR...", help="Folders that the stages wrote to; this one unless given.")
+]
+
+
+def report(
+    folders: Folders = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="The page to write.")] = Path("report.html"),
+    config: Annotated[
+        Path | None, typer.Option("--config", help="exoid.toml, to be named in the command lines that repeat it.")
+    ] = None,
+    compare: Annotated[
+        tuple[Path, Path] | None, typer.Option("--compare", metavar="A B", help="Lay two sessions side by side.")
+    ] = None,
+    title: Annotated[
+        str | None, typer.Option("--title", help="The page's title; the folder's name unless given.")
+    ] = None,
+) -> None:
+    """Write one self-contained page: the verdict, the figures, the model, and how to repeat it all.
+
+    \b
+    Examples:
+      exoid report build/default -o report.html
+      exoid report --compare monday/ tuesday/ -o compared.html
+    """
+    from pipelines.contracts.atomic import write_text
+    from pipelines.errors import SettingsError
+    from pipelines.report.report import report as page_of
+    from pipelines.report.session import find
+
+    if output.is_dir():
+        raise SettingsError(f"-o {output}: is a folder, expected the name of a page; write {output / 'report.html'}")
+    if compare and folders:
+        raise SettingsError("--compare takes both its folders itself; drop the others, or --compare")
+    session = find(folders or [Path()], config)
+    with console.progress("writing the page", 1.0):
+        page = page_of(session, title)
+    write_text(output, page)
+    for trouble in session.unreadable:
+        console.warn(trouble)
+    verdict = session.verdict or {}
+    console.emit({"path": str(output), "bytes": len(page.encode()), "summary": verdict.get("summary")})
+    if verdict:
+        console.say(verdict["summary"])
+    console.say(f"{output}: {len(page.encode()) / 1e6:.1f} MB, opens in any browser")

@@ -1,0 +1,150 @@
+"""Bars as data: what the error is made of, and what naming the causes took of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pipelines.errors import InputError
+from pipelines.label import effect_labelled, in_words
+
+SHARES = {
+    "noise_floor": ("noise floor", "noise"),
+    "repeatable_unexplained": ("unexplained, repeats every period", "left"),
+    "not_repeatable": ("unexplained, does not repeat", "wanders"),
+    "unexplained": ("unexplained", "left"),
+}
+"""Keys of the verdict's ``error_budget`` that are no cause: in words, and their colour's name."""
+CAUSES = 3
+"""Colours that there are for causes."""
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A part of a bar, from ``low`` to ``high`` of the bar's quantity."""
+
+    key: str
+    label: str
+    tone: str
+    """Name of its colour."""
+    low: float
+    high: float
+    share: float
+    """The mean square that it stands for; below zero where a cause raises a joint's error."""
+
+    @property
+    def rms(self) -> float:
+        """Its root mean square, signed as the share."""
+        return float(np.copysign(np.sqrt(abs(self.share)), self.share))
+
+
+@dataclass(frozen=True)
+class Bar:
+    """One joint's mean square error, laid end to end."""
+
+    joint: str
+    unit: str
+    segments: tuple[Segment, ...]
+
+    @property
+    def total(self) -> float:
+        """The mean square of the whole."""
+        return sum(segment.share for segment in self.segments)
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the whole."""
+        return float(np.sqrt(self.total))
+
+    @property
+    def low(self) -> float:
+        """Where the bar begins: below zero where a cause makes it worse."""
+        return min(0.0, *(segment.low for segment in self.segments))
+
+    @property
+    def high(self) -> float:
+        """Where it ends."""
+        return max(segment.high for segment in self.segments)
+
+
+@dataclass(frozen=True)
+class Fall:
+    """One joint's error before and after, beside its noise floor."""
+
+    joint: str
+    unit: str
+    before: float
+    after: float | None
+    """None where nothing was named."""
+    floor: float
+    unexplained: float | None
+    """Share of what is above the floor that is left; None where nothing is."""
+
+    @property
+    def highest(self) -> float:
+        """The largest of the three."""
+        return max(self.before, self.after or 0.0, self.floor)
+
+
+def budget(verdict: dict[str, Any]) -> list[Bar]:
+    """Return a bar for each joint; what takes away from an error lies left of zero."""
+    found = []
+    for joint, shares in verdict["error_budget"].items():
+        left = right = 0.0
+        segments = []
+        causes = [key for key in shares if key not in SHARES]
+        for key, share in shares.items():
+            start = right if share >= 0 else left
+            tone = SHARES[key][1] if key in SHARES else f"cause{1 + causes.index(key) % CAUSES}"
+            segments.append(
+                Segment(key, share_in_words(key), tone, min(start, start + share), max(start, start + share), share)
+            )
+            right, left = (right + share, left) if share >= 0 else (right, left + share)
+        found.append(Bar(joint, torque_unit(verdict, joint), tuple(segments)))
+    return found
+
+
+def falls(verdict: dict[str, Any]) -> list[Fall]:
+    """Return each joint's error before and after."""
+    named = bool(verdict["causes"])
+    return [
+        Fall(
+            joint,
+            torque_unit(verdict, joint),
+            before,
+            verdict["extended_rmse_nm"][joint] if named else None,
+            verdict["noise_floor_nm"][joint],
+            verdict["unexplained"][joint],
+        )
+        for joint, before in verdict["baseline_rmse_nm"].items()
+    ]
+
+
+def torque_unit(verdict: dict[str, Any], joint: str) -> str:
+    """Return the unit of a joint's torque or force."""
+    return verdict.get("units", {}).get(joint, {}).get("torque", "N·m")
+
+
+def share_in_words(key: str) -> str:
+    """Say what a share of the error is."""
+    return SHARES[key][0] if key in SHARES else label_in_words(key)
+
+
+def label_in_words(label: str) -> str:
+    """Return ``cogging@knee`` as a sentence says it; an effect that is not known here by its name."""
+    try:
+        return in_words(effect_labelled(label))
+    except InputError:
+        name, _, joint = label.partition("@")
+        return name.replace("_", " ") + (f" at the {joint}" if joint else "")
+
+
+def cause_label(cause: dict[str, Any]) -> str:
+    """Return the label of a cause in the verdict."""
+    return f"{cause['effect']}@{cause['joint']}" if cause["joint"] else cause["effect"]
+
+
+def causes_in_words(causes: Sequence[dict[str, Any]]) -> str:
+    """Return the causes of a verdict, most probable first."""
+    return " and ".join(label_in_words(cause_label(cause)) for cause in causes)

@@ -1,0 +1,45 @@
+"""The excitation: how good it is, what it was to bring, and how near its bounds it comes."""
+
+from dataclasses import dataclass
+from math import pi
+from typing import Any
+
+from pipelines.report.numbers import digits
+from pipelines.report.session import Artifact, Session
+
+NUMBERS = {
+    "condition": "condition number",
+    "scaled_condition": "of unit columns",
+    "log_det": "log det",
+}
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """A ``trajectory/1`` file as the page shows it."""
+
+    file: str
+    about: str
+    margins: tuple[dict[str, Any], ...]
+    """Each with joint, quantity, unit, low, high, lowest, highest and margin."""
+    errors: tuple[tuple[str, float], ...]
+    """Standard error foreseen of each parameter."""
+
+
+def excitations(session: Session) -> list[Excitation]:
+    """Return every excitation of a session."""
+    return [_excitation(session, one) for one in session.of_kind("trajectory")]
+
+
+def _excitation(session: Session, artifact: Artifact) -> Excitation:
+    about = artifact.metadata
+    told = [f"{words} {digits(about[key])}" for key, words in NUMBERS.items() if about.get(key) is not None]
+    if about.get("a") and about.get("omega_rad_s"):
+        base_hz = about["omega_rad_s"] / (2 * pi)
+        told.insert(0, f"{len(about['a'][0])} harmonics of {digits(base_hz)} Hz")
+    return Excitation(
+        session.shown(artifact.path),
+        ", ".join(told),
+        tuple(about.get("margins") or ()),
+        tuple((about.get("standard_errors") or {}).items()),
+    )

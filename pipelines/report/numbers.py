@@ -1,0 +1,38 @@
+"""Numbers as text: as many digits as they deserve."""
+
+from math import floor, isfinite, log10
+
+DIGITS = 3
+"""Significant ones, where nothing says how sure a number is."""
+OF_HALF = 2
+"""Significant digits of half an interval that its middle and ends are written to."""
+PLAIN = (1e-4, 1e6)
+"""Sizes between which a number is written without a power of ten."""
+
+
+def digits(value: float | None) -> str:
+    """Return a number with three significant digits, a dash for none."""
+    if value is None or not isfinite(value):
+        return "–"
+    return _written(value, _decimals(value, DIGITS))
+
+
+def beside(value: float, half: float | None) -> str:
+    """Return a number to two digits of half its interval; as ``digits`` does where that has no width."""
+    if not half or not isfinite(half):
+        return digits(value)
+    return _written(value, _decimals(half, OF_HALF))
+
+
+def _decimals(value: float, significant: int) -> int:
+    return 0 if value == 0 else significant - 1 - floor(log10(abs(value)))
+
+
+def _written(value: float, decimals: int) -> str:
+    if value != 0 and not PLAIN[0] <= abs(value) < PLAIN[1]:
+        text = f"{value:.{DIGITS - 1}e}"
+    else:
+        text = f"{round(value, decimals):.{max(decimals, 0)}f}"
+    if text.startswith("-"):
+        return f"−{text[1:]}" if float(text) else text[1:]
+    return text

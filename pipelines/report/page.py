@@ -1,0 +1,129 @@
+"""One HTML file that needs nothing else: style, scripts and data are in it, and no text of a file can be a script."""
+
+import base64
+import hashlib
+import json
+import re
+from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import jinja2
+import numpy as np
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from pipelines import __version__
+from pipelines.report.animation import Animation
+from pipelines.report.chart import Chart
+from pipelines.report.numbers import beside, digits
+
+LARGEST_BYTES = 5_000_000
+"""Of a page."""
+VALUES = 600_000
+"""Numbers in all charts of a page: four bytes each, four thirds of that as text, and room for the words."""
+
+ASSETS = files("pipelines.report").joinpath("assets")
+
+
+def render(template: str, drawn: Iterable[Chart], moving: Iterable[Animation], told: Mapping[str, Any]) -> str:
+    """Return a page as text; ``told`` is what its template shows, all of which is escaped."""
+    style = asset("uPlot.min.css") + asset("page.css")
+    scripts = [asset("uPlot.iife.min.js"), asset("page.js")]
+    data = {
+        "charts": {chart.key: _chart(chart) for chart in drawn},
+        "animations": [_animation(one) for one in moving],
+    }
+    return (
+        _environment()
+        .get_template(template)
+        .render(
+            told,
+            style=Markup(style),
+            style_hash=_digest(style),
+            scripts=[Markup(script) for script in scripts],
+            script_hashes=[_digest(script) for script in scripts],
+            data=Markup(_in_a_script(data)),
+            uplot_version=_uplot_version(scripts[0]),
+            uplot_license=Markup(asset("uPlot.LICENSE")),
+            version=__version__,
+            made=f"Made by exoid {__version__} on {datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
+        )
+    )
+
+
+@cache
+def asset(name: str) -> str:
+    """Return a file of the page."""
+    return ASSETS.joinpath(name).read_text(encoding="utf-8")
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.FunctionLoader(asset),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"digits": digits, "beside": beside}
+    return environment
+
+
+def _digest(text: str) -> str:
+    """Return how a content security policy names an inline script or style: what is not named does not run."""
+    return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
+
+
+def _uplot_version(script: str) -> str:
+    found = re.search(r"uPlot \(v([\d.]+)\)", script)
+    assert found
+    return found[1]
+
+
+def _in_a_script(data: Any) -> str:
+    """Return JSON that stays inside its script element whatever a text in it holds."""
+    text = json.dumps(data, ensure_ascii=True, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _chart(chart: Chart) -> dict[str, Any]:
+    return {
+        "x_label": chart.x_label,
+        "x": coded(chart.x, np.float64),
+        "group": chart.group,
+        "panels": [
+            {
+                "label": panel.label,
+                "band": panel.band,
+                "reach": panel.reach,
+                "series": [
+                    {"label": s.label, "role": s.role, "mark": s.mark, "values": coded(s.values, np.float32)}
+                    for s in panel.series
+                ],
+            }
+            for panel in chart.panels
+        ],
+    }
+
+
+def _animation(one: Animation) -> dict[str, Any]:
+    return {
+        "kind": one.kind,
+        "lengths": one.lengths,
+        "time": coded(one.time, np.float64),
+        "angles": {role: coded(values, np.float32) for role, values in one.angles.items()},
+    }
+
+
+def coded(values: NDArray, dtype: type[np.floating]) -> str:
+    """Return numbers as base64 of their little-endian bytes, row by row."""
+    return base64.b64encode(np.ascontiguousarray(values, np.dtype(dtype).newbyteorder("<")).tobytes()).decode()
+
+
+def indented(settings: Mapping[str, Any]) -> str:
+    """Return settings as indented JSON, to be read."""
+    return json.dumps(settings, indent=1, ensure_ascii=False)

@@ -1,0 +1,204 @@
+"""Where everything on the page comes from: files, hashes, settings, and the command lines that make them again."""
+
+import shlex
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pipelines.report.session import Artifact, Session, simulated
+from pipelines.settings import Experiment
+
+SECTIONS = ("mechanism", "design", "filter", "identify", "simulate")
+"""Sections of exoid.toml that a stage's file repeats; runs and rigs stand in the recordings."""
+
+
+@dataclass(frozen=True)
+class Input:
+    """One file that another was computed from."""
+
+    name: str
+    sha256: str
+    state: str
+    """``found`` (the same bytes are in the session), ``changed`` (other bytes of that name are), or ``elsewhere``."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """One file and what it was made of."""
+
+    file: str
+    contract: str
+    created_by: str
+    created_at: str
+    sha256: str
+    inputs: tuple[Input, ...]
+
+
+def origins(session: Session) -> list[Origin]:
+    """Return every file of a session, oldest first."""
+    rows = [
+        Origin(
+            session.shown(one.path),
+            one.contract,
+            str(one.metadata.get("created_by") or "unknown"),
+            str(one.metadata.get("created_at") or ""),
+            one.sha256,
+            tuple(_input(session, told) for told in one.inputs),
+        )
+        for one in session.artifacts
+    ]
+    return sorted(rows, key=lambda origin: (origin.created_at, origin.file))
+
+
+def _input(session: Session, told: dict[str, str]) -> Input:
+    if any(one.sha256 == told["sha256"] for one in session.artifacts):
+        state = "found"
+    else:
+        state = "changed" if any(one.path.name == told["name"] for one in session.artifacts) else "elsewhere"
+    return Input(told["name"], told["sha256"], state)
+
+
+def stale(session: Session) -> list[str]:
+    """Return a sentence for each file that was made of another version of what the session holds."""
+    return [
+        f"{origin.file} was made of another version of {one.name} than the one here"
+        for origin in origins(session)
+        for one in origin.inputs
+        if one.state == "changed"
+    ]
+
+
+def settings(session: Session) -> dict[str, dict[str, Any]]:
+    """Return every section of the settings that the files were made with, as they were resolved."""
+    found: dict[str, dict[str, Any]] = {}
+    for artifact in session.artifacts:
+        found |= resolved(artifact)
+    return {name: found[name] for name in SECTIONS if name in found}
+
+
+def resolved(artifact: Artifact) -> dict[str, dict[str, Any]]:
+    """Return the sections that one file's ``config`` tells, by name; those that are no section are left out."""
+    config = artifact.metadata.get("config") or {}
+    return {name: config[name] for name in SECTIONS if isinstance(config.get(name), dict)}
+
+
+def changed_settings(session: Session) -> list[str]:
+    """Return a sentence for each file whose settings are no longer those of the session's exoid.toml."""
+    if session.config is None:
+        return []
+    now = Experiment.load(session.config)
+    return [
+        f"{session.shown(one.path)} was made with another [{name}] than {session.config.name} has now"
+        for one in session.artifacts
+        for name, told in resolved(one).items()
+        if any(told[key] != value for key, value in getattr(now, name).model_dump(mode="json").items() if key in told)
+    ]
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command line, and the files that it makes."""
+
+    line: str
+    needs_settings: bool
+    """Whether an exoid.toml is named that the session was not told of."""
+
+
+def commands(session: Session) -> list[Command]:
+    """Return the command lines that make the session's files again, in their order."""
+    found = [made for kind in _MADE_BY for one in session.of_kind(kind) if (made := _MADE_BY[kind](session, one))]
+    lines = dict.fromkeys((shlex.join(["exoid", *words]), needs) for words, needs in found)
+    return [Command(line, needs) for line, needs in lines]
+
+
+Words = tuple[list[str], bool]
+
+
+def _config(session: Session, artifact: Artifact, *, always: bool = False) -> Words:
+    """Return the option that names the settings; none where the defaults do."""
+    if session.config:
+        return ["--config", str(session.config)], False
+    defaults = Experiment()
+    usual = all(told == getattr(defaults, name).model_dump(mode="json") for name, told in resolved(artifact).items())
+    return ([], False) if usual and not always else (["--config", "exoid.toml"], True)
+
+
+def _path_of(session: Session, told: dict[str, str]) -> str:
+    same = [one for one in session.artifacts if one.sha256 == told["sha256"]]
+    return str(same[0].path) if same else told["name"]
+
+
+def _inputs(session: Session, artifact: Artifact) -> list[str]:
+    return [_path_of(session, told) for told in artifact.inputs]
+
+
+def _folder(path: Path) -> str:
+    return f"{path.parent}/"
+
+
+def _design(session: Session, artifact: Artifact) -> Words | None:
+    config, needs = _config(session, artifact)
+    return ["design", *config, "-o", str(artifact.path)], needs
+
+
+def _record(session: Session, artifact: Artifact) -> Words | None:
+    inputs = _inputs(session, artifact)
+    if "imported" in artifact.metadata:
+        maps = [name for name in inputs if name.endswith(".toml")]
+        sources = [name for name in inputs if name not in maps]
+        return ["import", *sources, *(["--map", maps[0]] if maps else []), "-o", _folder(artifact.path)], False
+    run = (artifact.metadata.get("config") or {}).get("run") or {}
+    if not run or not inputs:
+        return None
+    config, needs = _config(session, artifact, always=True)
+    return ["acquire", *config, "--run", run["name"], "--trajectory", inputs[0], "-o", str(artifact.path)], needs
+
+
+def _filter(session: Session, artifact: Artifact) -> Words | None:
+    config, needs = _config(session, artifact)
+    return ["filter", *_inputs(session, artifact), *config, "-o", str(artifact.path)], needs
+
+
+def _identify(session: Session, artifact: Artifact) -> Words | None:
+    if artifact is session.extended:
+        return None  # the diagnosis's
+    config, needs = _config(session, artifact)
+    return ["identify", *_inputs(session, artifact), *config, "-o", _folder(artifact.path)], needs
+
+
+def _diagnose(session: Session, artifact: Artifact) -> Words | None:
+    config, needs = _config(session, artifact)
+    return ["diagnose", *_inputs(session, artifact), *config, "--out", _folder(artifact.path)], needs
+
+
+def _simulate(session: Session, artifact: Artifact) -> Words | None:
+    inputs = _inputs(session, artifact)
+    what = simulated(artifact)
+    if what == "drives" or not inputs:
+        return None  # written beside the replay in windows
+    config, needs = _config(session, artifact)
+    if what == "windows":
+        return ["simulate", inputs[0], "--replay", inputs[-1], *config, "-o", str(artifact.path)], needs
+    reference = ["--reference", inputs[1]] if len(inputs) > 1 else []
+    run = artifact.metadata.get("plant", {}).get("run", "with_human")
+    which = [] if run == "with_human" else ["--run", run]
+    return ["simulate", inputs[0], *reference, *which, *config, "-o", _folder(artifact.path)], needs
+
+
+_MADE_BY = {
+    "trajectory": _design, "recording": _record, "motion": _filter, "parameters": _identify, "verdict": _diagnose,
+    "simulation": _simulate,
+}  # fmt: skip
+"""By contract, in the order of an experiment: the words of the command that makes such a file."""
+
+
+def digests(session: Session) -> Iterator[tuple[str, str]]:
+    """Yield name and SHA-256 of every file that went into the session and is not in it, once each."""
+    seen = {
+        (one.name, one.sha256)
+        for origin in origins(session)
+        for one in origin.inputs
+        if one.state == "elsewhere"
+    }  # fmt: skip
+    yield from sorted(seen)

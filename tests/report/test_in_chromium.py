@@ -1,0 +1,172 @@
+"""The page in a real browser, opened from its file, without a network."""
+
+import pytest
+
+from pipelines.report.report import report
+from pipelines.report.session import find
+from tests.report.sessions import (
+    AXIS,
+    write_parameters,
+    write_recording,
+    write_replay,
+    write_residuals,
+    write_session,
+    write_verdict,
+)
+
+DRAWN = """key => exoid.plots.get(key).map(u => {
+    const all = u.ctx.getImageData(0, 0, u.ctx.canvas.width, u.ctx.canvas.height).data;
+    const colours = new Set();
+    for (let i = 0; i < all.length; i += 4)
+        if (all[i + 3]) colours.add((all[i] << 16) | (all[i + 1] << 8) | all[i + 2]);
+    return colours.size;
+})"""
+RANGE = "key => { const s = exoid.plots.get(key)[0].scales.x; return [s.min, s.max]; }"
+
+
+def draw_all(page):
+    page.evaluate("exoid.drawAll()")
+    page.wait_for_function("[...exoid.plots.values()].flat().every(u => u.status === 1)")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_page_loads_without_a_complaint_and_every_chart_is_drawn(opened, page_file, scheme):
+    with opened(page_file, color_scheme=scheme) as page:
+        draw_all(page)
+        keys = page.evaluate("Object.keys(exoid.data.charts)")
+        assert len(keys) > 10
+        for key in keys:
+            assert all(colours > 5 for colours in page.evaluate(DRAWN, key)), key
+
+
+def test_dragging_zooms_every_chart_of_the_run_and_a_double_click_shows_all_again(opened, page_file):
+    with opened(page_file) as page:
+        draw_all(page)
+        first, second = "torque-with_human_validate-hip", "angle-with_human_validate-knee"
+        whole = page.evaluate(RANGE, first)
+        over = page.locator(f'[data-chart="{first}"] .u-over').first
+        over.scroll_into_view_if_needed()
+        box = over.bounding_box()
+        page.mouse.move(box["x"] + 0.25 * box["width"], box["y"] + 60)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 60, steps=5)
+        page.mouse.up()
+        span = whole[1] - whole[0]
+        for key in (first, second):
+            low, high = page.evaluate(RANGE, key)
+            assert low == pytest.approx(whole[0] + 0.25 * span, abs=0.02 * span)
+            assert high == pytest.approx(whole[0] + 0.5 * span, abs=0.02 * span)
+        over.dblclick()
+        assert page.evaluate(RANGE, first) == pytest.approx(whole)
+
+
+def test_buttons_zoom_without_a_mouse(opened, page_file):
+    with opened(page_file) as page:
+        draw_all(page)
+        key = "torque-with_human_validate-hip"
+        whole = page.evaluate(RANGE, key)
+        tools = page.locator("[data-zoom='with_human_validate.parquet']")
+        tools.get_by_role("button", name="show less").press("Enter")
+        low, high = page.evaluate(RANGE, key)
+        assert high - low == pytest.approx((whole[1] - whole[0]) / 2)
+        tools.get_by_role("button", name="show the whole run").press("Enter")
+        assert page.evaluate(RANGE, key) == pytest.approx(whole)
+
+
+@pytest.mark.parametrize("width", [360, 390, 768, 1280, 1920])
+def test_nothing_sticks_out_of_the_screen(opened, page_file, width):
+    with opened(page_file, width=width) as page:
+        draw_all(page)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_the_verdict_stands_on_the_first_screen(opened, page_file):
+    with opened(page_file, width=1280, height=860) as page:
+        for text in ("The simulation misses cogging at the knee", "Missing from the simulation", "noise floor"):
+            assert page.get_by_text(text).first.bounding_box()["y"] < 860
+
+
+def test_a_printed_page_shows_every_chart_on_white(opened, page_file):
+    with opened(page_file, color_scheme="dark") as page:
+        page.evaluate("dispatchEvent(new Event('beforeprint'))")
+        page.wait_for_function("exoid.plots.size === Object.keys(exoid.data.charts).length")
+        assert page.evaluate("[...document.querySelectorAll('details')].every(d => d.open)")
+        paper = page.evaluate("getComputedStyle(document.documentElement).getPropertyValue('--paper')")
+        assert paper.strip() == "#ffffff"
+        page.evaluate("dispatchEvent(new Event('afterprint'))")
+        assert page.evaluate("document.documentElement.dataset.theme") is None
+        assert len(page.pdf(format="A4")) > 50_000
+
+
+def test_the_leg_moves(opened, page_file):
+    picture = "document.querySelector('[data-stage] canvas').toDataURL()"
+    with opened(page_file) as page:
+        stage = page.locator("[data-stage]").first
+        stage.scroll_into_view_if_needed()
+        before = page.evaluate(picture)
+        stage.get_by_role("button", name="Play").click()
+        page.wait_for_timeout(400)
+        stage.get_by_role("button", name="Pause").click()
+        assert page.evaluate(picture) != before
+        assert float(stage.locator("output").inner_text().split()[0]) > 0.1
+
+
+EVIL = "</script><script>alert('broken in')</script><img src=x onerror=alert(1)>\"'{{7*7}}"
+
+
+def test_text_from_a_hostile_file_is_shown_and_never_run(opened, tmp_path):
+    folder = write_session(tmp_path / "<b>leg", rig=EVIL, subject=EVIL, session=EVIL, abort=EVIL)
+    write_verdict(folder, summary=EVIL, caveats=[EVIL], status=EVIL)
+    page_file = tmp_path / "report.html"
+    page_file.write_text(report(find([folder]), title=EVIL), encoding="utf-8")
+    with opened(page_file) as page:
+        draw_all(page)
+        assert page.title().startswith(EVIL)
+        assert page.locator(".lead").inner_text() == EVIL
+        assert page.locator("img").count() == 0
+        assert page.locator("script").count() == 3
+
+
+def test_even_a_script_that_got_in_would_not_run(opened, chromium, page_file, tmp_path):
+    broken = tmp_path / "broken.html"
+    text = page_file.read_text(encoding="utf-8")
+    broken.write_text(text.replace("</main>", "<script>document.title = 'broken in'</script></main>"), encoding="utf-8")
+    page = chromium.new_page()
+    page.goto(broken.as_uri())
+    assert page.title() != "broken in"
+    page.close()
+
+
+def test_a_million_samples_stay_fluid_and_a_spike_among_them_is_seen(opened, tmp_path):
+    recording = write_recording(tmp_path, AXIS)
+    baseline, extended = (write_parameters(tmp_path, AXIS, extended=which) for which in (False, True))
+    write_residuals(tmp_path, AXIS, seconds=1000.0)
+    write_verdict(tmp_path, AXIS)
+    for parameters in (baseline, extended):
+        write_replay(tmp_path, parameters, recording, AXIS, seconds=1000.0, rate_hz=1000.0, spike=654_321)
+    text = report(find([tmp_path]))
+    assert len(text.encode()) < 5_000_000
+    page_file = tmp_path / "report.html"
+    page_file.write_text(text, encoding="utf-8")
+    with opened(page_file) as page:
+        draw_all(page)
+        key = "angle-with_human_validate-axis"
+        assert "1,000,000 rows" in page.locator(f'[data-chart="{key}"] figcaption').inner_text()
+        at = page.evaluate("k => { const u = exoid.plots.get(k)[1], y = u.data[1];"
+                           "return u.data[0][y.indexOf(Math.max(...y.filter(v => v !== null)))]; }", key)  # fmt: skip
+        assert at == pytest.approx(654.321)
+        # Median of zooms to ever other places, all charts of the run together, drawing included.
+        took = page.evaluate(
+            """async key => {
+                const u = exoid.plots.get(key)[0], times = [];
+                for (let k = 0; k < 15; k++) {
+                    const begin = performance.now();
+                    u.setScale('x', { min: 40 * k, max: 40 * k + 300 });
+                    await Promise.resolve();
+                    times.push(performance.now() - begin);
+                }
+                return times.sort((a, b) => a - b)[7];
+            }""",
+            key,
+        )
+        assert took < 200
