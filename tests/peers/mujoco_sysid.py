@@ -7,6 +7,7 @@ as the torques can tell apart.
 
 import contextlib
 import io
+import re
 import time
 from dataclasses import dataclass
 
@@ -101,7 +102,7 @@ def identify(log: Log, given: Given) -> Answer:
     return Answer(
         "MuJoCo sysid", given.to_leg(own, log.length), list(PARAMETERS), own, half_width,
         lambda truth: given.from_leg(truth, log.length), time.process_time() - begun,
-        [f"{i['title']}: {i['message']}" for i in insights],
+        [re.sub("</?b>", "", f"{i['title']}: {i['message']}") for i in insights],  # it writes HTML
     )  # fmt: skip
 
 
