@@ -9,6 +9,8 @@ import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 from rich.console import Console as RichConsole
@@ -49,7 +51,23 @@ class Console:
     def say(self, text: str | Text) -> None:
         """Print a sentence of result for a person."""
         if self.speaks:
-            self.out.print(text if isinstance(text, Text) else Text(text), soft_wrap=True)
+            # A terminal would break words; a pipe, and whoever searches in it, wants lines as they are.
+            self.out.print(text if isinstance(text, Text) else Text(text), soft_wrap=not self.out.is_terminal)
+
+    def note(self, text: str) -> None:
+        """Print what is to be said of the line above, set in and broken between words."""
+        hanging = "    " if text.startswith("- ") else "  "
+        for line in wrap(
+            text, self.out.width, initial_indent="  ", subsequent_indent=hanging,
+            break_long_words=False, break_on_hyphens=False,
+        ):  # fmt: skip
+            self.say(line)
+
+    def wrote(self, folder: Path, *names: str) -> None:
+        """Print what was written into a folder, after the results."""
+        self.say("")
+        self.say(f"{folder.as_posix()}/:")
+        self.note(", ".join(names))
 
     def table(
         self, headings: Sequence[str], rows: Iterable[Sequence[Any]], *, title: str | None = None, numbers: str = ""
@@ -58,12 +76,17 @@ class Console:
         if not self.speaks:
             return
         right = {name.strip() for name in numbers.split(",") if name.strip()}
-        table = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False)
+        if title:
+            self.say(Text(title, style="bold"))
+        table = Table(box=None, pad_edge=False)
         for heading in headings:
             table.add_column(heading, justify="right" if heading in right else "left", overflow="fold")
         for row in rows:
             table.add_row(*(Text("" if cell is None else str(cell)) for cell in row))
-        self.out.print(table)
+        with self.out.capture() as captured:
+            self.out.print(table)
+        # The last column is filled up with spaces, which nobody wants who copies from it.
+        self.out.file.write("".join(f"{line.rstrip()}\n" for line in captured.get().splitlines()))
 
     def emit(self, data: Any) -> None:
         """Print a result for a program, where ``--json`` asked for it."""
@@ -83,7 +106,10 @@ class Console:
 
     def say_command(self, words: Sequence[str], why: str) -> None:
         """Print a command that is about to be called, as a shell would take it, and why."""
-        self.say(Text.assemble((shlex.join(words), "bold"), f"\n  {why}" if why else ""))
+        if self.speaks:
+            self.out.print(Text(shlex.join(words), style="bold"), soft_wrap=True)  # to be copied in one piece
+            if why:
+                self.note(why)
 
     def warn(self, text: str) -> None:
         """Print a warning, in every mode."""

@@ -67,13 +67,14 @@ def _evaluate(file: Path, settings: Any, geometry: Any) -> None:
     found = quality(read_trajectory(file), settings, geometry)
     console.emit({"file": str(file), **found.as_metadata()})
     _show(str(file), found)
+    console.say(f"\n{file}: {settings.criterion} {found.value(settings.criterion):.4g}")
 
 
 def _design(output: Path, settings: Any, geometry: Any, mechanism: dict[str, Any]) -> None:
     from pipelines.contracts import TRAJECTORY, describe
     from pipelines.design.excitation import design
 
-    with console.progress("Designing", total=1.0) as report:
+    with console.progress("designing", total=1.0) as report:
         found = design(settings, geometry, report)
     config = {"design": settings.model_dump(mode="json"), "geometry": vars(geometry)} | mechanism
     TRAJECTORY.write(output, found.frame(), found.metadata() | describe(config=config))
@@ -83,15 +84,14 @@ def _design(output: Path, settings: Any, geometry: Any, mechanism: dict[str, Any
             "raise design.seconds"
         )
     console.emit({"file": str(output), **found.metadata()})
+    _show(str(output), found.quality)
     console.say(
-        f"{output}: {settings.criterion} {found.quality.value(settings.criterion):.4g}, {settings.harmonics} "
+        f"\n{output}: {settings.criterion} {found.quality.value(settings.criterion):.4g}, {settings.harmonics} "
         f"harmonics, period {found.trajectory.period_s:g} s, seed {settings.seed}; stopped by {found.stopped_by}"
     )
-    _show(str(output), found.quality)
 
 
 def _show(file: str, found: "Quality") -> None:
-    console.say("")
     console.table(
         ("how well the regressor is conditioned", "value"),
         [

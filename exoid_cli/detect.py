@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from exoid_cli.console import console
+from exoid_cli.place import ConfigOption, place_of, settings_in_force
 
 if TYPE_CHECKING:
     from pipelines.diagnosis.detect import Detectable
@@ -15,14 +16,17 @@ if TYPE_CHECKING:
 
 def detect(
     files: Annotated[
-        list[Path], typer.Argument(help="One excitation (TOML or trajectory/1), or recordings or motions of one rig.")
-    ],
+        list[Path] | None,
+        typer.Argument(
+            metavar="FILE",
+            help="One excitation (TOML or trajectory/1), or recordings or motions of one rig.",
+            show_default="trajectory.parquet",
+        ),
+    ] = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Folder for detectability.json and the figure.")
     ] = None,
-    config: Annotated[
-        Path | None, typer.Option("--config", help="exoid.toml; [design.noise], [filter], [mechanism].")
-    ] = None,
+    config: ConfigOption = None,
     rig: Annotated[
         Path | None, typer.Option("--rig", help="A virtual rig's file: the leg that an excitation would move.")
     ] = None,
@@ -33,17 +37,20 @@ def detect(
 ) -> None:
     """Say how large each cause must be to be seen with this motion and noise, and which causes look alike.
 
-    Examples: exoid detect trajectory.parquet -o detectable/,
-    exoid detect recordings/*.parquet --power 0.95
+    \b
+    Examples:
+      exoid detect
+      exoid detect trajectory.toml -o detectable/
+      exoid detect recordings/*.parquet --power 0.95
     """
     from pipelines.contracts.atomic import open_folder, write_text
     from pipelines.diagnosis.detect import as_json
-    from pipelines.settings import Experiment
 
-    experiment = Experiment.load(config) if config else Experiment()
+    files = files or [place_of(config, lacking="no excitation is given").step("design").target]
+    experiment = settings_in_force(config)
     if output:
         open_folder(output)
-    with console.progress("Looking", total=1.0) as report:
+    with console.progress("looking", total=1.0) as report:
         if _is_trajectory(files):
             found = _planned(files, experiment, rig, runs, power, report)
         else:
@@ -56,6 +63,8 @@ def detect(
         draw(found, output / "detectability", f"What {', '.join(file.name for file in files)} would reveal")
     console.emit(told)
     _show(found)
+    if output:
+        console.wrote(output, "detectability.json", "detectability.png")
 
 
 def _is_trajectory(files: Sequence[Path]) -> bool:

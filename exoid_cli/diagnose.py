@@ -2,16 +2,14 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
 from exoid_cli.console import console
 from exoid_cli.place import ConfigOption, place_of, settings_in_force
 from exoid_cli.steps import AgainOption, only
-
-if TYPE_CHECKING:
-    from pipelines.mechanics.machine import Machine
+from exoid_cli.verdict_view import show_verdict
 
 
 def diagnose(
@@ -89,62 +87,8 @@ def diagnose(
         draw(found, said, output)
     write_text(output / "verdict.json", json.dumps(said | {"provenance": shared}, indent=1, ensure_ascii=False) + "\n")
     console.emit(said)
-    _show(said, motions[0].machine, output)
-    if figures:
-        console.say(f"figures: {', '.join(f'{name}.png' for name in FIGURES)}")
-
-
-def _show(said: dict[str, Any], machine: "Machine", output: Path) -> None:
-    console.say(said["summary"])
-    for caveat in said["caveats"]:
-        console.say(f"But {caveat}.")
-    console.say("")
-    first, digits = machine.joints[0], ".3f" if machine.is_exoskeleton else ".4g"
-    told = ("noise_floor_nm", "baseline_rmse_nm", "extended_rmse_nm")
-    console.table(
-        ("joint", "noise floor", "rigid + friction", "with the causes", "excess left"),
-        [
-            (joint, *(f"{said[key][joint]:{digits}}" for key in told),
-             "at the floor" if said["unexplained"][joint] is None else f"{said['unexplained'][joint]:.0%}")
-            for joint in machine.names
-        ],
-        title=f"{first.effort} error on runs no fit has seen, {first.unit('torque')}",
-        numbers="noise floor, rigid + friction, with the causes, excess left",
-    )  # fmt: skip
-    if said["causes"]:
-        console.say(_control(said["control"]))
-    for cause in said["causes"]:
-        where = f" at the {cause['joint']}" if cause["joint"] else ""
-        console.say(f"\n{cause['effect']}{where} ({cause['side']}), probability {cause['probability']:.2f}")
-        for p in cause["parameters"]:
-            console.say(f"  {_in_words(p)}")
-        for sentence in cause["evidence"]:
-            console.say(f"  - {sentence}")
-        for tie in cause["indistinguishable_from"]:
-            other = f"{tie['effect']}@{tie['joint']}" if tie["joint"] else tie["effect"]
-            console.say(f"  or {other}: {tie['why']}; {tie['how_to_separate']}")
-    console.say(f"\n{output}: verdict.json, parameters, residuals, candidates, detectability.json")
-
-
-def _in_words(parameter: dict[str, Any]) -> str:
-    """Return a parameter with its interval; what was assumed, or chosen among a few values, has none."""
-    low, high = parameter["ci95"]
-    unit = "" if parameter["unit"] == "1" else f" {parameter['unit']}"
-    sure = "taken, not fitted" if low == high else f"{low:.4g} … {high:.4g}"
-    return f"{parameter['name']} {parameter['value']:.4g}{unit} ({sure})"
-
-
-def _control(said: dict[str, Any]) -> str:
-    """Return one line: tracking error and peak torque under adaptive control, without and with the causes."""
-    if said["reason"]:
-        return f"under adaptive control: not compared, {said['reason']}"
-    before, after = said["without"], said["with"]
-    of_joints = [
-        f"{joint} error {1e3 * before['tracking_rmse_rad'][joint]:.2f} -> {1e3 * error:.2f} mrad, "
-        f"peak torque {before['peak_torque_nm'][joint]:.1f} -> {after['peak_torque_nm'][joint]:.1f} N·m"
-        for joint, error in after["tracking_rmse_rad"].items()
-    ]
-    return (
-        "under adaptive control, without -> with the causes: " + "; ".join(of_joints)
-        + " (what each model promises; the one with the causes may well promise worse)"
+    show_verdict(said, motions[0].machine.joints)
+    console.wrote(
+        output, "verdict.json", *(f"{name}.parquet" for name in tables), "detectability.json",
+        *(f"{name}.png" for name in FIGURES if figures),
     )  # fmt: skip

@@ -7,10 +7,15 @@ import typer
 
 from exoid_cli import completion
 from exoid_cli.console import console
+from exoid_cli.place import ConfigOption, place_of, settings_in_force
 
 
 def export(
-    model: Annotated[Path, typer.Argument(help="A parameters/1 file, as `exoid identify` or `diagnose` writes it.")],
+    model: Annotated[
+        Path | None,
+        typer.Argument(metavar="FILE", help="A parameters/1 file.", show_default="identified/parameters.parquet"),
+    ] = None,
+    *,
     to: Annotated[str, typer.Option("--to", help="mjcf, urdf, json, matlab or c.", autocompletion=completion.formats)],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="The file, or a folder for it; beside the model unless given.")
@@ -18,14 +23,13 @@ def export(
     run: Annotated[
         str | None, typer.Option("--run", help="exo_alone, with_human or human; with_human if there are several.")
     ] = None,
-    config: Annotated[
-        Path | None, typer.Option("--config", help="exoid.toml: geometry, where the model does not say its own.")
-    ] = None,
+    config: ConfigOption = None,
 ) -> None:
     """Hand an identified model to MuJoCo, pinocchio, MATLAB, a controller in C, or anything that reads JSON.
 
     \b
-    Example:
+    Examples:
+      exoid export --to urdf
       exoid export diagnosed/parameters.parquet --to mjcf -o leg.xml
     """
     from pipelines.contracts import PARAMETERS
@@ -34,14 +38,14 @@ def export(
     from pipelines.export import FORMATS, exported
     from pipelines.export.exported import values_in_words
     from pipelines.mechanics.read import geometry_from
-    from pipelines.settings import Experiment
     from pipelines.validation import suggestion
 
     formats = {format.name: format for format in FORMATS}
     if to not in formats:
         raise SettingsError(f"--to {to}: there is no such format; {suggestion(to, list(formats))}")
     chosen = formats[to]
-    settings = Experiment.load(config) if config else Experiment()
+    model = model or place_of(config, lacking="no model is given").step("identify").target
+    settings = settings_in_force(config)
     made = exported(PARAMETERS.read(model), run, geometry_from(settings.mechanism))
     path = _path(model, output, chosen.suffix)
     files = {path.with_suffix(suffix): text for suffix, text in chosen.write(made, path.stem).items()}

@@ -71,9 +71,9 @@ def _filter(recording: Path, output: Path, settings: "FilterSettings") -> dict[s
         MOTION.write_pieces(output, found.passing(motion.pieces()), motion.metadata | provenance)
     gaps = "no gap" if found.segments == 1 else f"{found.segments} segments"
     console.say(
-        f"{output}: {found.samples} samples, {gaps}, {found.valid_share:.1%} valid; "
-        f"cut-off {found.cutoff_hz:.1f} Hz ({found.why})"
+        f"{output}: {found.samples} samples, {gaps}, {found.valid_share:.1%} valid, cut-off {found.cutoff_hz:.1f} Hz"
     )
+    console.note(found.why)
     difference = found.velocity_difference
     return {
         "file": str(output),

@@ -1,13 +1,13 @@
 """``exoid identify``: friction from the empty exoskeleton, then inertia with the human."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from exoid_cli import completion
 from exoid_cli.console import console
+from exoid_cli.parameters_view import said, show_parameters
 from exoid_cli.place import ConfigOption, place_of, settings_in_force
 from exoid_cli.steps import AgainOption, only
 
@@ -66,7 +66,8 @@ def identify(
     estimator = estimator_named(method or settings.identify.method)
     runs = read_runs(files, settings.filter, geometry_from(settings.mechanism))
     refuse_another_mechanism(settings.mechanism, runs)
-    found = fit(runs, estimator)
+    with console.working("fitting"):
+        found = fit(runs, estimator)
     config_used = settings.sections("mechanism", "filter") | {
         "identify": settings.identify.changed(method=estimator.name).model_dump(mode="json")
     }
@@ -83,29 +84,23 @@ def identify(
     }
     PARAMETERS.write(output / "parameters.parquet", found.parameters, shared | described)
     left = output / "residuals.parquet"
-    RESIDUALS.write_pieces(left, residuals(runs, found.models, "baseline"), shared)
+    with console.working("predicting every run"):
+        RESIDUALS.write_pieces(left, residuals(runs, found.models, "baseline"), shared)
     if settings.identify.figures:
         from pipelines.identification.figures import draw
 
-        draw(RESIDUALS.scan(left), output)
+        with console.working("drawing"):
+            draw(RESIDUALS.scan(left), output)
     _report(found, runs[0].machine)
-
-
-def _named(row: Mapping[Any, Any]) -> str:
-    joint, run = (row[key] if isinstance(row[key], str) else "" for key in ("joint", "run"))
-    return " ".join(filter(None, (joint, row["symbol"], run)))
+    figures = sorted(path.name for path in output.glob("*.png")) if settings.identify.figures else []
+    console.wrote(output, "parameters.parquet", "residuals.parquet", *figures)
 
 
 def _report(found: "Identified", machine: "Machine") -> None:
-    rows, unit = found.parameters, machine.joints[0].unit("torque")
-
-    def said(value: float, decimals: int = 4) -> str:
-        # So many decimals do for a leg; a servo's inertia would be nought by them.
-        return f"{value:.{decimals}f}" if machine.is_exoskeleton else f"{value:.5g}"
-
+    rows, unit = found.parameters.to_dict("records"), machine.joints[0].unit("torque")
     console.emit(
         {
-            "parameters": rows.to_dict("records"),
+            "parameters": rows,
             "validation": found.validation.as_json(),
             "collinear": found.collinear,
             "unrealizable": found.unrealizable,
@@ -113,27 +108,19 @@ def _report(found: "Identified", machine: "Machine") -> None:
             "remarks": found.remarks,
         }
     )
-    console.table(
-        ("parameter", "value", "95 % interval", "unit", "one step", "step"),
-        [
-            (
-                _named(row),
-                said(row["value"]),
-                f"{said(row['ci95_low'])} … {said(row['ci95_high'])}",
-                row["unit"],
-                said(one),
-                row["step"],
-            )
-            for row, one in zip(rows.to_dict("records"), found.one_step, strict=True)
-        ],
-        numbers="value, one step",
-    )
+    show_parameters(rows, machine.joints, found.one_step.tolist())
     console.say("")
     scores = {**found.validation.by_run, "all": found.validation.pooled}
     console.table(
         ("validation run", "joint", f"RMSE {unit}", "with reversals", f"torque rms {unit}"),
         [
-            (run, joint, said(score.rmse[j], 3), said(score.rmse_unmasked[j], 3), said(score.torque_rms[j], 2))
+            (
+                run,
+                joint,
+                said(score.rmse[j], machine.joints, 3),
+                said(score.rmse_unmasked[j], machine.joints, 3),
+                said(score.torque_rms[j], machine.joints, 2),
+            )
             for run, score in scores.items()
             for j, joint in enumerate(found.validation.joints)
         ],

@@ -11,16 +11,19 @@ from exoid_cli.console import console
 
 
 def init(folder: Annotated[Path, typer.Argument(help="Where the experiment shall live; made if need be.")]) -> None:
-    """Start a new experiment: a commented exoid.toml, the rig's description, and a Makefile.
+    """Start a new experiment: a commented exoid.toml, rigs, and a Makefile.
 
     \b
     Example:
       exoid init my_experiment
-      make -C my_experiment
+      cd my_experiment
+      exoid run
     """
     from pipelines.settings.template import create
 
     command = Path(sys.argv[0])
     words = [str(command.resolve())] if command.name == "exoid" else [sys.executable, "-m", "exoid_cli.app"]
     create(folder, exoid=shlex.join(words))
-    console.say(f"{folder}: new experiment; edit {folder / 'exoid.toml'}, then run `make -C {folder}`")
+    written = [folder / name for name in ("exoid.toml", "rigs", "Makefile")]
+    console.emit({"folder": folder, "written": written})
+    console.say(f"{folder}: a new experiment; edit {folder / 'exoid.toml'}, then `cd {folder}` and `exoid run`")

@@ -221,9 +221,9 @@ def leg(hip: float, knee: float) -> NDArray:
 
 def plain_line(progress: "Progress") -> str:
     """Return the progress in a line, for where there is no terminal."""
-    head = f"{progress.state:<10} {progress.time_s:7.1f} of {progress.duration_s:.1f} s"
+    head = f"{progress.state:<10} {progress.time_s:6.1f}/{progress.duration_s:.1f} s"
     if progress.row is not None:
         angles = ", ".join(f"{drive.angle:+.3f}" for drive in progress.row.drives)
         torques = ", ".join(f"{drive.torque:+.1f}" for drive in progress.row.drives)
-        head += f"  angles {angles} rad  torques {torques} N·m  {progress.rate_hz:.0f} Hz  {progress.missed} missed"
+        head += f"  {angles} rad  {torques} N·m  {progress.rate_hz:.0f} Hz  {progress.missed} missed"
     return f"{head}  {progress.abort}" if progress.abort else head

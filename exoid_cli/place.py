@@ -22,11 +22,16 @@ OutOption = Annotated[
 ]
 
 
+def is_experiment() -> bool:
+    """Return whether the current folder is an experiment's."""
+    return Path(NAME).is_file()
+
+
 def settings_in_force(config: Path | None) -> "Experiment":
     """Return the settings in the named file, else in ./exoid.toml, else the defaults."""
     from pipelines.settings import Experiment
 
-    here = config or (Path(NAME) if Path(NAME).is_file() else None)
+    here = config or (Path(NAME) if is_experiment() else None)
     return Experiment.load(here) if here else Experiment()
 
 
@@ -62,7 +67,7 @@ def place_of(config: Path | None, out: Path | None = None, lacking: str = "") ->
     from pipelines.workflow.graph import graph, imported_runs
 
     file = config or Path(NAME)
-    if not config and not file.is_file():
+    if not config and not is_experiment():
         begin = f"{lacking}, and " if lacking else ""
         raise InputError(
             f"{begin}there is no {NAME} in {Path.cwd()}; go to an experiment's folder, name one with --config, "

@@ -8,6 +8,7 @@ import typer
 from exoid_cli.confirm import confirm_move
 from exoid_cli.console import console
 from exoid_cli.operator import Terminal
+from exoid_cli.place import ConfigOption, is_experiment, place_of, settings_in_force
 
 if TYPE_CHECKING:
     from pipelines.acquisition.check.latency import Latency
@@ -20,9 +21,14 @@ DRIVE = {"angle": "angle rad", "velocity": "rad/s", "current": "current A", "tem
 
 
 def check(
-    file: Annotated[Path, typer.Argument(help="The rig's description.")],
-    config: Annotated[Path | None, typer.Option(help="An exoid.toml, for the rate its experiment samples at.")] = None,
-    rate_hz: Annotated[float | None, typer.Option(min=1.0, help="Samples a second that are wanted.")] = None,
+    file: Annotated[
+        Path | None, typer.Argument(metavar="FILE", help="The rig's description.", show_default="that of exoid.toml")
+    ] = None,
+    config: ConfigOption = None,
+    rate_hz: Annotated[
+        float | None,
+        typer.Option(min=1.0, help="Samples a second that are wanted.", show_default="that of exoid.toml, if any"),
+    ] = None,
     run: Annotated[
         Literal["exo_alone", "with_human"],
         typer.Option(help="Whether somebody is in the machine; only an empty one shows its sensors' zeros."),
@@ -39,15 +45,18 @@ def check(
 
     \b
     Examples:
+      exoid rig check
       exoid rig check rigs/real_time.toml --rate-hz 200
       exoid rig check rig.toml --by-hand
     """
     from pipelines.acquisition.check.check import check_rig, refuse_to_move_somebody
     from pipelines.errors import DeviceError
-    from pipelines.settings import Experiment
 
-    if rate_hz is None and config:
-        rate_hz = Experiment.load(config).acquire.sample_rate_hz
+    if file is None:
+        experiment = place_of(config, lacking="no rig file is given").experiment
+        file = experiment.file(experiment.acquire.rig)
+    if rate_hz is None and (config or is_experiment()):
+        rate_hz = settings_in_force(config).acquire.sample_rate_hz
     if run == "with_human":
         refuse_to_move_somebody(by_hand=by_hand, move=move)
     console.say(f"{file}: asking every device")
@@ -140,8 +149,9 @@ def _clock(device: "DeviceReport") -> tuple[str, str]:
 
 
 def _show_rate(what: str, rate: "Rate", wanted_hz: float | None) -> None:
-    wanted = f", wanted {wanted_hz:g}; {rate.late:.1%} of the cycles take longer than a sample" if wanted_hz else ""
-    console.say(f"\nCycles of {what}: {rate.cycles_hz:.0f} a second{wanted}")
+    console.say(f"\nCycles of {what}: {rate.cycles_hz:.0f} a second" + (f", wanted {wanted_hz:g}" if wanted_hz else ""))
+    if wanted_hz:
+        console.note(f"{rate.late:.1%} of them take longer than a sample")
     cycle = rate.cycle
     steps = len(cycle.histogram)
     edges = [cycle.least * (cycle.most / cycle.least) ** (k / steps) * 1e3 for k in range(steps + 1)]

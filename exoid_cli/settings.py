@@ -24,12 +24,13 @@ def options(quiet: QuietOption = False, json: JsonOption = False) -> None:
 
 @settings.command("check", cls=Command, short_help="Say whether an experiment's file can be used.")
 @heeding
-def check(config: Annotated[Path, typer.Argument(help="The experiment's exoid.toml.")]) -> None:
+def check(config: Annotated[Path, typer.Argument(help="The experiment's settings.")] = Path("exoid.toml")) -> None:
     """Say whether an experiment's file can be used; print it complete with --json.
 
     \b
-    Example:
-      exoid settings check exoid.toml
+    Examples:
+      exoid settings check
+      exoid settings check my_experiment/exoid.toml --json
     """
     from pipelines.settings import Experiment
 
@@ -55,3 +56,5 @@ def split(
     from pipelines.workflow.split import split as split_settings
 
     split_settings(Experiment.load(config), out)
+    console.emit({"folder": out, "written": sorted(path.name for path in out.iterdir())})
+    console.say(f"{out}: one file a section, and graph.mk")

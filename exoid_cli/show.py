@@ -1,11 +1,21 @@
 """``exoid show``: what a file is, where it came from, and what is in it."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from exoid_cli.console import console
+
+if TYPE_CHECKING:
+    from pipelines.contracts.inspection import Inspection
+
+HASH = 12
+"""Characters of a hash that are shown: enough to tell two files apart."""
+COLUMNS = 8
+"""Most columns of a table that lists objects."""
+FEW = 6
+"""Elements of a list that are shown."""
 
 
 def show(
@@ -13,37 +23,82 @@ def show(
 ) -> None:
     """Say what an exoid file is, where it came from, and its columns with units and ranges.
 
+    Of a model it shows the parameters, of a verdict what it says.
+
     \b
-    Example:
+    Examples:
       exoid show recordings/with_human_train.parquet
+      exoid show identified/parameters.parquet
+      exoid show diagnosed/verdict.json
     """
     from pipelines.contracts.inspection import inspect
 
     found = inspect(file)
     console.emit(found.as_json())
     console.say(f"{file}: {found.contract}, {found.purpose}")
-    if found.columns:
+    whole = _show_whole(found)
+    if found.columns and not whole:
         headings = ("column", "unit", "type", "min", "max", "nulls")
         rows = [[column[heading] for heading in headings] for column in found.columns]
         console.say(f"\n{found.rows} rows")
         console.table(headings, [_shortened(row) for row in rows], numbers="min, max, nulls")
     _show_facts("Where it came from", _folded(found.origin))
-    _show_facts("Metadata", found.metadata)
+    if not (whole and found.contract.startswith("verdict/")):
+        _show_facts("Metadata", found.metadata)
     if found.fault:
         raise found.fault
 
 
+def _show_whole(found: "Inspection") -> bool:
+    """Show what is short and meant for people as such; return whether it was that."""
+    from pipelines.contracts import PARAMETERS, joints_of
+
+    if found.fault:
+        return False
+    if found.contract == PARAMETERS.label:
+        from exoid_cli.parameters_view import show_parameters
+
+        console.say("")
+        show_parameters(PARAMETERS.read(Path(found.file)).frame.to_dict("records"), joints_of(found.metadata))
+        return True
+    if found.contract.startswith("verdict/") and "causes" in found.metadata:
+        from exoid_cli.verdict_view import show_verdict
+
+        console.say("")
+        show_verdict(found.metadata, joints_of(found.metadata))
+        return True
+    return False
+
+
 def _folded(origin: dict[str, Any]) -> dict[str, Any]:
-    """Say of the settings only that they are there: they are a screenful."""
-    if "config" not in origin:
-        return origin
-    return {**origin, "config": f"{len(_lines({'config': origin['config']}))} settings; --json shows them"}
+    """Say of the settings only that they are there, for they are a screenful; of a hash its beginning."""
+    folded = dict(origin)
+    if "config" in origin:
+        folded["config"] = f"{len(_lines({'config': origin['config']}))} settings; --json shows them"
+    if "inputs" in origin:
+        folded["inputs"] = {entry["name"]: f"sha256 {entry['sha256'][:HASH]}…" for entry in origin["inputs"]} or "none"
+    return folded
 
 
 def _show_facts(title: str, facts: dict[str, Any]) -> None:
-    if facts:
+    tables = {key: value for key, value in facts.items() if _is_table(value)}
+    lines = _lines({key: value for key, value in facts.items() if key not in tables})
+    if lines:
         console.say("")
-        console.table((title, ""), _lines(facts))
+        console.table((title, ""), lines)
+    for key, rows in tables.items():
+        console.say(f"\n{key}")
+        console.table(list(rows[0]), [[_in_short(cell) for cell in row.values()] for row in rows])
+
+
+def _is_table(value: Any) -> bool:
+    """Return whether a value is several objects of the same few keys, none of them nested."""
+    if not (isinstance(value, list) and len(value) > 1 and all(isinstance(row, dict) for row in value)):
+        return False
+    return len(value[0]) <= COLUMNS and all(
+        row.keys() == value[0].keys() and not any(isinstance(cell, dict | list) for cell in row.values())
+        for row in value
+    )
 
 
 def _lines(facts: dict[str, Any], prefix: str = "") -> list[tuple[str, str]]:
@@ -56,8 +111,17 @@ def _lines(facts: dict[str, Any], prefix: str = "") -> list[tuple[str, str]]:
             for number, item in enumerate(value):
                 lines += _lines(item, f"{prefix}{key}[{number}].")
         else:
-            lines.append((f"{prefix}{key}", str(value)))
+            lines.append((f"{prefix}{key}", _in_short(value)))
     return lines
+
+
+def _in_short(value: Any) -> str:
+    if isinstance(value, list) and (len(value) > FEW or any(isinstance(item, list) for item in value)):
+        rows = f"{len(value)} x {len(value[0])}" if isinstance(value[0], list) else str(len(value))
+        return f"{rows} values; --json shows them"
+    if isinstance(value, list):
+        return ", ".join(map(_in_short, value)) or "none"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _shortened(row: list[Any]) -> list[Any]:

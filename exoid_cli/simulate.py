@@ -95,13 +95,15 @@ def _track(table: "Table", run: str, reference: Path | None, settings: "Experime
             "name what to follow with --reference"
         )
     wanted = read_trajectory(reference) if reference else gait()
-    loop = track(plant, chosen, wanted)
+    with console.working("simulating"):
+        loop = track(plant, chosen, wanted)
     if loop.ran_away:
         raise InputError(
             f"{loop.ran_away}: the loop is unstable, or the disturbance stronger than the drives; lower "
             "simulate.adaptation_gain or simulate.disturbance_nm, or shorten simulate.step_s"
         )
-    gains = sweep(plant, chosen, wanted, chosen.sweep_nm_s_rad)
+    with console.working("sweeping the feedback gain"):
+        gains = sweep(plant, chosen, wanted, chosen.sweep_nm_s_rad)
     frame = loop.frame()
     inputs = [path for path in (table.path, reference) if path]
     described = describe(inputs, settings.sections("simulate", "mechanism")) | {
@@ -118,9 +120,10 @@ def _track(table: "Table", run: str, reference: Path | None, settings: "Experime
     if chosen.figures:
         from pipelines.simulation.figures import draw_sweep, draw_tracking
 
-        draw_tracking(frame, plant.joints, output, chosen.torque_limit_nm, chosen.settled_after_s)
-        if len(gains):
-            draw_sweep(gains, plant.joints, output, chosen.feedback_gain_nm_s_rad)
+        with console.working("drawing"):
+            draw_tracking(frame, plant.joints, output, chosen.torque_limit_nm, chosen.settled_after_s)
+            if len(gains):
+                draw_sweep(gains, plant.joints, output, chosen.feedback_gain_nm_s_rad)
     worst = loop.worst_error(chosen.settled_after_s)
     peak = abs(loop.run.torque).max(axis=0)
     names = [joint.name for joint in plant.joints]
@@ -139,7 +142,8 @@ def _track(table: "Table", run: str, reference: Path | None, settings: "Experime
         [(name, f"{e:.4f}", f"{t:.1f}") for name, e, t in zip(names, worst, peak, strict=True)],
         numbers=f"{settled}, {strongest}",
     )
-    console.say(f"{output}: rbf.parquet" + (", kv-sweep.csv" if len(gains) else "") + (", figures" * chosen.figures))
+    drawn = ["tracking.png", "error.png", "torque.png", *["kv-sweep.png"][: len(gains)]] if chosen.figures else []
+    console.wrote(output, "rbf.parquet", *["kv-sweep.csv"][: len(gains)], *drawn)
 
 
 def _replay(table: "Table", recording: Path, settings: "Experiment", output: Path) -> None:
@@ -152,7 +156,8 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
     default = geometry_from(settings.mechanism)
     motion = read_motion(recording, settings.filter, default)
     plant = plant_from_table(table, motion.run, motion.geometry)
-    replayed = replay(plant.model, motion)
+    with console.working(f"replaying {recording.name}"):
+        replayed = replay(plant.model, motion)
     open_loop, closed_loop = recorded.open_loop_frame(replayed, motion, plant.joints), None
     inputs = [path for path in (table.path, recording) if path]
     shared: dict[str, Any] = describe(inputs, settings.sections("filter", "mechanism")) | {
@@ -165,7 +170,8 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
     result: dict[str, Any] = {"simulation_rmse_rad": rmse}
     lacks = recorded.why_no_closed_loop(motion)
     if not lacks:
-        made = recorded.follow_references(plant, motion)
+        with console.working("following the references"):
+            made = recorded.follow_references(plant, motion)
         closed_loop = recorded.closed_loop_frame(made, motion, plant.joints)
         result["closed_loop_rmse_rad"] = dict(zip(names, made.angle_rmse.tolist(), strict=True))
         result["closed_loop_rmse_nm"] = dict(zip(names, made.torque_rmse.tolist(), strict=True))
@@ -176,8 +182,14 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
     if settings.simulate.figures:
         from pipelines.simulation.figures import draw_replay
 
-        draw_replay(open_loop, closed_loop, plant.joints, output.with_suffix(""), f"{recording.stem}, simulated again")
+        with console.working("drawing"):
+            title = f"{recording.stem}, simulated again"
+            draw_replay(open_loop, closed_loop, plant.joints, output.with_suffix(""), title)
     _report_replay(result, plant.joints, lacks)
+    console.wrote(
+        output.parent, output.name, *([] if lacks else [beside.name]),
+        *([output.with_suffix(".png").name] if settings.simulate.figures else []),
+    )  # fmt: skip
     for label, own in plant.model.of_one_run.items():
         console.warn(
             f"{label}: each run has its own {' and '.join(own)}, and {table.path} holds those of one run; "
@@ -194,8 +206,9 @@ def _report_replay(result: dict[str, Any], joints: "tuple[Joint, ...]", lacks: s
     }
     shown = [key for key in headings if key in result]
     console.table(
-        ("RMSE", *(headings[key] for key in shown)),
-        [(joint.name, *(f"{result[key][joint.name]:.5f}" for key in shown)) for joint in joints],
+        ("joint", *(headings[key] for key in shown)),
+        [(joint.name, *(f"{result[key][joint.name]:.4g}" for key in shown)) for joint in joints],
+        title="root mean square of simulated less recorded",
         numbers=", ".join(headings[key] for key in shown),
     )
     if lacks:

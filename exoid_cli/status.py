@@ -37,14 +37,17 @@ def status(config: ConfigOption = None, out: OutOption = None) -> None:
 
 def _line(stage: "Sequence[Judged]", out: Path) -> tuple[str, ...]:
     count = Counter(one.state.value for one in stage)
-    state = next(iter(count)) if len(count) == 1 else ", ".join(f"{n} {word}" for word, n in count.items())
+    state = next(word for word in ("missing", "stale", "done") if count[word])
     reasons = list(dict.fromkeys(reason for one in stage for reason in one.why))
     why = reasons[0] + (f" (and {len(reasons) - 1} more)" if len(reasons) > 1 else "") if reasons else ""
-    return stage[0].step.stage, state, _result([one.step.target.relative_to(out) for one in stage]), why
+    targets = [one.step.target.relative_to(out) for one in stage]
+    return stage[0].step.stage, state, _result(targets, count[state]), why
 
 
-def _result(targets: Sequence[Path]) -> str:
-    return targets[0].as_posix() if len(targets) == 1 else f"{len(targets)} in {targets[0].parent.as_posix()}/"
+def _result(targets: Sequence[Path], counted: int) -> str:
+    if len(targets) == 1:
+        return targets[0].as_posix()
+    return f"{counted} of {len(targets)} in {targets[0].parent.as_posix()}/"
 
 
 def _as_json(one: "Judged") -> dict[str, Any]:

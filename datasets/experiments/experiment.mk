@@ -19,10 +19,10 @@ endif
 
 $(SETTINGS)/graph.mk: $(firstword $(MAKEFILE_LIST)) $(CONFIG) \
     $(wildcard $(dir $(CONFIG))rigs/*.toml $(dir $(CONFIG))../rigs/*.toml)
-	@$(EXOID) settings split $(CONFIG) --out $(SETTINGS)
+	@$(EXOID) settings split $(CONFIG) --out $(SETTINGS) --quiet
 
 $(SETTINGS)/%.json: # only where one was deleted by hand
-	@$(EXOID) settings split $(CONFIG) --out $(SETTINGS)
+	@$(EXOID) settings split $(CONFIG) --out $(SETTINGS) --quiet
 
 all: $(RESULTS)
 

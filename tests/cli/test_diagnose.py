@@ -2,7 +2,7 @@
 
 import pytest
 
-from exoid_cli.diagnose import _in_words
+from exoid_cli.verdict_view import _in_words
 
 
 @pytest.mark.parametrize(

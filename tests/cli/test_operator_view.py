@@ -175,6 +175,6 @@ def test_without_colour_the_same_is_told(monkeypatch):
 
 def test_without_a_terminal_a_line_tells_the_same():
     assert plain_line(progress(knee=-2.08, missed=1)) == (
-        "run           12.3 of 40.0 s  angles +0.500, -2.080 rad  torques +31.0, -4.0 N·m  200 Hz  1 missed"
+        "run          12.3/40.0 s  +0.500, -2.080 rad  +31.0, -4.0 N·m  200 Hz  1 missed"
     )
     assert plain_line(progress(State.ABORT, row=None, abort="stopped by Ctrl-C")).endswith("stopped by Ctrl-C")

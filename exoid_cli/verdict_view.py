@@ -1,0 +1,76 @@
+"""A verdict as a person reads it: the sentence, the errors, each cause with its numbers and its evidence."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from exoid_cli.console import console
+
+if TYPE_CHECKING:
+    from pipelines.contracts import Joint
+
+
+def show_verdict(said: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
+    """Print a verdict/1 document about a machine of these joints."""
+    from pipelines.contracts import HIP_AND_KNEE
+
+    console.say(said["summary"])
+    for caveat in said["caveats"]:
+        console.say(f"But {caveat}.")
+    console.say("")
+    first, digits = joints[0], ".3f" if tuple(joints) == HIP_AND_KNEE else ".4g"
+    told = ("noise_floor_nm", "baseline_rmse_nm", "extended_rmse_nm")
+    console.table(
+        ("joint", "noise floor", "rigid + friction", "with the causes", "excess left"),
+        [
+            (joint.name, *(f"{said[key][joint.name]:{digits}}" for key in told),
+             "at the floor" if said["unexplained"][joint.name] is None else f"{said['unexplained'][joint.name]:.0%}")
+            for joint in joints
+        ],
+        title=f"{first.effort} error on runs no fit has seen, {first.unit('torque')}",
+        numbers="noise floor, rigid + friction, with the causes, excess left",
+    )  # fmt: skip
+    for cause in said["causes"]:
+        _show_cause(cause)
+    if said["causes"]:
+        _show_control(said["control"])
+
+
+def _show_cause(cause: Mapping[str, Any]) -> None:
+    where = f" at the {cause['joint']}" if cause["joint"] else ""
+    console.say(f"\n{cause['effect']}{where} ({cause['side']}), probability {cause['probability']:.2f}")
+    for p in cause["parameters"]:
+        console.note(_in_words(p))
+    for sentence in cause["evidence"]:
+        console.note(f"- {sentence}")
+    for tie in cause["indistinguishable_from"]:
+        other = f"{tie['effect']}@{tie['joint']}" if tie["joint"] else tie["effect"]
+        console.note(f"or {other}: {tie['why']}; {tie['how_to_separate']}")
+
+
+def _in_words(parameter: Mapping[str, Any]) -> str:
+    """Return a parameter with its interval; what was assumed, or chosen among a few values, has none."""
+    low, high = parameter["ci95"]
+    unit = "" if parameter["unit"] == "1" else f" {parameter['unit']}"
+    sure = "taken, not fitted" if low == high else f"{low:.4g} … {high:.4g}"
+    return f"{parameter['name']} {parameter['value']:.4g}{unit} ({sure})"
+
+
+def _show_control(said: Mapping[str, Any]) -> None:
+    """Print tracking error and peak torque under adaptive control, without and with the causes."""
+    console.say("")
+    if said["reason"]:
+        console.say(f"Under adaptive control: not compared, {said['reason']}.")
+        return
+    before, after = said["without"], said["with"]
+    headings = ("joint", "error mrad", "error with", "peak N·m", "peak with")
+    console.table(
+        headings,
+        [
+            (joint, f"{1e3 * before['tracking_rmse_rad'][joint]:.2f}", f"{1e3 * error:.2f}",
+             f"{before['peak_torque_nm'][joint]:.1f}", f"{after['peak_torque_nm'][joint]:.1f}")
+            for joint, error in after["tracking_rmse_rad"].items()
+        ],
+        title="tracking error and peak torque under adaptive control, without and with the causes",
+        numbers=", ".join(headings[1:]),
+    )  # fmt: skip
+    console.note("What each model promises; the one with the causes may well promise worse.")
