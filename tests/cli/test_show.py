@@ -46,6 +46,27 @@ def test_json_may_be_asked_for_before_or_after_the_command(exoid, recording):
     assert found["origin"]["config"]["bounds"] == {"hip": [0, 1]}
 
 
+def test_a_verdict_is_shown_by_its_words_and_numbers(exoid, tmp_path):
+    per_joint = {"hip": 0.5, "knee": 0.25}
+    cause = {
+        "effect": "cogging", "joint": "hip", "side": "drive", "probability": 0.9, "evidence": ["it repeats"],
+        "parameters": [{"name": "amplitude", "value": 0.3, "unit": "N·m", "ci95": [0.2, 0.4]}],
+        "indistinguishable_from": [],
+    }  # fmt: skip
+    said = {
+        "contract": "verdict/1", "status": "explained", "summary": "Missing from the simulation: cogging.",
+        "caveats": [], "noise_floor_nm": per_joint, "baseline_rmse_nm": per_joint, "extended_rmse_nm": per_joint,
+        "unexplained": {"hip": 0.1, "knee": None}, "causes": [cause], "control": {"reason": "no run with_human"},
+    }  # fmt: skip
+    path = tmp_path / "verdict.json"
+    path.write_text(json.dumps(said))
+    outcome = exoid("show", path)
+    assert (outcome.code, outcome.err) == (0, "")
+    for words in ("Missing from the simulation: cogging.", "cogging at the hip (drive), probability 0.90",
+                  "  amplitude 0.3 N·m (0.2 … 0.4)", "  - it repeats", "at the floor"):  # fmt: skip
+        assert words in outcome.out
+
+
 def test_quiet_prints_nothing(exoid, recording):
     assert exoid("show", recording, "-q").out == ""
 

@@ -154,6 +154,14 @@ def test_what_is_not_told_comes_from_the_experiment(exoid, experiment):
     assert (experiment / "simulated" / "replay-with_human_train.parquet").is_file()
 
 
+def test_a_model_is_shown_by_its_parameters(exoid, experiment):
+    outcome = exoid("show", "identified/parameters.parquet")
+    assert (outcome.code, outcome.err) == (0, "")
+    lines = outcome.out.splitlines()
+    assert any(line.startswith("X1 human ") and line.endswith("kg·m²      inertia") for line in lines)
+    assert max(map(len, lines)) <= 80
+
+
 def truth(experiment):
     """What the rig file says, in the order of the rows of ``parameters/1``."""
     plant = load_rig(experiment / "rigs" / "plain.toml").plant
