@@ -48,7 +48,8 @@ def export(
     settings = settings_in_force(config)
     made = exported(PARAMETERS.read(model), run, geometry_from(settings.mechanism))
     path = _path(model, output, chosen.suffix)
-    files = {path.with_suffix(suffix): text for suffix, text in chosen.write(made, path.stem).items()}
+    with console.working("writing the model"):
+        files = {path.with_suffix(suffix): text for suffix, text in chosen.write(made, path.stem).items()}
     if path.suffix not in {file.suffix for file in files}:
         files[path] = files.pop(path.with_suffix(chosen.suffix))
     if any(file.resolve() == model.resolve() for file in files):

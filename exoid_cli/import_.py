@@ -42,16 +42,17 @@ def _propose(files: list[Path], place: Path | None) -> None:
 
     if place is not None and place.exists():
         raise InputError(f"{place}: exists already, not overwritten with a guess; choose another name")
-    proposal = propose(files)
+    with console.working("looking"):
+        proposal = propose(files)
     doubts = [asdict(doubt) for doubt in proposal.doubts]
     console.emit({"map": proposal.text, "doubts": doubts})
     if place is None:
         console.say(proposal.text.rstrip())
         return
     write_text(place, proposal.text)
-    console.say(f"{place}: proposed; look at what is doubtful in it, then `exoid import` with --map {place}")
+    console.say(f"{place}: proposed; look at what is doubtful in it, then `exoid import ... --map {place}`")
     for doubt in proposal.doubts:
-        console.say(f"  {'fill in' if doubt.blocks else 'unsure'}: {doubt.key}: {doubt.why}")
+        console.note(f"- {'fill in' if doubt.blocks else 'unsure'}: {doubt.key}: {doubt.why}")
 
 
 def _import(files: list[Path], map_: Path, output: Path) -> None:
@@ -65,7 +66,9 @@ def _import(files: list[Path], map_: Path, output: Path) -> None:
     told: list[dict[str, Any]] = []
     for file in files:
         made = []
-        for recording in list(recordings(file, settings, map_)):  # all are right before the first is written
+        with console.working(f"reading {file.name}"):
+            found = list(recordings(file, settings, map_))  # all are right before the first is written
+        for recording in found:
             path = output / f"{recording.name}.parquet"
             if path in written:
                 raise InputError(
@@ -84,9 +87,10 @@ def _say(file: Path, made: list[tuple[Path, "Imported"]]) -> None:
         count = len(recording)
         time, purpose = recording.columns["time_s"], recording.metadata["purpose"]
         span = f"{time[0]:.3f} to {time[-1]:.3f} s of {file.name}"
-        console.say(f"{path}: {purpose}, {count} samples, {span}, {recording.sampling.rate_hz:.6g} Hz")
+        console.say(f"{path}: {purpose}, {count} samples, {recording.sampling.rate_hz:.6g} Hz")
+        console.note(span)
     for finding in dict.fromkeys(finding for _, recording in made for finding in recording.findings):
-        console.say(f"  {finding}")
+        console.note(f"- {finding}")
 
 
 def _as_json(file: Path, made: list[tuple[Path, "Imported"]]) -> dict[str, Any]:

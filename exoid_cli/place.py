@@ -70,8 +70,8 @@ def place_of(config: Path | None, out: Path | None = None, lacking: str = "") ->
     if not config and not is_experiment():
         begin = f"{lacking}, and " if lacking else ""
         raise InputError(
-            f"{begin}there is no {NAME} in {Path.cwd()}; go to an experiment's folder, name one with --config, "
-            "or start one with `exoid init DIR`"
+            f"{begin}there is no {NAME} in {Path.cwd()}; {'name it, ' if lacking else ''}go to an experiment's folder, "
+            "name its settings with --config, or start one with `exoid init DIR`"
         )
     experiment = Experiment.load(file)
     folder = out or file.parent

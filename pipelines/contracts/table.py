@@ -16,7 +16,7 @@ from pipelines.contracts import checks, parquet
 from pipelines.contracts.joints import Joint, joints_of
 from pipelines.contracts.metadata import TableKeys
 from pipelines.errors import ContractError
-from pipelines.validation import explain
+from pipelines.validation import closest, explain
 
 FLOAT, INTEGER, BOOLEAN, TEXT = pa.float64(), pa.int64(), pa.bool_(), pa.string()
 
@@ -214,12 +214,14 @@ class Contract:
 
         Empty pieces are left out. Where only some columns are ``named``, the others are not asked for.
         """
-        columns = [c for c in self.columns_for(joints_of(metadata)) if named is None or c.name in named]
+        known = self.columns_for(joints_of(metadata))
+        columns = [c for c in known if named is None or c.name in named]
         rows, seam = 0, None
         for piece in pieces:
             if not piece.num_rows:
                 continue
             for column in columns:
+                self._refuse_missing_column(piece, column, source, known)
                 piece = self._conform_column(piece, column, source, rows)
             self._check_time(piece, seam, source, rows)
             yield piece
@@ -240,15 +242,19 @@ class Contract:
         for rule in self.rules:
             rule(frame, metadata, source)
 
+    def _refuse_missing_column(self, table: pa.Table, column: Column, source: str, known: Sequence[Column]) -> None:
+        if not column.required or column.name in table.column_names:
+            return
+        near = closest(column.name, [name for name in table.column_names if name not in {c.name for c in known}])
+        raise ContractError(
+            f"{source}: column {column.name} is missing, expected {_described(column)}; "
+            f"a {self.label} table must have it" + (f"; if {near} is meant to be it, rename it" if near else "")
+        )
+
     def _conform_column(self, table: pa.Table, column: Column, source: str, first_row: int) -> pa.Table:
         index = table.schema.get_field_index(column.name)
         if index < 0:
-            if not column.required:
-                return table
-            raise ContractError(
-                f"{source}: column {column.name} is missing, expected {_described(column)}; "
-                f"a {self.label} table must have it"
-            )
+            return table
         where = checks.Place(source, column.name, first_row)
         values = checks.convert(table.column(index), column.dtype, where)
         checks.refuse_missing(values, column.nullable, where)

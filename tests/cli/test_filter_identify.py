@@ -147,6 +147,10 @@ def in_degrees(frame):
         (backwards, ["column time_s", "row 23"]),
         (in_degrees, ["column hip_angle_rad", "degrees"]),
         (lambda frame: frame.drop(columns="knee_torque_nm"), ["column knee_torque_nm is missing"]),
+        (
+            lambda frame: frame.rename(columns={"knee_torque_nm": "knee_torqe_nm"}),
+            ["column knee_torque_nm is missing", "if knee_torqe_nm is meant to be it, rename it"],
+        ),
     ],
 )
 @pytest.mark.parametrize("command", ["filter", "identify"])
