@@ -69,11 +69,12 @@ blind-fixed: $(INSTALLED) ## record anew how the fixed set of CI comes out, in t
 blind-page: $(INSTALLED) ## write docs/blind.md from the examinations that were made
 	$(BIN)/python -m tests.blind.page $(wildcard build/blind/report.json build/blind-full/report.json) docs/blind.md
 
-docs: $(INSTALLED) ## bring the generated pages up to date
+docs: $(INSTALLED) ## bring the generated pages up to date, and make the site of all pages in build/site
 	$(BIN)/python -m pipelines.settings.reference > docs/settings.md
 	$(BIN)/python -m pipelines.settings.map_reference > docs/import-map.md
 	$(BIN)/python -m pipelines.effects.reference docs/effects
 	$(BIN)/python -m pipelines.export.reference docs/export.md
+	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going -c docs/site -d build/doctrees docs build/site
 
 lock: ## pin the newest versions that fit pyproject.toml, in requirements.lock
 	rm -rf build/lock
