@@ -443,7 +443,9 @@ def _detectable(
 
 
 def _alike(look: Look, unexplained: NDArray | float) -> NDArray:
-    return np.isfinite(look.noncentrality) & (0.5 * look.noncentrality * np.asarray(unexplained) < TOLD_APART)
+    if not np.isfinite(look.noncentrality):  # seen at no size
+        return np.zeros(np.shape(unexplained), bool)
+    return 0.5 * look.noncentrality * np.asarray(unexplained) < TOLD_APART
 
 
 def _unexplained(chosen: Sequence[Look], looks: Sequence[list[Look]]) -> NDArray:

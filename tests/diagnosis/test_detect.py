@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 
 from pipelines.diagnosis.candidates import Candidate, torque_columns
 from pipelines.diagnosis.choice import MATERIAL, NEEDED
-from pipelines.diagnosis.detect import POWER, detectability, needed_noncentrality
+from pipelines.diagnosis.detect import POWER, Look, _alike, detectability, needed_noncentrality
 from pipelines.diagnosis.floor import Floor
 from pipelines.diagnosis.observations import baseline_of, observe
 from pipelines.diagnosis.planned import planned_motions, planned_noise
@@ -159,3 +159,8 @@ def test_planned_noise_is_what_block_averages_of_coloured_noise_have():
     floor = planned_noise(NOISE, 200.0, BlockAverage(5))
     assert floor.rms[0] == pytest.approx(blocks.std(), rel=0.03)
     assert floor.independent_share[0] == pytest.approx(blocks.var() / (200 * long.var()), rel=0.25)
+
+
+def test_what_a_motion_shows_at_no_size_is_like_nothing_that_it_shows():
+    unseen = Look((), np.inf, np.inf, "exo_alone", np.inf, *[np.zeros((0, 0))] * 3, plausible=False)
+    assert not _alike(unseen, np.array([0.0, 0.5, 1.0])).any()
