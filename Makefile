@@ -17,7 +17,7 @@ SEEDS ?= tuning
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | sort | expand -t 12
 
-all: $(INSTALLED) ## design, acquire, filter, identify, diagnose and simulate the default experiment, into build/default
+all: $(INSTALLED) ## the default experiment from its design to its report, into build/default
 	+@$(EXPERIMENT) all
 
 test: $(INSTALLED) ## the tests

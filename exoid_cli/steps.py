@@ -59,7 +59,12 @@ def bring_up_to_date(
     for step in place.steps:
         judged = judge.judge(step)
         if step in wanted and (again or not judged.done):
-            done.append(_perform(context, judged, before(step)))
+            try:
+                done.append(_perform(context, judged, before(step)))
+            except InputError as error:
+                if not step.may_fail:
+                    raise
+                console.warn(f"{error}; {step.target.name} is left out")
             judge.judge(step)
     return done
 
@@ -81,7 +86,7 @@ def _look_before(place: Place, wanted: "Sequence[Step]") -> None:
     """Refuse where an input is missing that another stage makes; warn where one is stale."""
     from pipelines.workflow.freshness import Freshness, Judge
 
-    makers = {one.step.target: one for one in Judge(place.out).all(place.steps)}
+    makers = {file: one for one in Judge(place.out).all(place.steps) for file in one.step.makes}
     told = set[str]()
     for step in wanted:
         for maker in (makers[file] for file in step.inputs if file in makers):

@@ -30,4 +30,4 @@ all: $(RESULTS)
 .SECONDARY:
 
 clean: # all but the recordings, which no command can bring back
-	rm -rf $(SETTINGS) $(addprefix $(OUT)/,trajectory.parquet motions identified diagnosed simulated)
+	rm -rf $(SETTINGS) $(addprefix $(OUT)/,trajectory.parquet motions identified diagnosed simulated report.html)

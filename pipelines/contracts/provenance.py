@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
@@ -42,11 +43,18 @@ def sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
+IN_A_PAGE = re.compile(r'<script type="application/json" id="provenance">(.*?)</script>', re.DOTALL)
+"""Where a report holds its own; in it, no text contains ``<``."""
+
+
 def provenance_of(path: Path) -> dict[str, Any]:
-    """Return the metadata of a table, or the ``provenance`` of a JSON document; ContractError where there is none."""
-    if path.suffix != ".json":
+    """Return a table's metadata, or the ``provenance`` of a document or page; ContractError where there is none."""
+    if path.suffix not in (".json", ".html"):
         return parquet.header(path)[1]
     try:
-        return dict(json.loads(path.read_text(encoding="utf-8"))["provenance"])
-    except (ValueError, KeyError, TypeError) as error:
+        text = path.read_text(encoding="utf-8")
+        if path.suffix == ".html":
+            return dict(json.loads(IN_A_PAGE.findall(text)[-1]))
+        return dict(json.loads(text)["provenance"])
+    except (ValueError, KeyError, TypeError, IndexError) as error:
         raise ContractError(f"{path}: does not say where it came from; make it again") from error

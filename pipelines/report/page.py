@@ -16,9 +16,11 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from pipelines import __version__
+from pipelines.contracts import describe
 from pipelines.report.animation import Animation
 from pipelines.report.chart import Chart
 from pipelines.report.numbers import beside, digits
+from pipelines.report.session import Artifact
 
 LARGEST_BYTES = 5_000_000
 """Of a page."""
@@ -28,7 +30,13 @@ VALUES = 600_000
 ASSETS = files("pipelines.report").joinpath("assets")
 
 
-def render(template: str, drawn: Iterable[Chart], moving: Iterable[Animation], told: Mapping[str, Any]) -> str:
+def render(
+    template: str,
+    drawn: Iterable[Chart],
+    moving: Iterable[Animation],
+    told: Mapping[str, Any],
+    artifacts: Iterable[Artifact],
+) -> str:
     """Return a page as text; ``told`` is what its template shows, all of which is escaped."""
     style = asset("uPlot.min.css") + asset("page.css")
     scripts = [asset("uPlot.iife.min.js"), asset("page.js")]
@@ -46,12 +54,18 @@ def render(template: str, drawn: Iterable[Chart], moving: Iterable[Animation], t
             scripts=[Markup(script) for script in scripts],
             script_hashes=[_digest(script) for script in scripts],
             data=Markup(_in_a_script(data)),
+            provenance=Markup(_in_a_script(_provenance(artifacts))),
             uplot_version=_uplot_version(scripts[0]),
             uplot_license=Markup(asset("uPlot.LICENSE")),
             version=__version__,
             made=f"Made by exoid {__version__} on {datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
         )
     )
+
+
+def _provenance(artifacts: Iterable[Artifact]) -> dict[str, Any]:
+    """Return what the page was made of, as every result of exoid's tells it."""
+    return describe() | {"inputs": [{"name": one.path.name, "sha256": one.sha256} for one in artifacts]}
 
 
 @cache

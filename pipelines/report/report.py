@@ -119,7 +119,7 @@ def report(session: Session, title: str | None = None) -> str:
         "settings": indented(provenance.settings(session)),
         "origins": provenance.origins(session),
     }
-    return render("report.html", drawn.all, shown, told)
+    return render("report.html", drawn.all, shown, told, session.artifacts)
 
 
 def _quantity(session: Session) -> str:

@@ -5,7 +5,7 @@ result may tell of; a folder that was copied, or a setting that was changed and 
 """
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -56,7 +56,7 @@ class Judge:
         state = Freshness.STALE if step.target.exists() else Freshness.MISSING
         why = tuple(self._reasons(step) if step.target.exists() else self._left_behind(step.target))
         judged = Judged(step, state if why or state is Freshness.MISSING else Freshness.DONE, why)
-        self._seen[step.target] = judged
+        self._seen.update(dict.fromkeys(step.makes, judged))
         return judged
 
     def _reasons(self, step: Step) -> Iterator[str]:
@@ -65,23 +65,26 @@ class Judge:
         except ContractError as error:
             yield str(error).removeprefix(f"{step.target}: ")
             return
-        yield from self._other_inputs(step, {entry["name"]: entry["sha256"] for entry in told.get("inputs", [])})
+        yield from self._other_inputs(step, {(entry["name"], entry["sha256"]) for entry in told.get("inputs", [])})
         yield from _other_settings(told.get("config", {}), step.settings)
         if step.watched and step.watched.stat().st_mtime_ns > step.target.stat().st_mtime_ns:
             yield f"{self._name(step.watched)} is newer"
 
-    def _other_inputs(self, step: Step, recorded: Mapping[str, str]) -> Iterator[str]:
+    def _other_inputs(self, step: Step, recorded: Set[tuple[str, str]]) -> Iterator[str]:
+        names = {name for name, _ in recorded}
         for file in step.inputs:
             maker = self._seen.get(file)
+            if maker and maker.step.may_fail and maker.state is Freshness.MISSING:
+                continue  # it does without
             if maker and not maker.done:
                 yield f"waits for {maker.step.stage}"
             elif not file.exists():
                 yield f"{self._name(file)} is missing"
-            elif file.name not in recorded:
+            elif file.name not in names:
                 yield f"{self._name(file)} was not among its inputs"
-            elif recorded[file.name] != sha256(file):
+            elif (file.name, sha256(file)) not in recorded:
                 yield f"{self._name(file)} has changed"
-        for name in recorded.keys() - {file.name for file in step.inputs}:
+        for name in () if step.takes_all else names - {file.name for file in step.inputs}:
             yield f"{name} is no input any more"
 
     def _left_behind(self, target: Path) -> Iterator[str]:

@@ -4,9 +4,9 @@ It is written here and nowhere else: ``exoid run``, ``exoid status``, a command 
 rules that ``split`` writes, all go by it.
 """
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,17 @@ class Step:
     """The run it is for, where it is for one."""
     watched: Path | None = None
     """A file that counts too, though no result may tell its hash."""
+    beside: tuple[Path, ...] = ()
+    """Other files that the command makes, where later steps read them."""
+    may_fail: bool = False
+    """Whether it may be impossible, so that what needs it does without: not every model with causes can move."""
+    takes_all: bool = False
+    """Whether it takes whatever else the results' folder holds, too."""
+
+    @property
+    def makes(self) -> tuple[Path, ...]:
+        """Every file of it that another step may need."""
+        return (self.target, *self.beside)
 
     @property
     def settings_files(self) -> tuple[str, ...]:
@@ -81,22 +92,33 @@ def graph(experiment: Experiment, config: Path, out: Path, imported: Collection[
     )
     if validate:  # a diagnosis measures its gain on validation runs; without one there is none
         verdict, counted, words = out / "diagnosed" / "verdict.json", ("filter", "mechanism"), _words(recordings)
-        steps.append(step("diagnose", verdict, recordings.values(), counted, "diagnose", *words))
-    simulate, loop = ("simulate", parameters.as_posix()), out / "simulated" / "rbf.parquet"
-    steps.append(step("simulate", loop, [parameters], ("simulate", "mechanism"), *simulate))
-    for name in (run.name for run in validate):
-        again, recording = out / "simulated" / f"replay-{name}.parquet", recordings[name]
-        called = (*simulate, "--replay", recording.as_posix())
-        steps.append(step("replay", again, [parameters, recording], ("filter", "mechanism"), *called, run=name))
-    return tuple(steps)
+        diagnose = step("diagnose", verdict, recordings.values(), counted, "diagnose", *words)
+        extended = verdict.with_name("parameters.parquet")
+        steps.append(replace(diagnose, beside=(extended,)))
+
+    def simulated(model: Path, folder: Path, loop: str, replay: str) -> Iterator[Step]:
+        called: tuple[str, ...] = ("simulate", model.as_posix())
+        yield step(loop, folder / LOOP, [model], ("simulate", "mechanism"), *called)
+        for name in (run.name for run in validate):
+            inputs, words = [model, recordings[name]], (*called, "--replay", recordings[name].as_posix())
+            yield step(replay, folder / f"replay-{name}.parquet", inputs, ("filter", "mechanism"), *words, run=name)
+
+    steps += simulated(parameters, out / "simulated", "simulate", "replay")
+    if validate:
+        again = simulated(extended, out / "simulated" / "extended", "extended", "extended")
+        steps += [replace(one, may_fail=True) for one in again]
+    shown = [one.target for one in steps if one.stage != "filter"]
+    report = step("report", out / "report.html", shown, (), "report", out.as_posix())
+    return (*steps, replace(report, takes_all=True))
 
 
-FOLDERS = ("identify", "diagnose", "simulate")
-"""Stages whose command is told a folder to write into."""
+LOOP, WHOLE_FOLDER = "rbf.parquet", ("identify", "diagnose")
 
 
 def _output(stage: str, target: Path) -> str:
-    return f"{target.parent.as_posix()}/" if stage in FOLDERS else target.as_posix()
+    """Return what a command is told to write: some are told a folder."""
+    told_a_folder = stage in WHOLE_FOLDER or target.name == LOOP
+    return f"{target.parent.as_posix()}/" if told_a_folder else target.as_posix()
 
 
 def _words(files: Mapping[str, Path]) -> list[str]:
@@ -141,6 +163,6 @@ def needed_for(wanted: Sequence[Step], steps: Sequence[Step]) -> list[Step]:
     """Return the wanted steps and all that make their inputs, in the order of the graph."""
     files = {file for step in wanted for file in (step.target, *step.inputs)}
     for step in reversed(steps):
-        if step.target in files:
+        if not files.isdisjoint(step.makes):
             files.update(step.inputs)
-    return [step for step in steps if step.target in files]
+    return [step for step in steps if not files.isdisjoint(step.makes)]

@@ -63,4 +63,7 @@ def _rule(step: Step) -> Iterator[str]:
     settings = [f"$(SETTINGS)/{name}.json" for name in step.settings_files]
     yield ""
     yield f"{step.target.as_posix()}: {' '.join([*made, *settings])}"
-    yield f"\t$(EXOID) {' '.join(step.command)}"
+    # A step that may be impossible is tried, and what needs it made without it.
+    yield f"\t{'-' * step.may_fail}$(EXOID) {' '.join(step.command)}"
+    # With an empty recipe make looks at the file's own time, once the command has run.
+    yield from (f"{file.as_posix()}: {step.target.as_posix()} ;" for file in step.beside)

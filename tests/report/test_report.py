@@ -7,6 +7,7 @@ import shutil
 import pytest
 
 from pipelines.contracts import PARAMETERS
+from pipelines.contracts.provenance import provenance_of, sha256
 from pipelines.errors import InputError
 from pipelines.report.report import report
 from pipelines.report.session import find
@@ -47,6 +48,12 @@ def test_the_page_has_its_six_parts_and_stays_under_five_megabytes(page_file):
     ]
     assert "Not here yet" not in page
     assert len(page.encode()) < 5_000_000
+
+
+def test_the_page_tells_what_it_was_made_of_as_every_result_does(session_folder, page_file):
+    told = provenance_of(page_file)
+    made_of = {sha256(path) for path in session_folder.rglob("*") if path.suffix in (".parquet", ".json")}
+    assert {one["sha256"] for one in told["inputs"]} == made_of
 
 
 def test_the_page_asks_for_nothing_outside_itself(page_file):

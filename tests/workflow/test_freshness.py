@@ -2,6 +2,7 @@
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -84,6 +85,30 @@ def test_another_set_of_inputs_is_told(chain):
     assert chain.states()["two"] == (
         "stale", ("first.json was not among its inputs", "source.json is no input any more"),
     )  # fmt: skip
+
+
+def test_what_may_be_impossible_and_is_not_there_is_done_without(chain):
+    first, second = chain.steps
+    first.target.unlink()
+    assert Judge(chain.folder).all([replace(first, may_fail=True), second])[1].done
+
+
+def test_two_inputs_of_one_name_are_told_apart_by_their_content(chain):
+    first, second = chain.steps
+    other = chain.folder / "other" / "first.json"
+    other.parent.mkdir()
+    other.write_text("{}")
+    both = replace(second, inputs=(first.target, other))
+    second.target.write_text(json.dumps({"provenance": describe(both.inputs)}))
+    assert Judge(chain.folder).judge(both).done
+    other.write_text("[]")
+    assert Judge(chain.folder).judge(both).why == ("other/first.json has changed",)
+
+
+def test_a_report_that_takes_all_may_have_taken_more(chain):
+    step = replace(chain.steps[1], takes_all=True)
+    step.target.write_text(json.dumps({"provenance": describe([*step.inputs, chain.source])}))
+    assert Judge(chain.folder).judge(step).done
 
 
 @pytest.mark.parametrize("content", ["", "{", "{}", "[1]"])

@@ -21,6 +21,9 @@ case "$1" in
   settings) exec {sys.executable} -m exoid_cli.app "$@" ;;
 esac
 echo "$@" >> "$LOG"
+case "$*" in
+  *simulated/extended*) [ -e impossible ] && exit 2 ;;
+esac
 for last in "$@"; do :; done
 case "$last" in
   */) mkdir -p "$last"; touch "$last/parameters.parquet" "$last/rbf.parquet" "$last/verdict.json" ;;
@@ -67,7 +70,8 @@ def make(tmp_path, monkeypatch):
 
 
 FIT = ["identify", "simulate", "simulate", "simulate"]
-ALL_FROM_RECORDINGS = [*["filter"] * 4, "diagnose", *FIT]
+DIAGNOSIS = ["diagnose", "simulate", "simulate", "simulate"]
+ALL_FROM_RECORDINGS = [*["filter"] * 4, *FIT, *DIAGNOSIS, "report"]
 
 
 def test_a_first_make_runs_every_stage_and_a_second_none(make):
@@ -85,12 +89,19 @@ def test_make_calls_the_commands_of_the_graph_each_after_those_it_needs(make):
         assert all(place[file] < place[step.target] for file in step.inputs if file in place)
 
 
+def test_where_the_model_with_causes_cannot_move_all_else_is_made(make):
+    (make.folder / "impossible").touch()
+    assert sorted(make()) == sorted(["design", *["acquire"] * 4, *ALL_FROM_RECORDINGS])
+    assert (make.folder / "report.html").is_file()
+    assert not (make.folder / "simulated" / "extended").exists()
+
+
 def test_an_imported_recording_is_nobodys_to_make(make):
     path = make.folder / "recordings" / "exo_alone_train.parquet"
     parquet.save(path, [pa.table({"time_s": [0.0]})], {"contract": "recording/1", "imported": {}})
     assert make().count("acquire") == 3
     path.touch()
-    assert sorted(make()) == sorted(["filter", "diagnose", *FIT])
+    assert sorted(make()) == sorted(["filter", *FIT, *DIAGNOSIS, "report"])
 
 
 def test_only_what_depends_on_a_change_runs_again(make):
@@ -100,13 +111,13 @@ def test_only_what_depends_on_a_change_runs_again(make):
     make.change("[design]  ", "[design] # a comment")
     assert make() == []
     make.change("feedback_gain_nm_s_rad = 300.0", "feedback_gain_nm_s_rad = 400.0")
-    assert make() == ["simulate"]
+    assert make() == ["simulate", "simulate", "report"]
     make.change("[identify]\nfigures = true", "[identify]\nfigures = false")
-    assert make() == FIT
+    assert make() == [*FIT, "report"]
     make.change("order = 4", "order = 2")
     assert sorted(make()) == sorted(ALL_FROM_RECORDINGS)
     make.change("seed = 2", "seed = 22")
-    assert sorted(make()) == sorted(["acquire", "filter", "diagnose", *FIT])
+    assert sorted(make()) == sorted(["acquire", "filter", *FIT, *DIAGNOSIS, "report"])
     make.change("harmonics = 5", "harmonics = 4")
     assert sorted(make()) == sorted(["design", *["acquire"] * 4, *ALL_FROM_RECORDINGS])
     assert make() == []
@@ -147,7 +158,7 @@ def test_a_run_with_an_excitation_of_its_own_heeds_it_alone(make):
 def test_without_a_run_to_validate_on_nothing_is_diagnosed(make):
     path = make.folder / "exoid.toml"
     path.write_text(path.read_text().replace('purpose = "validate"', 'purpose = "train"'))
-    assert sorted(make()) == sorted(["design", *["acquire", "filter"] * 4, "identify", "simulate"])
+    assert sorted(make()) == sorted(["design", *["acquire", "filter"] * 4, "identify", "simulate", "report"])
 
 
 def test_clean_keeps_the_recordings(make):
