@@ -4,6 +4,8 @@
 """
 
 import errno
+import glob
+import io
 import os
 import signal
 import sys
@@ -102,7 +104,17 @@ def main() -> NoReturn:
     """Run exoid as the shell's command."""
     # As an exception: what is half written is cleared away, as it is after Ctrl-C.
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(TERMINATED))
-    sys.exit(run(sys.argv[1:]))
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(encoding="utf-8")  # Windows' pipes have one that knows no N·m
+    arguments = sys.argv[1:]
+    sys.exit(run(matching_files(arguments) if os.name == "nt" else arguments))
+
+
+def matching_files(arguments: Sequence[str]) -> list[str]:
+    """Return the words, patterns replaced by the files that match: Windows' shells leave that to us."""
+    found = ((word, sorted(glob.glob(word)) if set("*?") & set(word) else []) for word in arguments)
+    return [name for word, files in found for name in files or [word]]
 
 
 def run(arguments: Sequence[str]) -> int:

@@ -13,8 +13,9 @@ import numpy as np
 
 from pipelines.acquisition.columns import columns_of
 from pipelines.acquisition.embedded import embedded
-from pipelines.acquisition.journal import Journal, JournalFile, journal_of, locked, refuse_leftover
+from pipelines.acquisition.journal import Journal, JournalFile, journal_of, refuse_leftover
 from pipelines.acquisition.line_rate import refuse_slow_lines
+from pipelines.acquisition.lock import Lock, locked
 from pipelines.acquisition.loop import Loop, Progress, Report, run_to_its_end
 from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.pace import urgent
@@ -103,8 +104,8 @@ def acquire(
         supervisor = Supervisor(present, sample_rate_hz, sensors)
         recording = _record(supervisor, run, trajectory, journal, metadata, report, stopped_by, reset_faults)
         run_to_its_end(recording, supervisor.abort)
-        with locked(journal):
-            return _finish(output, journal, supervisor)
+        with locked(journal) as lock:
+            return _finish(output, lock, supervisor)
 
 
 async def _record(
@@ -152,7 +153,9 @@ async def _record(
 def _signals() -> Iterator[list[str]]:
     """Collect the names of signals that ask for a stop, so that the loop and nothing else acts on them."""
     # A terminal that is closed must not leave a drive enabled either.
-    names = {signal.SIGINT: "Ctrl-C", signal.SIGTERM: "SIGTERM", signal.SIGHUP: "SIGHUP", signal.SIGQUIT: "SIGQUIT"}
+    told = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "SIGHUP", "SIGQUIT": "SIGQUIT"}
+    # Windows knows two of them.
+    names = {signal.Signals[name]: word for name, word in told.items() if name in signal.Signals.__members__}
     came, before = list[str](), {}
     with suppress(ValueError):  # outside a process's main thread nobody can catch signals, and nobody is sent them
         for number in names:
@@ -164,8 +167,9 @@ def _signals() -> Iterator[list[str]]:
             signal.signal(number, handler)
 
 
-def _finish(output: Path, path: Path, supervisor: Supervisor) -> Outcome:
+def _finish(output: Path, lock: Lock, supervisor: Supervisor) -> Outcome:
     """Turn the journal into a recording; raise where the run was stopped, or exoid was at fault."""
+    path = lock.path
     kind: type[ExoidError] = DeviceError
     told = f"{supervisor.why}; {_rest(supervisor)}" if supervisor.why else "the run is complete"
     if fault := supervisor.fault:
@@ -188,7 +192,7 @@ def _finish(output: Path, path: Path, supervisor: Supervisor) -> Outcome:
             f"{told}; {samples} samples are in {place}, but the disk did not give back all that was written; check the "
             f"disk, {path} is kept"
         ) from fault
-    path.unlink()
+    lock.remove()
     if account.abort:
         rest = f", its {samples} samples so far are in {place}" if samples else " before the recording began"
         raise kind(told + rest) from fault

@@ -1,13 +1,14 @@
 """The embedded rig: a virtual rig in a process of its own, for as long as a run lasts."""
 
-import select
+import queue
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from pipelines.errors import DeviceError, SettingsError
 from pipelines.settings.acquire import RunSettings
@@ -17,6 +18,12 @@ from pipelines.settings.rig import RigSettings
 START_S = 180.0
 """Longest start; the very first one compiles the plant."""
 END_S = 3.0
+# Ctrl-C is for whoever moves the leg, the rig must live to be stopped safely.
+_ON_ITS_OWN: dict[str, Any] = (
+    {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
+    if hasattr(subprocess, "CREATE_NEW_PROCESS_GROUP")
+    else {"start_new_session": True}
+)
 
 
 @contextmanager
@@ -27,35 +34,67 @@ def embedded(rig: RigSettings, path: Path, run: RunSettings, sample_rate_hz: flo
         "--sample-rate-hz", str(sample_rate_hz), "--port", "0", "--until-input-ends",
     ]  # fmt: skip
     with tempfile.TemporaryFile() as complaints:
-        # A session of its own: Ctrl-C is for whoever moves the leg, the rig must live to be stopped safely.
         # It ends with its input, which the system closes even where this process is killed.
         process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=complaints, start_new_session=True, bufsize=0
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=complaints, bufsize=0, **_ON_ITS_OWN
         )
+        said = Said(process)
         try:
             lines = len({device.line for device in (*rig.drive, *rig.sensor)})
-            yield _at(rig, dict(_place(process, path, complaints) for _ in range(lines)))
+            yield _at(rig, dict(_place(said, path, complaints) for _ in range(lines)))
         finally:
-            _end(process)
+            said.end()
 
 
-def _place(process: subprocess.Popen, path: Path, complaints) -> tuple[str | None, str]:
+class Said:
+    """What a process says, line by line; a thread listens, for not every system can wait for a pipe."""
+
+    def __init__(self, process: subprocess.Popen) -> None:
+        self.process = process
+        self._lines = queue.SimpleQueue[bytes]()
+        self._thread = threading.Thread(target=self._listen, name="embedded rig", daemon=True)
+        self._thread.start()
+
+    def line(self, longest_s: float) -> str:
+        """Return the next line; nothing where the process has ended, or took too long."""
+        with suppress(queue.Empty):
+            return self._lines.get(timeout=longest_s).decode().strip()
+        return ""
+
+    def end(self) -> None:
+        """End the process, in good order if it is able to."""
+        assert self.process.stdin is not None  # it was asked for
+        self.process.stdin.close()
+        try:
+            self.process.wait(END_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        self._thread.join(END_S)
+
+    def _listen(self) -> None:
+        assert self.process.stdout is not None  # it was asked for
+        with self.process.stdout as pipe:
+            for line in pipe:
+                self._lines.put(line)
+        self._lines.put(b"")
+
+
+def _place(said: Said, path: Path, complaints: IO[bytes]) -> tuple[str | None, str]:
     """Wait until the rig says where a line is; return its name, None for that of devices on none, and the place."""
-    assert process.stdout is not None  # it was asked for
-    ready, _, _ = select.select([process.stdout], [], [], START_S)
-    if line := process.stdout.readline().decode().strip() if ready else "":
+    if line := said.line(START_S):
         name, _, place = line.rpartition(" ")
         return name or None, place
-    _end(process)
+    said.end()
     complaints.seek(0)
-    said = complaints.read().decode(errors="replace").strip()
-    if not said:
+    words = complaints.read().decode(errors="replace").strip()
+    if not words:
         raise DeviceError(
             f"{path}: the embedded rig did not start within {START_S:g} s; run `exoid rig {path}` to see why"
         )
     # What the rig could not use is the user's to mend here as there.
-    kind = SettingsError if process.returncode == SettingsError.exit_code else DeviceError
-    raise kind(said.splitlines()[-1].removeprefix("exoid: "))
+    kind = SettingsError if said.process.returncode == SettingsError.exit_code else DeviceError
+    raise kind(words.splitlines()[-1].removeprefix("exoid: "))
 
 
 def _at(rig: RigSettings, places: dict[str | None, str]) -> RigSettings:
@@ -67,14 +106,3 @@ def _at(rig: RigSettings, places: dict[str | None, str]) -> RigSettings:
             devices = getattr(rig, kind)
             update[kind] = tuple(d if d.line else d.model_copy(update=alone) for d in devices)
     return rig.model_copy(update=update)
-
-
-def _end(process: subprocess.Popen) -> None:
-    for stream in (process.stdin, process.stdout):
-        if stream:
-            stream.close()
-    try:
-        process.wait(END_S)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()

@@ -4,19 +4,18 @@ Whoever writes a journal holds a lock on it, which the system takes away whateve
 that goes on can be told from one that was killed.
 """
 
-import fcntl
 import io
 import json
 import threading
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, Self
 
 import pyarrow as pa
 
+from pipelines.acquisition.lock import locked, take
 from pipelines.contracts.parquet import KEY, to_json
 from pipelines.errors import ContractError, InputError
 
@@ -56,7 +55,7 @@ class Journal:
         path.parent.mkdir(parents=True, exist_ok=True)
         # Exclusive: a journal that is there already is all that is left of a run.
         self._file = open(path, "xb", buffering=0)  # noqa: SIM115, it stays open from the first sample to the last
-        fcntl.flock(self._file, fcntl.LOCK_EX)
+        take(self._file, wait=True)
         self._bytes = io.BytesIO()
         self._stream = pa.ipc.new_stream(self._bytes, self._schema)
         self._stream.write_batch(self._batch([]))  # the head comes to disk with a first batch only
@@ -247,24 +246,12 @@ def in_pieces(batches: Iterable[pa.RecordBatch], rows: int) -> Iterator[pa.Table
         yield pa.Table.from_batches(waiting)
 
 
-@contextmanager
-def locked(path: Path) -> Iterator[bool]:
-    """Hold a journal's lock; yields False where another process holds it, which is recording then."""
-    with open(path, "rb") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            free = True
-        except BlockingIOError:
-            free = False
-        yield free
-
-
 def refuse_leftover(path: Path) -> None:
     """Refuse to record over what another run writes or has left."""
     if not path.exists():
         return
-    with locked(path) as free:
-        if not free:
+    with locked(path) as lock:
+        if not lock.free:
             raise InputError(f"{path}: another run is recording there now; choose another output or wait for its end")
     try:
         journal = JournalFile(path)

@@ -4,7 +4,6 @@ import asyncio
 import errno
 import ssl
 import sys
-import termios
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -22,6 +21,13 @@ from pipelines.acquisition.reply import check_replies
 from pipelines.errors import DeviceError, SettingsError
 from pipelines.settings.line import LineSettings, RtuLine, RtuOverTcpLine, TlsLine
 from pipelines.settings.rig import DeviceSettings, RigSettings
+
+BAD_SETTINGS: tuple[type[Exception], ...] = (ValueError,)
+"""What a serial port that cannot be set up as told is refused with."""
+with suppress(ImportError):  # Windows has another way with ports
+    import termios
+
+    BAD_SETTINGS += (termios.error,)
 
 
 class Line:
@@ -65,7 +71,7 @@ class Line:
         self.client.ctx.comm_params.timeout_connect = self._timeout_s
         try:
             return await self.client.connect()
-        except (termios.error, ValueError) as error:
+        except BAD_SETTINGS as error:
             raise DeviceError(
                 f"{self._label}: the serial port cannot be set up like that ({error}); correct baud_rate, parity or "
                 'stop_bits in the rig file (a pseudo-terminal needs parity = "none")'

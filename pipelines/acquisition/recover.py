@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipelines.acquisition.journal import ENDING, JournalFile, locked
+from pipelines.acquisition.journal import ENDING, JournalFile
+from pipelines.acquisition.lock import locked
 from pipelines.acquisition.recorded import Account, account_of, place_for, write_recording
 from pipelines.errors import InputError
 
@@ -39,8 +40,8 @@ def recover(path: Path, output: Path | None = None) -> Recovered:
     """
     if not path.exists():
         raise InputError(f"{path}: no such file; `exoid recover` takes the journal that a killed run left")
-    with locked(path) as free:
-        if not free:
+    with locked(path) as lock:
+        if not lock.free:
             raise InputError(f"{path}: a run is recording there now; wait for its end, or stop it with Ctrl-C")
         journal = JournalFile(path)
         account = account_of(journal)
@@ -51,5 +52,5 @@ def recover(path: Path, output: Path | None = None) -> Recovered:
             raise InputError(f"{output}: is there already and is not overwritten; name another file with -o")
         write_recording(journal, output, account, recovered=True)
         if not account.damaged:
-            path.unlink()
+            lock.remove()
     return Recovered(output, account)

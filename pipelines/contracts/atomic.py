@@ -21,7 +21,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     try:
         yield temporary
-        _sync(temporary)
+        _sync(temporary, os.O_RDWR)  # Windows brings to disk only what could be written to
         os.replace(temporary, path)
     except BaseException as error:
         temporary.unlink(missing_ok=True)
@@ -29,7 +29,7 @@ def whole_file(path: Path) -> Iterator[Path]:
             error.filename = str(path)  # the name that the user knows
         raise
     with suppress(OSError):  # some file systems cannot sync a folder; the file itself is safe
-        _sync(path.parent)
+        _sync(path.parent, os.O_RDONLY)
 
 
 def open_folder(path: Path) -> None:
@@ -49,8 +49,8 @@ def write_text(path: Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
-def _sync(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
+def _sync(path: Path, how: int) -> None:
+    descriptor = os.open(path, how)
     try:
         os.fsync(descriptor)
     finally:
