@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
 HASH = 12
 """Characters of a hash that are shown: enough to tell two files apart."""
+FIRST = 10
+"""Candidates that are shown."""
 COLUMNS = 8
 """Most columns of a table that lists objects."""
 FEW = 6
@@ -23,7 +25,8 @@ def show(
 ) -> None:
     """Say what an exoid file is, where it came from, and its columns with units and ranges.
 
-    Of a model it shows the parameters, of a verdict what it says.
+    Of a model it shows the parameters, of a verdict what it says, of
+    candidates why each was named or not.
 
     \b
     Examples:
@@ -51,7 +54,7 @@ def show(
 
 def _show_whole(found: "Inspection") -> bool:
     """Show what is short and meant for people as such; return whether it was that."""
-    from pipelines.contracts import PARAMETERS, joints_of
+    from pipelines.contracts import CANDIDATES, PARAMETERS, joints_of
 
     if found.fault:
         return False
@@ -61,6 +64,9 @@ def _show_whole(found: "Inspection") -> bool:
         console.say("")
         show_parameters(PARAMETERS.read(Path(found.file)).frame.to_dict("records"), joints_of(found.metadata))
         return True
+    if found.contract == CANDIDATES.label:
+        _show_candidates(CANDIDATES.read(Path(found.file)).frame.to_dict("records"))
+        return True
     if found.contract.startswith("verdict/") and "causes" in found.metadata:
         from exoid_cli.verdict_view import show_verdict
 
@@ -68,6 +74,15 @@ def _show_whole(found: "Inspection") -> bool:
         show_verdict(found.metadata, joints_of(found.metadata))
         return True
     return False
+
+
+def _show_candidates(rows: list[dict[Any, Any]]) -> None:
+    """Say of the first candidates what became of each, and why."""
+    for row in rows[:FIRST]:
+        console.say(f"\n{row['rank']} {' + '.join(row['causes'])}: {row['verdict']}")
+        console.note(row["reason"])
+    if len(rows) > FIRST:
+        console.say(f"\n{len(rows) - FIRST} more are in the file")
 
 
 def _folded(origin: dict[str, Any]) -> dict[str, Any]:

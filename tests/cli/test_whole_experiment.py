@@ -165,6 +165,13 @@ def test_a_model_is_shown_by_its_parameters(exoid, experiment):
     assert max(map(len, lines)) <= 80
 
 
+def test_the_candidates_of_a_diagnosis_are_shown_with_what_became_of_each(exoid, experiment):
+    lines = exoid("show", "diagnosed/candidates.parquet").out.splitlines()
+    assert re.fullmatch(r"1 \S+@\S+( \+ \S+@\S+)*: (named|rejected|absorbed|indistinguishable)", lines[2])
+    assert lines[3].startswith("  ")
+    assert max(map(len, lines)) <= 80
+
+
 def truth(experiment):
     """What the rig file says, in the order of the rows of ``parameters/1``."""
     plant = load_rig(experiment / "rigs" / "plain.toml").plant
