@@ -74,7 +74,7 @@ docs: $(INSTALLED) ## bring the generated pages up to date, and make the site of
 	$(BIN)/python -m pipelines.settings.map_reference > docs/import-map.md
 	$(BIN)/python -m pipelines.effects.reference docs/effects
 	$(BIN)/python -m pipelines.export.reference docs/export.md
-	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going -c docs/site -d build/doctrees docs build/site
+	$(BIN)/sphinx-build --quiet --write-all --fail-on-warning --keep-going -c docs/site -d build/doctrees docs build/site
 
 lock: ## pin the newest versions that fit pyproject.toml, in requirements.lock
 	rm -rf build/lock

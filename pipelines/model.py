@@ -31,12 +31,12 @@ class Term:
 
     @property
     def linear(self) -> NDArray:
-        """Values of the linear parameters."""
+        """Values of the linear parameters, (p,)."""
         return self.values[: len(self.effect.linear)]
 
     @property
     def shape(self) -> NDArray:
-        """Values of the shape parameters."""
+        """Values of the shape parameters, (s,)."""
         return self.values[len(self.effect.linear) :]
 
 
@@ -57,11 +57,11 @@ class Model:
 
     @property
     def linear_values(self) -> NDArray:
-        """Values of the linear parameters, in the order of the regressor's columns."""
+        """Values of the linear parameters, (p,) in the order of the regressor's columns."""
         return np.concatenate([term.linear for term in self.terms])
 
     def with_linear(self, values: NDArray) -> "Model":
-        """Return the model with other linear parameters."""
+        """Return the model with other linear parameters, (p,)."""
         parts = np.split(np.asarray(values, float), np.cumsum([len(t.effect.linear) for t in self.terms])[:-1])
         terms = (Term(t.effect, np.append(part, t.shape)) for t, part in zip(self.terms, parts, strict=True))
         return Model(tuple(terms))
@@ -124,7 +124,13 @@ class Model:
 
 
 def effect_named(name: str) -> type[Effect]:
-    """Look an effect up by the name that files use."""
+    """Look an effect up by the name that files use.
+
+    Raises
+    ------
+    InputError
+        Where there is none of this name.
+    """
     if name not in BY_NAME:
         raise InputError(f"there is no effect {name!r}; {suggestion(name, list(BY_NAME))}")
     return BY_NAME[name]
@@ -140,6 +146,11 @@ def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_
     """Rebuild the model of one kind of run of a machine from a ``parameters/1`` table.
 
     ``run`` is a kind of run, or ``human`` for the wearer's own rigid body.
+
+    Raises
+    ------
+    InputError
+        Where the table has no rigid body for that run.
     """
     is_body = frame["effect"] == RigidBody.name
     if not (is_body & (frame["run"] == run)).any():
@@ -169,7 +180,13 @@ def _term_from_rows(effect: Effect, rows: pd.DataFrame) -> Term:
 
 
 def term_from(effect: Effect, values: Mapping[str, float]) -> Term:
-    """Return a term from the values that a file gives to ``effect.parameters``."""
+    """Return a term from the values that a file gives to ``effect.parameters``.
+
+    Raises
+    ------
+    InputError
+        Where values are missing, or others than the effect's.
+    """
     known = {parameter.name: parameter for parameter in effect.parameters}
     missing = [name for name, parameter in known.items() if name not in values and parameter.default is None]
     if missing or not set(values) <= set(known):

@@ -62,7 +62,13 @@ class Device:
         return await self._ask(what, count, wait, request, address=address, count=count)
 
     async def read_fifo(self, address: int, words: int) -> list[int]:
-        """Return what a queue holds, read by FC24: whole records of so many words, or nothing."""
+        """Return what a queue holds, read by FC24: whole records of so many words, or nothing.
+
+        Raises
+        ------
+        DeviceError
+            Where what it holds are no whole records.
+        """
         what = f"reading the queue at register {address}"
         response = await self._request(what, self._in_motion, self._client.read_fifo_queue, address=address)
         found = list(getattr(response, "values", []))

@@ -153,7 +153,15 @@ class Drive:
         return was_enabled
 
     async def reset_fault(self) -> None:
-        """Clear a fault; a drive that reports none is told nothing."""
+        """Clear a fault; a drive that reports none is told nothing.
+
+        Raises
+        ------
+        SettingsError
+            Where the rig file does not say how.
+        DeviceError
+            Where the drive keeps its fault.
+        """
         told = self._decoded(self.told, await self.device.read(self.told.address, self.told.count))
         if not int(told.get("status", 0)) & self.map.fault_mask:
             return
@@ -398,7 +406,13 @@ class Machine:
             part.device.line.close()
 
     async def look(self) -> Row:
-        """Read every device once, moving nothing."""
+        """Read every device once, moving nothing.
+
+        Raises
+        ------
+        DeviceError
+            Where a drive reports a fault.
+        """
         # Several looks: between two requests of one of them a drive may go on to its next sample.
         looks = [await asyncio.gather(*(drive.look() for drive in self.drives)) for _ in range(LOOKS)]
         for reading in looks[-1]:

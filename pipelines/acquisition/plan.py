@@ -74,7 +74,7 @@ def _run(trajectory: Trajectory, sample_rate_hz: float, begin: int, end: int) ->
 
 
 def check_start(rig: RigSettings, angle: NDArray) -> str | None:
-    """Return why the leg must not be moved from where it stands; None if it may."""
+    """Return why the leg must not be moved from where it stands, (J,) rad; None if it may."""
     for drive, found in zip(rig.drive, angle, strict=True):
         low, high = drive.angle_rad
         if not low <= found <= high:

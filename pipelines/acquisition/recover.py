@@ -18,7 +18,13 @@ class Recovered:
 
 
 def journals_in(place: Path) -> list[Path]:
-    """Return the journals below a folder; a file stands for itself."""
+    """Return the journals below a folder; a file stands for itself.
+
+    Raises
+    ------
+    InputError
+        Where there is none.
+    """
     if not place.is_dir():
         return [place]
     found = sorted(place.rglob(f"*{ENDING}"))
@@ -37,6 +43,11 @@ def recover(path: Path, output: Path | None = None) -> Recovered:
     output : Path, optional
         The recording; else what `exoid acquire` would have called it, ``<run>.aborted.parquet`` for a run that was
         killed. A file that is there is never overwritten.
+
+    Raises
+    ------
+    InputError
+        Where it is none, is still written to, or holds no sample, and where the output is there already.
     """
     if not path.exists():
         raise InputError(f"{path}: no such file; `exoid recover` takes the journal that a killed run left")

@@ -184,7 +184,13 @@ class Streams:
 
 
 def sampling_of(machine: Machine, cycle_hz: float, judge: Judge) -> Sampling:
-    """Return how the samples of a machine are to be had; set-points go out at ``cycle_hz``."""
+    """Return how the samples of a machine are to be had; set-points go out at ``cycle_hz``.
+
+    Raises
+    ------
+    DeviceError
+        Where the lines are too slow to tell which samples belong together.
+    """
     if machine.rig.sampling == "cyclic" and machine.rig.clocks == "common":
         return Latched()
     if machine.rig.clocks == "common" and machine.leads_are_vague:

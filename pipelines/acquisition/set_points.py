@@ -32,13 +32,13 @@ class SetPoints:
         return self.between(0, len(self))
 
     def between(self, begin: int, end: int) -> NDArray:
-        """Return set-points ``begin`` to before ``end``."""
+        """Return set-points ``begin`` to before ``end``, (end - begin, J) rad."""
         first, stop = self.first, self.stop
         before, after = self._lead_in[begin:end], self._lead_out[max(begin - stop, 0) : max(end - stop, 0)]
         begin, end = max(begin, first), min(end, stop)
         return np.concatenate([before, *([self._run(begin - first, end - first)] if begin < end else []), after])
 
     def pieces(self) -> Iterator[tuple[int, NDArray]]:
-        """Yield all in pieces, each with its first index; a piece begins with the last one of the one before."""
+        """Yield all in pieces (k, J), each with its first index; a piece begins with the last one of the one before."""
         for begin in range(0, len(self), PIECE):
             yield max(begin - 1, 0), self.between(max(begin - 1, 0), min(begin + PIECE, len(self)))

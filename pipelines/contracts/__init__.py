@@ -38,7 +38,13 @@ __all__ = [
 
 
 def contract_of(path: Path | str) -> Contract:
-    """Return the contract that a file says it keeps."""
+    """Return the contract that a file says it keeps.
+
+    Raises
+    ------
+    ContractError
+        Where it is none that exoid knows.
+    """
     _, metadata = parquet.header(Path(path))
     name = metadata["contract"].partition("/")[0]
     for contract in CONTRACTS:

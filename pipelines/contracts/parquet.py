@@ -89,7 +89,13 @@ def refuse_place(path: Path, contract: str) -> None:
 
 
 def to_json(metadata: Mapping[str, Any], source: str) -> str:
-    """Return metadata as JSON text; NumPy's numbers and arrays become plain ones, paths become text."""
+    """Return metadata as JSON text; NumPy's numbers and arrays become plain ones, paths become text.
+
+    Raises
+    ------
+    ContractError
+        Where something in it has no JSON form.
+    """
     try:
         return json.dumps(dict(metadata), ensure_ascii=False, allow_nan=False, default=_plain)
     except (TypeError, ValueError) as error:

@@ -69,7 +69,17 @@ def problem(
     basis: NDArray,
     samples: int,
 ) -> Problem:
-    """Prepare a search; ``theta0`` is None where the mean angles are searched too."""
+    """Prepare a search.
+
+    Parameters
+    ----------
+    bounds : (3, J, 2) array
+        Lowest and highest angle, velocity and acceleration of each joint, SI units.
+    theta0 : (J,) array or None
+        Mean angles, rad; None where they are searched too.
+    basis : array
+        Columns that span the coefficients that are searched, ``search.basis_of``.
+    """
     phase = 2.0 * np.pi * np.outer(np.arange(1, harmonics + 1), np.arange(samples) / samples)
     return Problem(
         sine=np.sin(phase),

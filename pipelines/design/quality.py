@@ -56,7 +56,13 @@ class Quality:
 
 
 def quality(trajectory: Trajectory, settings: DesignSettings, geometry: Geometry) -> Quality:
-    """Judge an excitation as a whole period of it, by the reference method."""
+    """Judge an excitation as a whole period of it, by the reference method.
+
+    Raises
+    ------
+    InputError
+        Where it moves other joints than hip and knee.
+    """
     names = tuple(joint.name for joint in trajectory.joints)
     if names != JOINTS:
         raise InputError(f"the excitation moves the joints {', '.join(names)}, expected hip and knee")

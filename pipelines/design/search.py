@@ -47,6 +47,11 @@ def search(settings: DesignSettings, geometry: Geometry, report: Report = lambda
     """Find an excitation that keeps its bounds at every time and is as good as can be by the chosen criterion.
 
     ``report`` is called with the share done, 0 to 1, and the best value so far.
+
+    Raises
+    ------
+    NotIdentifiable
+        Where no motion within the bounds tells the parameters apart.
     """
     rng = np.random.default_rng(settings.seed)
     coarse = _problem(settings, geometry, COARSE_SAMPLES, COARSE_SAMPLES_PER_HARMONIC)

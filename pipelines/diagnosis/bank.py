@@ -37,14 +37,14 @@ class Bank:
     """(O,) inverse variance of each output under the baseline."""
 
     def columns_of(self, chosen: Sequence[int]) -> NDArray:
-        """Return the columns of the baseline and some candidates."""
+        """Return the columns of the baseline and some candidates, (c,) places in ``gram``."""
         parts = [np.arange(self.baseline.size)]
         parts += [np.arange(self.where[i].start, self.where[i].stop) for i in chosen]
         return np.concatenate(parts)
 
 
 def weights_under(gram: Gram) -> NDArray:
-    """Return each output's inverse variance under the fit to all columns, iterated."""
+    """Return each output's inverse variance under the fit to all columns, iterated, (O,) 1/(N·m)²."""
     counts = gram.count.sum(axis=0)
     weights = np.where(counts > 0, 1.0, 0.0)
     for _ in range(PASSES):

@@ -174,14 +174,14 @@ def _words(joint: str, joints: Sequence[str], words: str) -> str:
 
 
 def by_kind(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Iterable[tuple[list[Run], list[NDArray]]]:
-    """Yield the runs of each kind with their residuals: what hides in one kind need not be in the other."""
+    """Yield the runs of each kind with their residuals (m, O): what hides in one kind need not be in the other."""
     for kind in dict.fromkeys(run.motion.run for run in runs):
         chosen = [i for i, run in enumerate(runs) if run.motion.run == kind]
         yield [runs[i] for i in chosen], [residuals[i] for i in chosen]
 
 
 def variable_share(variable: Variable, runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> float:
-    """Return the share of a joint's residual variance that smooth curves along a variable foretell."""
+    """Return the share of a joint's residual (m, O) variance that smooth curves along a variable foretell."""
     total = error = 0.0
     for some, left in by_kind(runs, residuals):
         y = pooled(some, [r[:, j] for r in left], j)
@@ -221,8 +221,8 @@ def pooled(runs: Sequence[Run], values: Sequence[NDArray], j: int) -> NDArray:
 def tone(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> tuple[float, float]:
     """Return the strongest frequency (Hz) that no period of the motion explains, and the share it foretells.
 
-    The frequency is shared by all runs, amplitude and phase are each run's own. Both are found on all folds but
-    one and judged on that one.
+    The frequency is shared by all runs' residuals (m, O), amplitude and phase are each run's own. Both are found on
+    all folds but one and judged on that one.
     """
     total = error = 0.0
     found = []
@@ -270,7 +270,7 @@ def _strongest(runs: Sequence[Run], residuals: Sequence[NDArray]) -> float:
 
 
 def excesses(runs: Sequence[Run], residuals: Sequence[NDArray], floor: Floor) -> list[Excess]:
-    """Return how far each run's residual stands above the noise floor, joint by joint."""
+    """Return how far each run's residual (m, O) stands above the noise floor, joint by joint."""
     return [
         Excess(
             joint, run.motion.file, run.motion.run,

@@ -70,7 +70,7 @@ def _shared_values(fit: Fit, baseline: Baseline) -> tuple[NDArray, NDArray]:
 
 
 def settled(fit: Fit, run: Run, baseline: Baseline) -> tuple[list[Term], NDArray]:
-    """Return the causes as terms of a run's model with its own onsets and phases, and the baseline's values."""
+    """Return the causes as terms of a run's model with its own onsets and phases, and the baseline's values (b,)."""
     values, _, terms = _learn(fit, laden([run], fit, baseline)[0], baseline, [run.usable])[0]
     at = baseline.size
     filled = []

@@ -101,12 +101,12 @@ class Examined:
 
 
 def heard_in(runs: Sequence[Run], residuals: Sequence[NDArray]) -> dict[str, float]:
-    """Return the log likelihood that is known of play besides what it does to the mean torque, by label."""
+    """Return the log likelihood of play that residuals (m, O) tell besides their mean over periods, by label."""
     return _by_label(Backlash, runs, evidence_of_play(runs, residuals, MOST_INDEPENDENT))
 
 
 def felt_in(runs: Sequence[Run], residuals: Sequence[NDArray]) -> dict[str, float]:
-    """Return that of a wearer's pushes. A rhythm fitted to them explains some of it: the two do not add up."""
+    """Return that of a wearer's pushes, of residuals (m, O). A rhythm fitted to them explains some of it too."""
     return _by_label(VoluntaryTorque, runs, evidence_of_will(runs, residuals))
 
 

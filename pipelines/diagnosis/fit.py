@@ -81,7 +81,9 @@ class Fit:
 def fit(
     causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline, weights: NDArray, loads: NDArray | None = None
 ) -> Fit:
-    """Fit baseline and causes at the shapes they have, to runs with the ``loads`` that ``Fit.loads`` tells of."""
+    """Fit baseline and causes at the shapes they have, to runs with the ``loads`` that ``Fit.loads`` tells of.
+
+    ``weights`` (O,) are the outputs' inverse variances."""
     gram = gram_of_runs(runs, *zip(*stacked_columns(causes, runs, baseline), strict=True))
     values = solve(gram, weights)
     ordered, kinds = tuple(sorted(causes, key=_last_sensors)), tuple(run.motion.run for run in runs)
@@ -135,7 +137,7 @@ def _errors(gram: Gram, values: NDArray) -> tuple[NDArray, NDArray, float]:
 
 
 def refined(causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline, weights: NDArray) -> Fit:
-    """Fit with every shape parameter at its best, one after the other."""
+    """Fit with every shape parameter at its best, one after the other; ``weights`` (O,) as in ``fit``."""
     best = fit(causes, runs, baseline, weights)
     for sweep in range(SWEEPS):
         if sweep and best.causes:

@@ -28,7 +28,7 @@ class Gram:
     """(F, O) usable blocks."""
 
     def select(self, chosen: Sequence[int] | NDArray) -> "Gram":
-        """Return the products of some of the columns."""
+        """Return the products of some of the columns, (k,) places."""
         chosen = np.asarray(chosen)
         return Gram(self.columns[:, :, chosen[:, None], chosen], self.measured[:, :, chosen], self.square, self.count)
 

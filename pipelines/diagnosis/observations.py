@@ -197,7 +197,7 @@ def like_trained(run: Run, baseline: Baseline) -> Run:
 
 
 def with_load(run: Run, baseline: Baseline, values: NDArray) -> Run:
-    """Return the run with the loads of links and limb estimated from the baseline's rigid bodies.
+    """Return the run with the loads of links and limb estimated from the baseline's rigid bodies in ``values`` (b,).
 
     The measured torques would not do: their noise would stand on both sides of the regression.
     """

@@ -46,7 +46,7 @@ class Scan:
 
     @classmethod
     def of(cls, runs: Sequence[Run], untouched: Sequence[NDArray], weights: NDArray) -> "Scan":
-        """Prepare a scan."""
+        """Prepare a scan of runs with baseline columns ``untouched`` (m, O, b), outputs weighed by ``weights`` (O,)."""
         roots = [np.sqrt(weights) * run.usable for run in runs]
         weighted = [(c * r[:, :, np.newaxis]).reshape(-1, c.shape[2]) for c, r in zip(untouched, roots, strict=True)]
         lengths = np.cumsum([len(w) for w in weighted])[:-1]
@@ -120,7 +120,7 @@ def _grid(effect: Effect, bends: bool, runs: Sequence[Run]) -> Iterator[tuple[fl
 
 
 def values_of(parameter: Parameter, count: int) -> NDArray:
-    """Return the values of a shape parameter that are tried."""
+    """Return the values of a shape parameter that are tried, (count,) or fewer, in its unit."""
     if parameter.forms:
         return np.array(parameter.forms)
     if parameter.default is not None:

@@ -65,7 +65,9 @@ def log_likelihood(rms: NDArray, before: NDArray, independent: NDArray, imperfec
 
 
 def cost(causes: Sequence[Candidate], columns: int, independent: NDArray) -> float:
-    """Return what a set must gain for its parameters: Schwarz's price for each amplitude, and the shapes' search."""
+    """Return what a set must gain for its parameters: Schwarz's price for each amplitude, and the shapes' search.
+
+    ``independent`` (O,) counts each output's independent samples (Schwarz, 1978, Annals of Statistics 6(2))."""
     shapes = sum(len(c.effect.shape) for c in causes)
     return SHAPE_COST * shapes + 0.5 * columns * float(np.log(np.max(independent)))
 

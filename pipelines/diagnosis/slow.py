@@ -60,7 +60,7 @@ def slow_error(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SlowError:
 
 
 def slowed(run: Run, residual: NDArray, length_s: float = SLOW_S, needed: float = 1.0) -> tuple[Run, NDArray]:
-    """Average neighbouring blocks to a length, (m // k, O), where a share of them is usable; never across a gap."""
+    """Average neighbouring blocks to a length, (m/k, O), where a share of them is usable; never across a gap."""
     width = run.block.decimation / run.motion.sample_rate_hz
     k = max(1, round(length_s / width))
     whole = len(residual) // k * k

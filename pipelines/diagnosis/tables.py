@@ -17,7 +17,10 @@ from pipelines.effects.rigid_body import RigidBody
 
 
 def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.DataFrame, NDArray]:
-    """Return ``parameters/1`` of a fit and its covariance, rigid bodies for each kind of run, and the human's."""
+    """Return ``parameters/1`` of a fit, p rows, and their covariance (p, p).
+
+    A rigid body for each kind of run, and the human's.
+    """
     rows: list[dict[str, Any]] = []
     maps: list[NDArray] = []
     size = len(sure.covariance)
@@ -94,7 +97,7 @@ def _add_causes(fit: Fit, baseline: Baseline, sure: Uncertainty, add) -> None:
 
 
 def residual_rows(run: Run, residual: NDArray, model: str) -> pd.DataFrame:
-    """Return a run's rows of ``residuals/1``."""
+    """Return a run's rows of ``residuals/1`` for what a model leaves of it, (m, O) N·m."""
     joints = joints_of(run.motion.metadata)
     J = len(joints)
     columns: dict[str, Any] = {
@@ -116,7 +119,7 @@ def residual_rows(run: Run, residual: NDArray, model: str) -> pd.DataFrame:
 
 
 def residual_table(runs: Sequence[Run], by_model: Mapping[str, Sequence[NDArray]]) -> pd.DataFrame:
-    """Return ``residuals/1`` of several runs under several models."""
+    """Return ``residuals/1`` of several runs under several models, each residual (m, O) N·m."""
     return pd.concat(
         [
             residual_rows(run, residual, model)

@@ -82,6 +82,11 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
     """Lay a model out for the compiled dynamics.
 
     ``model`` holds the terms of one kind of run (``Model.for_run``).
+
+    Raises
+    ------
+    InputError
+        Where a joint has two transmissions, or cuffs and joints are both compliant.
     """
     terms = in_order(model)
     effects = [term.effect for term in terms]

@@ -49,7 +49,10 @@ def make_drives(
     sample_rate_hz: float,
     speed_cutoff_hz: float = 100.0,
 ) -> Drives:
-    """Lay drives out for the compiled loop; ``rate_hz`` is rounded to a multiple of the sample rate."""
+    """Lay drives out for the compiled loop, gains and limits (J,) each.
+
+    ``rate_hz`` is rounded to a multiple of the sample rate.
+    """
     periods = max(1, round(rate_hz / sample_rate_hz))
     period = 1.0 / (sample_rate_hz * periods)
     counts = np.asarray(counts_per_turn, float)

@@ -65,7 +65,13 @@ def make_plant(model: Model, geometry: Geometry, joints: tuple[Joint, ...], run:
 
 
 def plant_from_table(table: Table, run: str, default_geometry: Geometry | None = None) -> Plant:
-    """Return the plant that a ``parameters/1`` table describes for one kind of run."""
+    """Return the plant that a ``parameters/1`` table describes for one kind of run.
+
+    Raises
+    ------
+    InputError
+        Where it holds no model of that run.
+    """
     bodies = table.frame.loc[table.frame["effect"] == "rigid_body", "run"]
     if not (bodies.isna() | (bodies == run)).any():
         known = ", ".join(sorted(set(bodies) - {"human"})) or "none"

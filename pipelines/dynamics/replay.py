@@ -57,6 +57,11 @@ def replay(model: Model, motion: Motion, window_s: float = WINDOW_S, every_s: fl
     motion : Motion
     window_s, every_s : float
         Length of a window and time from one start to the next, s.
+
+    Raises
+    ------
+    InputError
+        Where no stretch of valid samples is as long as a window.
     """
     length = round(window_s * motion.sample_rate_hz)
     every = max(1, round(every_s * motion.sample_rate_hz))

@@ -215,11 +215,11 @@ class Effect(ABC):
         return motion.joint_index(self.joint) if self.joint else -1
 
     def physical(self, values: NDArray) -> NDArray:
-        """Return the values of ``parameters`` for those of ``fitted``."""
+        """Return the values of ``parameters`` for those of ``fitted``, (p,) each."""
         return np.asarray(values, dtype=float)
 
     def values_from(self, physical: NDArray) -> NDArray:
-        """Return the values of ``fitted`` for those of ``parameters``: the inverse of ``physical``."""
+        """Return the values of ``fitted`` for those of ``parameters``, (p,) each: the inverse of ``physical``."""
         return np.asarray(physical, dtype=float)
 
     def jacobian(self, values: NDArray) -> NDArray:
@@ -231,7 +231,7 @@ class Effect(ABC):
         return ((ahead - behind) / (2.0 * np.diag(steps)[:, np.newaxis])).T
 
     def completed(self, values: NDArray | tuple[float, ...]) -> NDArray:
-        """Return values of ``fitted`` with the defaults of those that are left out at the end."""
+        """Return values of ``fitted``, (p,), with the defaults of those that are left out at the end."""
         rest = [p.default for p in self.fitted[len(values) :]]
         return np.append(np.asarray(values, dtype=float), [d for d in rest if d is not None])
 
@@ -293,5 +293,7 @@ class Effect(ABC):
         return torque - self.torque(motion, values) if self.torque_reading is not None else torque
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
-        """Return the motion as it would have been measured without this effect in the sensor or transmission."""
+        """Return the motion as it would have been measured without this effect in the sensor or transmission.
+
+        ``shape`` (s,) holds the nonlinear parameters of this run, in the order of ``self.shape``."""
         return motion

@@ -13,7 +13,7 @@ SHARE = 0.5
 
 
 def scaled_gram(gram: NDArray) -> NDArray:
-    """Return A'A with the columns of A scaled to unit norm."""
+    """Return A'A, (p, p), with the columns of A scaled to unit norm."""
     size = np.sqrt(np.diag(gram))
     return gram / np.outer(size, size)
 
@@ -41,7 +41,7 @@ def collinearities(gram: NDArray, names: Sequence[str]) -> list[str]:
 
 
 def worst_direction(scaled: NDArray, names: Sequence[str]) -> list[str]:
-    """Return the parameters that the least determined combination mixes."""
+    """Return the parameters that the least determined combination of a scaled A'A, (p, p), mixes."""
     _, vectors = np.linalg.eigh(scaled)
     weight = np.abs(vectors[:, 0])
     return [names[i] for i in np.argsort(-weight) if weight[i] > 0.3 * weight.max()]

@@ -27,11 +27,11 @@ class Compressed:
     """(J,) how many rows there were."""
 
     def select(self, columns: NDArray) -> "Compressed":
-        """Return the regression on some of the parameters."""
+        """Return the regression on some of the parameters, (k,) columns."""
         return replace(self, regressor=self.regressor[:, :, columns])
 
     def with_held(self, columns: NDArray, values: NDArray) -> "Compressed":
-        """Return the same rows, less the torque of parameters whose values are known."""
+        """Return the same rows, less the torque of parameters, (k,) columns, whose values (k,) are known."""
         return replace(self, torque=self.torque - self.regressor[:, :, columns] @ values)
 
 

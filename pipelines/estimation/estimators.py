@@ -23,7 +23,13 @@ ESTIMATORS: tuple[type[Estimator], ...] = (
 
 
 def estimator_named(name: str) -> Estimator:
-    """Look an estimator up by the name that ``--method`` and exoid.toml use."""
+    """Look an estimator up by the name that ``--method`` and exoid.toml use.
+
+    Raises
+    ------
+    InputError
+        Where there is none of this name.
+    """
     known = {estimator.name: estimator for estimator in ESTIMATORS}
     if name not in known:
         raise InputError(f"--method: there is no method {name!r}; {suggestion(name, list(known))}")

@@ -61,7 +61,7 @@ class OrdinaryLeastSquares(WeightedLeastSquares):
 
 
 def scores_of(problem: Problem, values: NDArray, weights: NDArray) -> Scores:
-    """Return what every block adds to the normal equations' residual."""
+    """Return what every block adds to the normal equations' residual, (m, k); values (k,), joints' weights (J,)."""
     every = problem.completed(values)
 
     def go_through() -> Iterator[tuple[Hashable, NDArray]]:

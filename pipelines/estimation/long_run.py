@@ -34,7 +34,7 @@ def long_run_covariance(scores: Scores, parameters: int) -> LongRun:
     Parameters
     ----------
     scores : callable
-        Gone through twice: for the lag, and for the sum.
+        Of pieces (m, p); gone through twice: for the lag, and for the sum.
     parameters : int
         Fitted parameters, for the loss of degrees of freedom.
     """

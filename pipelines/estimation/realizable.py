@@ -60,6 +60,11 @@ def nearest(problem: Problem, values: NDArray, normal: NDArray) -> NDArray:
     """Return the realizable values (k,) nearest to ``values`` in the norm of the ``normal`` matrix (k, k).
 
     For least-squares values and their normal matrix these leave the least residual.
+
+    Raises
+    ------
+    NotIdentifiable
+        Where the program finds none.
     """
     # In standard errors about the free fit: numbers near one, whatever the units.
     size = np.sqrt(np.diag(np.linalg.inv(normal)))

@@ -54,7 +54,7 @@ class Exported:
 
     @property
     def X(self) -> NDArray:
-        """Inertial parameters of all that moves."""
+        """Inertial parameters of all that moves, (p,) in the mechanism's order and units."""
         return self.terms[0].values
 
     def of(self, effect: str, joint: str) -> Term | None:

@@ -47,12 +47,12 @@ class Summary:
 
     @property
     def noise(self) -> NDArray:
-        """Rms of measured less filtered angle, rad: the encoder's noise and what the filter took."""
+        """Rms of measured less filtered angle, (J,) rad: the encoder's noise and what the filter took."""
         return self._noise.root
 
     @property
     def velocity_difference(self) -> NDArray | None:
-        """Rms of the drive's own velocity less the filtered one, rad/s; None where the drive gave none."""
+        """Rms of the drive's own velocity less the filtered one, (J,) rad/s; None where the drive gave none."""
         return self._velocity.root if self._velocity.count.any() else None
 
 

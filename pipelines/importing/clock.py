@@ -59,7 +59,13 @@ def seconds(found: NDArray, origin: float, settings: TimeSettings, findings: lis
 
 
 def first_stamp(found: NDArray) -> float:
-    """Return the first stamp that is one, as it stands in the file."""
+    """Return the first of the stamps (n,) that is one, as it stands in the file.
+
+    Raises
+    ------
+    InputError
+        Where none is.
+    """
     known = found if found.dtype.kind in "iu" else found[np.isfinite(found)]
     if not len(known):
         raise InputError("no row has a time stamp; correct time.column or time.unit in the map")

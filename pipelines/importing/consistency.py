@@ -41,7 +41,7 @@ def _through_origin(x: NDArray, y: NDArray) -> Agreement | None:
 
 
 def mean_power(time_s: NDArray, angle: NDArray, torque: NDArray) -> tuple[float, float]:
-    """Return mean and mean magnitude of torque times the angle's derivative.
+    """Return mean and mean magnitude, W, of torque (n,) N·m times the derivative of the angle (n,) rad at times (n,) s.
 
     What a drive delivers between two instants of equal state can only have gone into friction: the mean is positive
     where the signs of both columns agree.
@@ -56,7 +56,7 @@ def mean_power(time_s: NDArray, angle: NDArray, torque: NDArray) -> tuple[float,
 
 
 def whole_rows(*columns: NDArray) -> list[NDArray]:
-    """Return the rows, from the middle of the log, in which every column has a number."""
+    """Return the rows of columns (n,), from the middle of the log, in which every column has a number."""
     middle = slice(max(0, (len(columns[0]) - MOST) // 2), (len(columns[0]) + MOST) // 2)
     known = np.all([np.isfinite(column[middle]) for column in columns], axis=0)
     return [column[middle][known] for column in columns]

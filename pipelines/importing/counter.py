@@ -7,7 +7,7 @@ from pipelines.importing.finding import Finding, counted
 
 
 def signed(values: NDArray, bits: int, where: str, findings: list[Finding]) -> NDArray:
-    """Return what a signed register holds that was logged as if it had no sign (two's complement).
+    """Return what a signed register holds, (n,), that was logged as if it had no sign (two's complement).
 
     What no register of so many bits can hold is missing: 4.2949673e9 was a number near 2^32 before its last digits
     were lost, and its sign is known but not its value.
@@ -27,7 +27,7 @@ def signed(values: NDArray, bits: int, where: str, findings: list[Finding]) -> N
 
 
 def unwrapped(values: NDArray, modulus: float, where: str, findings: list[Finding]) -> NDArray:
-    """Return a counter that starts anew at ``modulus`` counted on: no step is larger than half of it."""
+    """Return a counter (n,) that starts anew at ``modulus`` counted on: no step is larger than half of it."""
     known = np.isfinite(values)
     steps = np.diff(values[known])
     turns = -np.round(steps / modulus)

@@ -98,7 +98,13 @@ class Log:
 
 
 def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
-    """Read the columns that a map names, and look at their clock."""
+    """Read the columns that a map names, and look at their clock.
+
+    Raises
+    ------
+    SettingsError
+        Where the map names what the log does not have.
+    """
     channels = tuple(_channels(settings))
     needed = _needed(channels, settings.time)
     for name, where in needed.items():

@@ -18,7 +18,7 @@ GIVES_BACK = 0.2
 
 
 def look_at(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Finding]:
-    """Yield what is not plausible about a recording's columns."""
+    """Yield what is not plausible about a recording's columns, (n,) each in SI units."""
     for joint in settings.joint:
         yield from _still(columns, joint)
         yield from _velocity(columns, joint)

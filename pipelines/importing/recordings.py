@@ -50,7 +50,13 @@ class Imported:
 
 
 def recordings(path: Path, settings: ImportMap, map_path: Path) -> Iterator[Imported]:
-    """Yield the recordings that a map makes of a log."""
+    """Yield the recordings that a map makes of a log.
+
+    Raises
+    ------
+    SettingsError
+        Where no ``[[recording]]`` of the map is of this file.
+    """
     wanted = [recording for recording in settings.recording if recording.is_of(path.name)]
     if not wanted:
         patterns = ", ".join(recording.files for recording in settings.recording)

@@ -149,6 +149,11 @@ def cuff_torque(thigh, shank, q, geometry: Geometry) -> NDArray:
         Sum of front and back sensor in the segment's frame, N: x distal, y forward, z lateral.
     q : (n, 2) array
         Joint angles, rad.
+
+    Raises
+    ------
+    ValueError
+        Where the geometry does not say where the cuffs are.
     """
     d_thigh, d_shank = geometry.thigh_cuff_distance_m, geometry.shank_cuff_distance_m
     if d_thigh is None or d_shank is None:

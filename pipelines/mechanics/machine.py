@@ -62,7 +62,13 @@ THE_LEG = Machine()
 def machine_of(
     joints: Sequence[Joint], geometry: Geometry, source: Any = "", scales: tuple[Scale, ...] = ()
 ) -> Machine:
-    """Return the machine with these joints; ``source`` begins the message where there is none."""
+    """Return the machine with these joints; ``source`` begins the message where there is none.
+
+    Raises
+    ------
+    InputError
+        Where no mechanism has such joints.
+    """
     kinds = tuple(joint.kind for joint in joints)
     for mechanism in MECHANISMS:
         if mechanism.kinds == kinds and mechanism.has_gravity in (None, geometry.gravity_m_s2 != 0.0):

@@ -155,7 +155,7 @@ class Motion:
         return smooth, rate, curvature
 
     def with_state(self, q: NDArray, dq: NDArray, ddq: NDArray) -> "Motion":
-        """Return the same run with other kinematics, as a corrected measurement has."""
+        """Return the same run with other kinematics, (n, J) each, as a corrected measurement has."""
         made = replace(self, q=q, dq=dq, ddq=ddq)
         # The torques are the same, and smoothing them costs more than the correction did.
         made.__dict__.update({name: self.__dict__[name] for name in LOADS if name in self.__dict__})

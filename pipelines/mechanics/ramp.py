@@ -9,7 +9,7 @@ def smooth_share(progress: NDArray) -> NDArray:
 
     Parameters
     ----------
-    progress : array
+    progress : (n,) array
         Time over the ramp's length; before 0 the share is 0, after 1 it is 1.
     """
     s = np.clip(progress, 0.0, 1.0)

@@ -36,7 +36,7 @@ class Stretches:
 
     @property
     def samples(self) -> NDArray:
-        """How many each has."""
+        """How many each has, (s,)."""
         return self.stop - self.start
 
     @property
@@ -50,7 +50,7 @@ class Stretches:
 
 
 def find_stretches(times: Iterable[NDArray], rate_hz: float) -> Stretches:
-    """Find the stretches of a recording whose times (s, strictly increasing) come piece by piece.
+    """Find the stretches of a recording whose times, (n,) s and strictly increasing, come piece by piece.
 
     Raises
     ------

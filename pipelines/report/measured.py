@@ -110,7 +110,7 @@ def _angle_chart(run: str, joint: Joint, tables: dict[str, pd.DataFrame]) -> Cha
 
 
 def broken(frame: pd.DataFrame, column: str) -> NDArray:
-    """Return a column with a gap where a window begins: no line may join two simulations."""
+    """Return a column (n,) with a gap where a window begins: no line may join two simulations."""
     begins = frame["window"].diff().fillna(0) != 0
     return frame[column].where(~begins, np.nan).to_numpy()
 

@@ -134,7 +134,7 @@ def _animation(one: Animation) -> dict[str, Any]:
 
 
 def coded(values: NDArray, dtype: type[np.floating]) -> str:
-    """Return numbers as base64 of their little-endian bytes, row by row."""
+    """Return numbers, (n,) or (n, k), as base64 of their little-endian bytes, row by row."""
     return base64.b64encode(np.ascontiguousarray(values, np.dtype(dtype).newbyteorder("<")).tobytes()).decode()
 
 

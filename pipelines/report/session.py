@@ -77,7 +77,13 @@ class Session:
 
     @cached_property
     def verdict_file(self) -> Artifact | None:
-        """The diagnosis's file: the only one, or that in ``diagnosed/``, where `make` has it; two would contradict."""
+        """The diagnosis's file: the only one, or that in ``diagnosed/``, where `make` has it; two would contradict.
+
+        Raises
+        ------
+        InputError
+            Where there are several, and none in ``diagnosed/``.
+        """
         found = self.of_kind("verdict")
         usual = [one for one in found if one.path.parent in [folder / "diagnosed" for folder in self.folders]]
         found = usual or found

@@ -160,7 +160,13 @@ class Plant:
 
 
 def term_of(effect: PlantEffect, source: str) -> Term:
-    """Return a setting as a term of the model; ``source`` starts the message of a refusal."""
+    """Return a setting as a term of the model; ``source`` starts the message of a refusal.
+
+    Raises
+    ------
+    SettingsError
+        Where its joint or its values are not the effect's.
+    """
     try:
         made = effect_named(effect.effect)(joint=effect.joint)
         if (effect.joint is None) != made.whole_leg:

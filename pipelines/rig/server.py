@@ -51,7 +51,13 @@ READ_WRITE = 23
 
 
 def build_plant(rig: RigSettings, path: Path, run: str, seed: int = 0, sample_rate_hz: float | None = None) -> Plant:
-    """Return the plant of a rig file, with what it hides; ``sample_rate_hz`` is that of set-points."""
+    """Return the plant of a rig file, with what it hides; ``sample_rate_hz`` is that of set-points.
+
+    Raises
+    ------
+    SettingsError
+        Where it has no ``[plant]``.
+    """
     if rig.plant is None:
         raise SettingsError(f"{path}: plant: missing, so there is no machine to play; add a [plant], see docs/rig.md")
     hidden = hidden_effects(path.parent / rig.plant.sealed) if rig.plant.sealed else ()
@@ -323,6 +329,11 @@ async def serve(
         Address on which TCP ports listen.
     sample_rate_hz : float, optional
         Rate of set-points, where not the plant's settings'.
+
+    Raises
+    ------
+    SettingsError
+        Where one ``port`` is given for devices on several lines.
     """
     virtual = VirtualRig(rig, plant, sample_rate_hz)
     on_line: dict[str | int, list[SimDevice]] = defaultdict(list)

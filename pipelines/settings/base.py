@@ -18,7 +18,13 @@ class Settings(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     def changed(self, **values: Any) -> Self:
-        """Return the settings with some values replaced, as command-line options do; None leaves one as it is."""
+        """Return the settings with some values replaced, as command-line options do; None leaves one as it is.
+
+        Raises
+        ------
+        SettingsError
+            Where the result is not valid.
+        """
         content = self.model_dump() | {name: value for name, value in values.items() if value is not None}
         try:
             return type(self).model_validate(content)

@@ -86,7 +86,13 @@ class Experiment(Settings):
             )
 
     def run_named(self, name: str) -> RunSettings:
-        """Return one run's settings by its name."""
+        """Return one run's settings by its name.
+
+        Raises
+        ------
+        SettingsError
+            Where there is no run of this name.
+        """
         for run in self.run:
             if run.name == name:
                 return run

@@ -252,7 +252,13 @@ class ImportMap(Settings):
 
 
 def load_map(path: Path) -> ImportMap:
-    """Return the map in a file."""
+    """Return the map in a file.
+
+    Raises
+    ------
+    SettingsError
+        Where there is no such file.
+    """
     if not path.exists():
         raise SettingsError(f"{path}: no such file; `exoid import FILE... --guess --map {path}` proposes one")
     return load_toml(path, ImportMap)

@@ -17,6 +17,11 @@ def create(folder: Path, exoid: str) -> None:
         The experiment's folder, made if need be.
     exoid : str
         The command that the Makefile calls unless told otherwise.
+
+    Raises
+    ------
+    SettingsError
+        Where the folder has one of them already.
     """
     source = datasets()
     for name in ("exoid.toml", "rigs", "Makefile"):

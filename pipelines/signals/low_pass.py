@@ -46,6 +46,6 @@ def low_pass(x: NDArray, rate_hz: float, cutoff_hz: float, order: int = ORDER) -
 
 
 def derivative(x: NDArray, rate_hz: float, order: int) -> NDArray:
-    """Differentiate uniform samples along the first axis, ``order`` 1 or 2, by central differences."""
+    """Differentiate uniform samples (n, ...) along the first axis, ``order`` 1 or 2, by central differences."""
     differences = savgol_filter(x, DERIVATIVE_STENCIL, DERIVATIVE_STENCIL - 1, deriv=order, delta=1.0 / rate_hz, axis=0)
     return np.ascontiguousarray(differences)

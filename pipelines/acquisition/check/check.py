@@ -40,6 +40,11 @@ def check_rig(
         Who moves the joints and presses the cuffs, if all devices answer.
     move : bool
         Whether the drives shall move the joints a little, once nothing else is wrong.
+
+    Raises
+    ------
+    SettingsError
+        Where no rate is told, and the rig records by itself.
     """
     if run == "with_human":
         refuse_to_move_somebody(by_hand=operator is not None, move=move)

@@ -41,7 +41,7 @@ class Series:
 
     @property
     def fresh(self) -> NDArray:
-        """Indices of the first answer with each new sample."""
+        """Indices of the first answer with each new sample, (k,)."""
         register = self.block.registers["sequence"]
         start = register.address - self.block.address
         counter = self.words[:, start : start + register.registers]

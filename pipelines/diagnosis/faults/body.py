@@ -46,7 +46,7 @@ class Averages:
         return LEG.regressor(q, dq, ddq, self.motion.geometry) @ FROM_POSITIVE
 
     def joint_columns(self, joint: int, reading: Reading = AS_RECORDED) -> NDArray:
-        """Columns of one joint: its share of the rigid body, Coulomb, viscous, and an offset of either sign."""
+        """Columns of one joint, (m, k): its share of the rigid body, Coulomb, viscous, and an offset of either sign."""
         order, sign = reading
         body = self.body(reading)[:, joint, slice(1, 3) if joint else slice(None)]
         friction = np.column_stack([self.direction[:, order[joint]], self.dq[:, order[joint]]]) * sign[joint]

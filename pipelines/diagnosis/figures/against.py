@@ -97,7 +97,7 @@ def _along_tone(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> tu
 
 
 def reach(*residuals: NDArray) -> float:
-    """Return how tall a panel must be to show residuals, N·m either side of nought."""
+    """Return how tall a panel must be to show residuals (m,), N·m either side of nought."""
     return 1.1 * max((float(np.percentile(np.abs(e), TALLEST)) for e in residuals if len(e)), default=1.0)
 
 

@@ -26,7 +26,7 @@ HANGS_RAD = 0.15
 def write_joint(
     proposal: Proposal, number: int, joint: JointColumns, columns: Columns, time_s: NDArray, alone: bool
 ) -> list[str]:
-    """Write a joint's tables into a map; return the columns that are in them.
+    """Write a joint's tables into a map; return the columns (n,) that are in them.
 
     Only of a joint ``alone`` does its own motion tell what its torque does: others throw it about.
     """

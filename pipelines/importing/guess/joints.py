@@ -29,7 +29,7 @@ class JointColumns:
 def group_joints(
     meanings: Sequence[Meaning], columns: Mapping[str, NDArray], time_s: NDArray, clock: str
 ) -> list[JointColumns]:
-    """Return the joints of a log, in the order of their columns."""
+    """Return the joints of a log of columns (n,) at times (n,) s, in the order of their columns."""
     usable = [m for m in meanings if m.column != clock and _moves(columns[m.column], len(time_s))]
     by_joint: dict[str, list[Meaning]] = {}
     for found in usable:

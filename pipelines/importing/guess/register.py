@@ -8,12 +8,12 @@ FEW = 0.001
 
 
 def are_whole(known: NDArray) -> bool:
-    """Tell whether values are whole numbers, but for a slip here and there."""
+    """Tell whether values (n,) are whole numbers, but for a slip here and there."""
     return bool(len(known)) and bool(np.mean(known == np.round(known)) > 0.99)
 
 
 def lost_sign(values: NDArray) -> int | None:
-    """Return the bits of a signed register that was logged as if it had none; None where it was not.
+    """Return the bits of a signed register, (n,), that was logged as if it had none; None where it was not.
 
     Its values are whole, never negative, and in the upper half as well as near zero, with next to nothing between.
     """

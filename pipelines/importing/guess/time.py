@@ -31,7 +31,7 @@ class TimeGuess:
 
 
 def guess_time(meanings: Sequence[Meaning], columns: Mapping[str, NDArray]) -> TimeGuess | None:
-    """Return the clock; None where no column is one."""
+    """Return the clock among columns (n,); None where none is one."""
     advancing = [meaning for meaning in meanings if _advances(columns[meaning.column])]
     candidates = [meaning for meaning in advancing if meaning.quantity == "time"] or advancing
     for found in sorted(candidates, key=lambda meaning: meaning.unit is None):

@@ -7,7 +7,13 @@ from pipelines.errors import InputError
 
 
 def library(name: str) -> ModuleType:
-    """Return a library of the extra ``import``; where it is not installed, say how to install it."""
+    """Return a library of the extra ``import``; where it is not installed, say how to install it.
+
+    Raises
+    ------
+    InputError
+        Where it is not installed.
+    """
     try:
         return importlib.import_module(name)
     except ImportError as error:

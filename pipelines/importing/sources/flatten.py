@@ -9,7 +9,7 @@ from pipelines.importing.sources.source import Columns
 
 
 def flattened(content: Any, name: str = "") -> Columns:
-    """Return every array of numbers, or of text, below an object; what is something else is left out."""
+    """Return every array (n,) of numbers, or of text, below an object; what is something else is left out."""
     return dict(_columns(content, name))
 
 

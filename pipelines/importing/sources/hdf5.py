@@ -16,7 +16,13 @@ MATLAB_CLASSES_OF_NUMBERS = (b"double", b"single", b"logical", *(f"{s}int{b}".en
 
 
 def open_hdf5(path: Path, settings: SourceSettings, format: str = "HDF5") -> Source:
-    """Return the log in an HDF5 file; a data set in groups has a name with slashes, ``run1/hip/angle``."""
+    """Return the log in an HDF5 file; a data set in groups has a name with slashes, ``run1/hip/angle``.
+
+    Raises
+    ------
+    InputError
+        Where the file is damaged.
+    """
     h5py = library("h5py")
     try:
         with h5py.File(path) as file:

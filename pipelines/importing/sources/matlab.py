@@ -15,7 +15,13 @@ V73 = b"MATLAB 7.3"
 
 
 def open_matlab(path: Path, settings: SourceSettings) -> Source:
-    """Return the variables of a .mat file; fields of a struct have dotted names, columns of a matrix numbered ones."""
+    """Return the variables of a .mat file; fields of a struct have dotted names, columns of a matrix numbered ones.
+
+    Raises
+    ------
+    InputError
+        Where the file is damaged, or has not the variable that the map names.
+    """
     with open(path, "rb") as file:
         if file.read(len(V73)) == V73:
             return open_hdf5(path, settings, "MATLAB v7.3")

@@ -21,6 +21,11 @@ def open_rosbag(path: Path, settings: SourceSettings) -> Source:
 
     Columns are ``JOINT.position``, ``.velocity`` and ``.effort``; ``stamp`` is the header's time and ``log_time``
     when the message was recorded, both in whole nanoseconds.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be read.
     """
     highlevel, typesys = library("rosbags.highlevel"), library("rosbags.typesys")
     store = typesys.get_typestore(typesys.Stores.LATEST)
