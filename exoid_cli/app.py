@@ -27,6 +27,7 @@ from exoid_cli.detect import detect
 from exoid_cli.diagnose import diagnose
 from exoid_cli.effects import effects
 from exoid_cli.export import export
+from exoid_cli.figures import figures
 from exoid_cli.filter import filter_
 from exoid_cli.heeding import Command, JsonOption, QuietOption, heeding
 from exoid_cli.identify import identify
@@ -70,6 +71,7 @@ _add("identify", identify, "Fit the leg's parameters; judge them on other runs."
 _add("diagnose", diagnose, "Name what the model gets wrong, and measure the gain.")
 _add("simulate", simulate, "Simulate the identified leg, or replay a recording.")
 _add("report", report, "Write one page that shows all that was found.")
+_add("figures", figures, "Draw the report's figures as PDF and PNG.")
 _add("export", export, "Hand a model to MuJoCo, URDF, MATLAB, C or JSON.")
 _add("show", show, "Say what a file is, and what is in it.")
 _add("effects", effects, "List the effects a model can have, or explain one.")

@@ -7,13 +7,13 @@ import typer
 
 from exoid_cli.console import console
 
-Folders = Annotated[
+FoldersArgument = Annotated[
     list[Path] | None, typer.Argument(metavar="DIR...", help="Folders that the stages wrote to; this one unless given.")
 ]
 
 
 def report(
-    folders: Folders = None,
+    folders: FoldersArgument = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="The page to write.")] = Path("report.html"),
     config: Annotated[
         Path | None, typer.Option("--config", help="exoid.toml, to be named in the command lines that repeat it.")
@@ -39,16 +39,33 @@ def report(
 
     if output.is_dir():
         raise SettingsError(f"-o {output}: is a folder, expected the name of a page; write {output / 'report.html'}")
-    if compare and folders:
-        raise SettingsError("--compare takes both its folders itself; drop the others, or --compare")
+    if compare:
+        if folders:
+            raise SettingsError("--compare names both its folders itself; drop the others, or --compare")
+        _compare(compare, output)
+        return
     session = find(folders or [Path()], config)
+
     with console.progress("writing the page", 1.0):
         page = page_of(session, title)
     write_text(output, page)
     for trouble in session.unreadable:
         console.warn(trouble)
-    verdict = session.verdict or {}
-    console.emit({"path": str(output), "bytes": len(page.encode()), "summary": verdict.get("summary")})
-    if verdict:
-        console.say(verdict["summary"])
+    summary = session.verdict["summary"] if session.verdict else None
+    console.emit({"path": str(output), "bytes": len(page.encode()), "summary": summary})
+    if summary:
+        console.say(summary)
     console.say(f"{output}: {len(page.encode()) / 1e6:.1f} MB, opens in any browser")
+
+
+def _compare(folders: tuple[Path, Path], output: Path) -> None:
+    from pipelines.contracts.atomic import write_text
+    from pipelines.report.compare import compare, titles_of
+    from pipelines.report.session import find
+
+    first, second = (find([folder]) for folder in folders)
+    page = compare(first, second, titles_of(first, second))
+    write_text(output, page.text)
+    console.emit({"path": str(output), "changed": page.changed, "judged": page.judged})
+    console.say(f"{page.changed} of {page.judged} parameters changed beyond their 95 % intervals")
+    console.say(f"{output}: opens in any browser")

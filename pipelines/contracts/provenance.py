@@ -43,7 +43,7 @@ def sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-IN_A_PAGE = re.compile(r'<script type="application/json" id="provenance">(.*?)</script>', re.DOTALL)
+IN_A_PAGE = re.compile(r'<script type="application/json" id="made-of">(.*?)</script>', re.DOTALL)
 """Where a report holds its own; in it, no text contains ``<``."""
 
 

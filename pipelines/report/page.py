@@ -39,7 +39,7 @@ def render(
 ) -> str:
     """Return a page as text; ``told`` is what its template shows, all of which is escaped."""
     style = asset("uPlot.min.css") + asset("page.css")
-    scripts = [asset("uPlot.iife.min.js"), asset("page.js")]
+    scripts = [asset("sharp.js"), asset("uPlot.iife.min.js"), asset("page.js")]
     data = {
         "charts": {chart.key: _chart(chart) for chart in drawn},
         "animations": [_animation(one) for one in moving],
@@ -55,7 +55,7 @@ def render(
             script_hashes=[_digest(script) for script in scripts],
             data=Markup(_in_a_script(data)),
             provenance=Markup(_in_a_script(_provenance(artifacts))),
-            uplot_version=_uplot_version(scripts[0]),
+            uplot_version=_uplot_version(asset("uPlot.iife.min.js")),
             uplot_license=Markup(asset("uPlot.LICENSE")),
             version=__version__,
             made=f"Made by exoid {__version__} on {datetime.now(UTC):%Y-%m-%d %H:%M} UTC",

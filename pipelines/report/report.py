@@ -89,9 +89,9 @@ def report(session: Session, title: str | None = None) -> str:
     quantity = _quantity(session)
     told = {
         "title": title or session.name,
-        "machine": _machine(session),
-        "status": _status(verdict),
-        "headline": _headline(verdict),
+        "machine": machine(session),
+        "status": status(verdict),
+        "headline": headline(verdict),
         "verdict": verdict,
         "quantity": quantity,
         "warnings": [*provenance.stale(session), *provenance.changed_settings(session)],
@@ -126,13 +126,15 @@ def _quantity(session: Session) -> str:
     return "force" if session.joints and session.joints[0].kind == "prismatic" else "torque"
 
 
-def _machine(session: Session) -> str:
+def machine(session: Session) -> str:
+    """Return joints, rig, subject and session in words."""
     joints = " and ".join(joint.name for joint in session.joints)
     about = list(dict.fromkeys(one.about for one in recordings(session) if one.about))
     return " · ".join(filter(None, (joints, "; ".join(about[:3]))))
 
 
-def _status(verdict: dict[str, Any] | None) -> dict[str, str]:
+def status(verdict: dict[str, Any] | None) -> dict[str, str]:
+    """Return a verdict's status in words, and the tone of its badge."""
     if not verdict:
         return {"words": "not diagnosed", "tone": ""}
     if is_spoilt(verdict):
@@ -146,7 +148,8 @@ def is_spoilt(verdict: dict[str, Any]) -> bool:
     return verdict["summary"].startswith("Acquisition, not physics")
 
 
-def _headline(verdict: dict[str, Any] | None) -> str:
+def headline(verdict: dict[str, Any] | None) -> str:
+    """Return what was found, as short as can be."""
     if not verdict:
         return "Not diagnosed yet"
     if is_spoilt(verdict):

@@ -170,8 +170,7 @@
     closed.forEach((details) => { details.open = true; });
     figures.forEach(draw);
     for (const figure of figures) for (const u of plots.get(figure.dataset.chart) || []) {
-      const width = Math.min(PRINT_PX, figure.closest(".grid, .two") ? PRINT_PX / 2 - 30 : PRINT_PX);
-      u.setSize({ width, height: u.height });
+      u.setSize({ width: figure.closest(".grid, .hero") ? PRINT_PX / 2 - 30 : PRINT_PX, height: u.height });
     }
     redraw();
   });
@@ -183,7 +182,7 @@
   });
 
   // The machine in motion.
-  const LINE_PX = { measured: 9, before: 5, after: 3 };
+  const LINE_PX = { measured: 16, before: 6, after: 3.5 };
   class Stage {
     constructor(box, told) {
       this.told = told;
@@ -199,9 +198,15 @@
       this.slider.addEventListener("input", () => { this.stop(); this.at = +this.slider.value; this.draw(); });
       this.times.addEventListener("change", () => this.draw());
       this.button.addEventListener("click", () => (this.running ? this.stop() : this.start()));
-      this.at = 0;
+      this.at = this.furthestOff();
       this.running = false;
       new ResizeObserver(() => this.draw()).observe(this.canvas);
+    }
+    furthestOff() {
+      const [[, measured], [, first] = [null, measured]] = this.moves;
+      let at = 0;
+      measured.forEach((value, k) => { if (Math.abs(first[k] - value) > Math.abs(first[at] - measured[at])) at = k; });
+      return Math.floor(at / this.joints);
     }
     start() {
       this.running = true;

@@ -1,0 +1,181 @@
+"""Two sessions side by side: what changed, beyond what their intervals allow for."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from math import hypot
+from typing import Any
+
+from pipelines.report.bars import Fall, cause_label, label_in_words, torque_unit
+from pipelines.report.page import render
+from pipelines.report.parameters import Estimate, estimates
+from pipelines.report.report import headline, machine, status
+from pipelines.report.session import Artifact, Session
+
+
+@dataclass(frozen=True)
+class Change:
+    """One number of both sessions."""
+
+    words: str
+    unit: str
+    first: Estimate
+    second: Estimate
+
+    @property
+    def difference(self) -> float:
+        """The second less the first."""
+        return self.second.value - self.first.value
+
+    @property
+    def half(self) -> float | None:
+        """Half the 95 % interval of the difference of independent estimates; None where one of them has none.
+
+        Errors of independent sessions add in squares, and so do the intervals' halves: each is its standard error
+        times the critical value that its session's scatter asks for.
+        """
+        if self.first.half is None or self.second.half is None:
+            return None
+        return hypot(self.first.half, self.second.half)
+
+    @property
+    def is_beyond(self) -> bool | None:
+        """Whether the difference's interval leaves out zero; None where there is none."""
+        return None if not self.half else abs(self.difference) > self.half
+
+
+@dataclass(frozen=True)
+class ModelChanges:
+    """One model of both sessions, parameter by parameter."""
+
+    title: str
+    files: tuple[str, str]
+    changes: tuple[Change, ...]
+    only: tuple[tuple[str, ...], tuple[str, ...]]
+    """Parameters that only the one or the other session has."""
+
+    @property
+    def beyond(self) -> int:
+        """How many have changed beyond their intervals."""
+        return sum(bool(change.is_beyond) for change in self.changes)
+
+    @property
+    def judged(self) -> int:
+        """How many could have."""
+        return sum(change.is_beyond is not None for change in self.changes)
+
+
+def changes(first: Sequence[Estimate], second: Sequence[Estimate]) -> list[Change]:
+    """Return the parameters that both have, in the order of the first."""
+    others = {one.key: one for one in second}
+    return [Change(one.words, one.unit, one, others[one.key]) for one in first if one.key in others]
+
+
+@dataclass(frozen=True)
+class Compared:
+    """The page, and the count that stands on top of it."""
+
+    text: str
+    changed: int
+    judged: int
+
+
+def titles_of(first: Session, second: Session) -> tuple[str, str]:
+    """Return what the sessions are called: their folders, as far up as it takes to tell them apart."""
+    paths = [session.folders[0].resolve() for session in (first, second)]
+    names = [path.name for path in paths]
+    for path_a, path_b in zip(*(path.parents for path in paths), strict=False):
+        if names[0] != names[1]:
+            break
+        names = [f"{path_a.name}/{names[0]}", f"{path_b.name}/{names[1]}"]
+    return names[0], names[1]
+
+
+def compare(first: Session, second: Session, titles: tuple[str, str]) -> Compared:
+    """Lay two sessions side by side."""
+    pair = (first, second)
+    models = list(_models(pair))
+    told: dict[str, Any] = {
+        "titles": titles,
+        "machines": [machine(session) for session in pair],
+        "verdicts": [session.verdict for session in pair],
+        "statuses": [status(session.verdict) for session in pair],
+        "headlines": [headline(session.verdict) for session in pair],
+        "models": models,
+        # A parameter that both models have is counted once, in the one that is told last and knows most.
+        "beyond": models[-1].beyond if models else 0,
+        "judged": models[-1].judged if models else 0,
+        "causes": _causes(pair),
+        "errors": _errors(pair),
+    }
+    text = render("compare.html", (), (), told, (*first.artifacts, *second.artifacts))
+    return Compared(text, told["beyond"], told["judged"])
+
+
+def _models(pair: tuple[Session, Session]) -> Iterable[ModelChanges]:
+    first, second = pair
+    kinds = (
+        ("Rigid body and friction", [next(iter(session.baselines), None) for session in pair]),
+        ("With the named causes", [session.extended for session in pair]),
+    )
+    for title, (one, other) in kinds:
+        if one and other:
+            yield _model(title, first, one, second, other)
+
+
+def _model(title: str, first: Session, one: Artifact, second: Session, other: Artifact) -> ModelChanges:
+    a, b = estimates(first.table(one)), estimates(second.table(other))
+    keys = ({e.key for e in a}, {e.key for e in b})
+    return ModelChanges(
+        title,
+        (first.shown(one.path), second.shown(other.path)),
+        tuple(changes(a, b)),
+        (
+            tuple(e.words for e in a if e.key not in keys[1]),
+            tuple(e.words for e in b if e.key not in keys[0]),
+        ),
+    )
+
+
+def _causes(pair: tuple[Session, Session]) -> list[dict[str, Any]]:
+    """Return every cause that either verdict names, with what each says of it."""
+    named = [{cause_label(cause): cause for cause in (session.verdict or {}).get("causes", [])} for session in pair]
+    return [
+        {
+            "words": label_in_words(label),
+            "cells": [_cause_cell(session, causes.get(label)) for session, causes in zip(pair, named, strict=True)],
+        }
+        for label in dict.fromkeys(label for causes in named for label in causes)
+    ]
+
+
+def _cause_cell(session: Session, cause: dict[str, Any] | None) -> dict[str, Any] | None:
+    if cause is None:
+        return None
+    assert session.verdict
+    low, high = cause["gain"]["ci95"]
+    return {
+        "probability": cause["probability"],
+        "gain": cause["gain"]["rmse_reduction_nm"],
+        "low": low,
+        "high": high,
+        "unit": torque_unit(session.verdict, cause["gain"].get("joint") or cause["joint"]),
+    }
+
+
+def _errors(pair: tuple[Session, Session]) -> list[tuple[str, list[Fall]]]:
+    """Return for each error, without causes and with them, a bar for each joint: first session, second session."""
+    first, second = (session.verdict for session in pair)
+    if not first or not second:
+        return []
+    joints = [joint for joint in first["baseline_rmse_nm"] if joint in second["baseline_rmse_nm"]]
+    kinds = (("Rigid body and friction", "baseline_rmse_nm"), ("With the named causes", "extended_rmse_nm"),
+             ("Noise floor", "noise_floor_nm"))  # fmt: skip
+    return [
+        (title, [_fall(joint, first, second, key) for joint in joints])
+        for title, key in kinds
+    ]  # fmt: skip
+
+
+def _fall(joint: str, first: dict[str, Any], second: dict[str, Any], key: str) -> Fall:
+    floor = max(first["noise_floor_nm"][joint], second["noise_floor_nm"][joint])
+    return Fall(joint, torque_unit(first, joint), first[key][joint], second[key][joint], floor, None)

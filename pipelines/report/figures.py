@@ -1,0 +1,36 @@
+"""Every figure of a session's page, by name, to be drawn on paper."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
+
+from pipelines.plots import STYLE, save
+from pipelines.report.bars import budget, falls
+from pipelines.report.paper import budget_figure, chart_figure, falls_figure
+from pipelines.report.report import charts
+from pipelines.report.session import Session
+
+Drawings = dict[str, Callable[[], Figure]]
+"""What draws each figure, by the name of its file."""
+
+
+def figures(session: Session) -> Drawings:
+    """Return what draws each figure of a session's page, by the name of its file."""
+    found: Drawings = {}
+    if session.verdict:
+        found["error"] = partial(falls_figure, falls(session.verdict))
+        found["error-budget"] = partial(budget_figure, budget(session.verdict))
+    return found | {chart.key: partial(chart_figure, chart) for chart in charts(session, values=None).all}
+
+
+def draw(drawn: Drawings, names: Sequence[str], folder: Path, report: Callable[[float], None]) -> None:
+    """Write figures as PDF and PNG into a folder; ``report`` hears how many are done."""
+    with plt.rc_context(STYLE):
+        for number, name in enumerate(names):
+            figure = drawn[name]()
+            figure.draw_without_rendering()  # its layout is known only then, and `save` measures it
+            save(figure, folder / name)
+            report(number + 1)

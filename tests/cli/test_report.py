@@ -1,0 +1,81 @@
+"""`exoid report` and `exoid figures` as a user calls them."""
+
+import json
+import struct
+
+import pytest
+
+from tests.report.sessions import write_parameters, write_session
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return write_session(tmp_path / "demo")
+
+
+def test_the_page_is_written_and_its_summary_said(exoid, folder, tmp_path):
+    outcome = exoid("report", folder, "-o", tmp_path / "page.html")
+    assert outcome.code == 0
+    assert outcome.out.startswith("Missing from the simulation: cogging at the knee")
+    assert (tmp_path / "page.html").read_text().startswith("<!doctype html>")
+
+
+def test_in_a_folder_with_results_no_arguments_are_needed(exoid, folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    told = json.loads(exoid("report", "--json").out)
+    assert told["path"] == "report.html"
+    assert told["bytes"] == len((folder / "report.html").read_bytes())
+
+
+def test_two_sessions_are_compared(exoid, folder, tmp_path):
+    other = write_session(tmp_path / "other", shift=0.06)
+    outcome = exoid("report", "--compare", folder, other, "-o", tmp_path / "compared.html")
+    assert outcome.out.startswith("5 of 5 parameters changed beyond their 95 % intervals\n")
+    assert "demo and other" in (tmp_path / "compared.html").read_text()
+
+
+def test_figures_are_written_as_pdf_and_png_whole(exoid, folder, tmp_path):
+    names = ("error-budget", "verdict", "kv-sweep")
+    outcome = exoid(
+        "figures", folder, "-o", tmp_path / "figures", *(word for name in names for word in ("--only", name))
+    )
+    assert outcome.code == 0
+    for name in names:
+        assert (tmp_path / "figures" / f"{name}.pdf").read_bytes().startswith(b"%PDF")
+        png = (tmp_path / "figures" / f"{name}.png").read_bytes()
+        width, height = struct.unpack(">II", png[16:24])
+        assert width > 350 and height > 200
+
+
+def test_a_mistyped_figure_gets_a_suggestion(exoid, folder):
+    outcome = exoid("figures", folder, "--only", "error-bugdet")
+    assert (outcome.code, outcome.err) == (
+        2, "exoid: --only error-bugdet: there is no such figure here; did you mean error-budget?\n"
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (
+            ["nowhere"],
+            "nowhere: no such folder, expected an experiment's folder; name the one that its stages wrote to",
+        ),
+        (["demo", "-o", "demo"], "-o demo: is a folder, expected the name of a page; write demo/report.html"),
+        (
+            ["demo", "--compare", "demo", "demo"],
+            "--compare names both its folders itself; drop the others, or --compare",
+        ),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_line(exoid, folder, monkeypatch, arguments, says):
+    monkeypatch.chdir(folder.parent)
+    outcome = exoid("report", *arguments)
+    assert (outcome.code, " ".join(outcome.err.split())) == (2, f"exoid: {says}")
+
+
+def test_where_there_is_nothing_to_draw_that_is_said(exoid, tmp_path):
+    write_parameters(tmp_path)
+    outcome = exoid("figures", tmp_path)
+    assert outcome.code == 2
+    assert "holds nothing to draw; `exoid diagnose` and `exoid simulate` make it" in " ".join(outcome.err.split())

@@ -1,0 +1,79 @@
+"""Two sessions side by side: what did not change is marked no more often than 95 % intervals allow."""
+
+import re
+
+import numpy as np
+import pytest
+
+from pipelines.report.compare import changes, compare, titles_of
+from pipelines.report.parameters import Estimate
+from pipelines.report.session import find
+from tests.report.sessions import write_session, write_verdict
+
+
+def estimate(value, half, name="X1"):
+    return Estimate("rigid_body", name, name, "", "with_human", "kg·m²", value, value - half, value + half)
+
+
+def pair(folder, shift):
+    return [find([write_session(folder / name, shift=by)]) for name, by in (("monday", 0.0), ("tuesday", shift))]
+
+
+@pytest.mark.parametrize("widths", [(1.0, 1.0), (0.2, 3.0)])
+def test_of_parameters_that_did_not_change_one_in_twenty_is_marked(widths):
+    rng = np.random.default_rng(7)
+    first, second = ([estimate(w * z, 1.96 * w, str(k)) for k, z in enumerate(rng.standard_normal(4000))]
+                     for w in widths)  # fmt: skip
+    marked = np.mean([change.is_beyond for change in changes(first, second)])
+    assert marked == pytest.approx(0.05, abs=3 * np.sqrt(0.05 * 0.95 / 4000))
+
+
+def test_intervals_from_few_periods_mark_no_more_than_they_promise():
+    # Student's t with 5 degrees of freedom, whose 97.5 % point is 2.57: the halves are that many standard errors.
+    rng = np.random.default_rng(8)
+    sets = []
+    for _ in range(2):
+        scatter = np.sqrt(rng.chisquare(5, 4000) / 5)
+        sets.append(
+            [estimate(z, 2.57 * s, str(k)) for k, (z, s) in enumerate(zip(rng.normal(size=4000), scatter, strict=True))]
+        )
+    assert np.mean([change.is_beyond for change in changes(*sets)]) < 0.05 + 3 * np.sqrt(0.05 * 0.95 / 4000)
+
+
+def test_a_change_beyond_the_intervals_is_marked_and_a_smaller_one_is_not():
+    (beyond,) = changes([estimate(2.0, 0.03)], [estimate(2.051, 0.04)])
+    (within,) = changes([estimate(2.0, 0.03)], [estimate(2.049, 0.04)])
+    assert (beyond.is_beyond, within.is_beyond) == (True, False)
+    assert beyond.half == pytest.approx(0.05)
+
+
+def test_what_has_no_interval_is_not_judged():
+    (taken,) = changes([estimate(2.0, 0.0)], [estimate(3.0, 0.0)])
+    assert taken.is_beyond is None
+
+
+def test_the_page_says_what_changed(tmp_path):
+    first, second = pair(tmp_path, 0.06)
+    page = compare(first, second, titles_of(first, second))
+    assert (page.changed, page.judged) == (5, 5)
+    assert "5 of 5 parameters changed beyond their intervals" in page.text
+    assert len(re.findall('<tr class="changed">', page.text)) == 9
+    same = compare(*pair(tmp_path / "again", 0.02), ("a", "b"))
+    assert same.changed == 0
+    assert "No parameter changed beyond its interval" in same.text
+
+
+def test_folders_of_one_name_are_told_apart_by_those_above(tmp_path):
+    sessions = [find([write_session(tmp_path / day / "demo")]) for day in ("monday", "tuesday")]
+    assert titles_of(*sessions) == ("monday/demo", "tuesday/demo")
+
+
+def test_a_hostile_session_is_escaped_beside_another(tmp_path, opened):
+    first, second = pair(tmp_path, 0.06)
+    evil = "</script><script>alert(1)</script>"
+    write_verdict(second.folders[0], summary=evil, caveats=[evil])
+    page_file = tmp_path / "compared.html"
+    page_file.write_text(compare(first, find(second.folders), (evil, evil)).text, encoding="utf-8")
+    with opened(page_file, width=390) as page:
+        assert page.get_by_text(evil).count() > 2
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
