@@ -1,9 +1,9 @@
 """`exoid report` and `exoid figures` as a user calls them."""
 
 import json
-import struct
 
 import pytest
+from matplotlib.pyplot import imread
 
 from tests.report.sessions import write_parameters, write_session
 
@@ -42,9 +42,11 @@ def test_figures_are_written_as_pdf_and_png_whole(exoid, folder, tmp_path):
     assert outcome.code == 0
     for name in names:
         assert (tmp_path / "figures" / f"{name}.pdf").read_bytes().startswith(b"%PDF")
-        png = (tmp_path / "figures" / f"{name}.png").read_bytes()
-        width, height = struct.unpack(">II", png[16:24])
-        assert width > 350 and height > 200
+        picture = imread(tmp_path / "figures" / f"{name}.png")[..., :3]
+        assert picture.shape[0] > 200 and picture.shape[1] > 350
+        # Nothing is cut off: what is drawn stands within a white edge.
+        assert all((edge == 1).all() for edge in (picture[0], picture[-1], picture[:, 0], picture[:, -1]))
+        assert (picture < 1).any()
 
 
 def test_a_mistyped_figure_gets_a_suggestion(exoid, folder):
