@@ -1,0 +1,135 @@
+"""docs/tutorial.md does what it says: every command of it runs, and the whole of it says what is printed there.
+
+A ``console`` block is a session: ``$ exoid ...`` is run, what follows is what it prints, ``...`` stands for anything. A
+``toml`` block that begins with ``# in FILE`` or ``# at the end of FILE`` is an edit of that file.
+"""
+
+import re
+import shlex
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+PAGE = Path(__file__).parents[2] / "docs" / "tutorial.md"
+BLOCK = re.compile(r"^```(console|toml)\n(.*?)^```", flags=re.MULTILINE | re.DOTALL)
+NUMBER = re.compile(r"[-+]?\d[\d,]*\.?\d*(?:e[-+]?\d+)?")
+
+SHORT = {
+    "exoid.toml": {
+        "iterations = 800 ": "iterations = 50 ",
+        "base_frequency_hz = 0.1 ": "base_frequency_hz = 0.2 ",
+        "duration_s = 40.0\n": "duration_s = 15.0\n",
+        "\nsample_rate_hz = 200.0\n": "\nsample_rate_hz = 100.0\n",
+        "figures = true": "figures = false",
+        "sweep_nm_s_rad = [50.0, 100.0, 150.0, 200.0, 250.0, 300.0, 350.0, 400.0, 450.0, 500.0]": "sweep_nm_s_rad = []",
+    },
+    "rigs/plain.toml": {"ramp_s = 3.0": "ramp_s = 1.0"},
+}
+"""Of the new experiment's files, for one of seconds instead of minutes."""
+
+
+@dataclass(frozen=True)
+class Command:
+    line: str
+    printed: str
+
+
+@dataclass(frozen=True)
+class Edit:
+    file: str
+    at_the_end: bool
+    text: str
+
+    def make(self):
+        path = Path(self.file)
+        before = path.read_text(encoding="utf-8")
+        if self.at_the_end:
+            path.write_text(f"{before}\n{self.text}", encoding="utf-8")
+            return
+        for line in self.text.splitlines():
+            key, equals, _ = line.partition(" = ")
+            if equals:
+                before, times = re.subn(rf"^{re.escape(key)} = .*$", line, before, flags=re.MULTILINE)
+                assert times == 1, f"{self.file} has {times} lines with {key}"
+        path.write_text(before, encoding="utf-8")
+
+
+def steps() -> Iterator[Command | Edit]:
+    for kind, text in BLOCK.findall(PAGE.read_text(encoding="utf-8")):
+        if kind == "toml":
+            head, _, body = text.partition("\n")
+            place = re.fullmatch(r"# (in|at the end of) (\S+)", head)
+            assert place, f"a toml block of the tutorial says not where it belongs: {head}"
+            yield Edit(place[2], place[1] != "in", body)
+            continue
+        for session in re.split(r"^\$ ", text, flags=re.MULTILINE)[1:]:
+            line, _, printed = session.replace("\\\n", " ").partition("\n")
+            yield Command(line, printed)
+
+
+def do_all(exoid, monkeypatch, changes) -> Iterator[tuple[Command, str]]:
+    """Do every step in the current folder; yield each command of exoid's with what it printed."""
+    for step in steps():
+        if isinstance(step, Edit):
+            step.make()
+            continue
+        program, *arguments = shlex.split(step.line)
+        if program == "cd":
+            monkeypatch.chdir(Path(arguments[0]))
+            continue
+        assert program == "exoid", f"the tutorial runs {program}, which a user on Windows may not have"
+        outcome = exoid(*arguments)
+        assert outcome.code == 0, f"{step.line}: {outcome.err}"
+        if arguments[0] == "init":
+            shorten(Path(arguments[1]), changes)
+        yield step, outcome.out
+
+
+def shorten(folder, changes):
+    for name, pairs in changes.items():
+        text = (folder / name).read_text(encoding="utf-8")
+        for old, new in pairs.items():
+            assert old in text
+            text = text.replace(old, new)
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+def test_every_command_of_the_tutorial_runs(exoid, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    done = dict(do_all(exoid, monkeypatch, SHORT))
+    (diagnosed,) = [out for step, out in done.items() if step.line == "exoid diagnose"]
+    assert "parallel_spring at the knee" in diagnosed
+
+
+@pytest.mark.slow
+def test_the_tutorial_prints_what_stands_in_it(exoid, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    for step, out in do_all(exoid, monkeypatch, {}):
+        assert alike(step.printed, out), f"{step.line} printed\n{out}"
+
+
+def alike(wanted: str, found: str) -> bool:
+    """Compare words as they are, numbers to 5 % and blanks not at all; ``...`` in the page stands for anything."""
+    numbers = [value(number) for word in wanted.split() if word != "..." for number in NUMBER.findall(word)]
+    pattern = r"\s*".join(r".*?" if word == "..." else pattern_of(word) for word in wanted.split())
+    match = re.fullmatch(pattern, found.strip(), flags=re.DOTALL)
+    return match is not None and all(
+        abs(value(x) - number) <= 0.05 * abs(number) + 0.02 for x, number in zip(match.groups(), numbers, strict=True)
+    )
+
+
+def pattern_of(word: str) -> str:
+    return f"({NUMBER.pattern})".join(re.escape(text) for text in NUMBER.split(word))
+
+
+def value(number: str) -> float:
+    return float(number.replace(",", ""))
+
+
+def test_a_page_that_tells_another_number_or_word_is_not_alike():
+    assert alike("rms ... 2.95 N·m,\n  done", "rms  of 4 runs 3.01 N·m, done\n")
+    assert not alike("rms 2.95 N·m", "rms 3.95 N·m")
+    assert not alike("rms 2.95 N·m", "rms 2.95 N")
+    assert not alike("rms 2.95 N·m", "rms 2.95 N·m and more")
