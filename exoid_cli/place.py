@@ -58,13 +58,16 @@ class Place:
 def _why_absent(stage: str, run: str | None) -> str:
     if run:
         return f"the recording of run {run} was imported, and no command makes it"
+    if stage in ("design", "acquire"):
+        return f"the recordings of all runs were imported, and `exoid {stage}` has nothing to do here"
     return f"no [[run]] has purpose validate, without which `exoid {stage}` has nothing to do here"
 
 
 def place_of(config: Path | None, out: Path | None = None, lacking: str = "") -> Place:
     """Return the experiment to work in; where there is none, ``lacking`` begins what is said of it."""
     from pipelines.settings import Experiment
-    from pipelines.workflow.graph import graph, imported_runs
+    from pipelines.workflow.graph import graph
+    from pipelines.workflow.imported import with_imported
 
     file = config or Path(NAME)
     if not config and not is_experiment():
@@ -73,6 +76,6 @@ def place_of(config: Path | None, out: Path | None = None, lacking: str = "") ->
             f"{begin}there is no {NAME} in {Path.cwd()}; {'name it, ' if lacking else ''}go to an experiment's folder, "
             "name its settings with --config, or start one with `exoid init DIR`"
         )
-    experiment = Experiment.load(file)
     folder = out or file.parent
-    return Place(experiment, graph(experiment, file, folder, imported_runs(experiment, folder)), folder)
+    experiment, imported = with_imported(Experiment.load(file), folder)
+    return Place(experiment, graph(experiment, file, folder, imported), folder)

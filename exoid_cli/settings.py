@@ -7,6 +7,7 @@ import typer
 
 from exoid_cli.console import console
 from exoid_cli.heeding import Command, JsonOption, QuietOption, heeding
+from exoid_cli.place import place_of
 
 settings = typer.Typer(rich_markup_mode=None)
 
@@ -32,12 +33,11 @@ def check(config: Annotated[Path, typer.Argument(help="The experiment's settings
       exoid settings check
       exoid settings check my_experiment/exoid.toml --json
     """
-    from pipelines.settings import Experiment
-
-    experiment = Experiment.load(config)
-    experiment.refuse_what_cannot_run()
-    console.emit(experiment.model_dump(mode="json"))
-    console.say(f"{config}: {len(experiment.run)} runs, all settings are valid")
+    place = place_of(config)
+    if place.of_stage("acquire"):
+        place.experiment.refuse_what_cannot_run()
+    console.emit(place.experiment.model_dump(mode="json"))
+    console.say(f"{config}: {len(place.experiment.run)} runs, all settings are valid")
 
 
 @settings.command("split", cls=Command, short_help="Write one file a section, for make.")

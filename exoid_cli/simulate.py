@@ -33,7 +33,7 @@ def simulate(
     again: AgainOption = False,
     run: Annotated[
         Literal["exo_alone", "with_human"] | None,
-        typer.Option("--run", help="Whose parameters; with_human unless given, and a replay's own."),
+        typer.Option("--run", help="Whose parameters.", show_default="with_human, if the model has it; a replay's own"),
     ] = None,
     reference: Annotated[
         Path | None, typer.Option("--reference", help="What to follow: trajectory/1 or TOML; a gait unless given.")
@@ -73,7 +73,13 @@ def simulate(
     if replay:
         _replay(table, replay, settings, output)
     else:
-        _track(table, run or "with_human", reference, settings, output)
+        _track(table, run or _whose(table), reference, settings, output)
+
+
+def _whose(table: "Table") -> str:
+    """Return the kind of run that a model is of: with somebody in it, where it is of both."""
+    kinds = set(table.frame["run"])
+    return "exo_alone" if "exo_alone" in kinds and "with_human" not in kinds else "with_human"
 
 
 def _track(table: "Table", run: str, reference: Path | None, settings: "Experiment", output: Path) -> None:

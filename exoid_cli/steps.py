@@ -59,6 +59,8 @@ def bring_up_to_date(
     for step in place.steps:
         judged = judge.judge(step)
         if step in wanted and (again or not judged.done):
+            if done:
+                console.say("")
             try:
                 done.append(_perform(context, judged, before(step)))
             except InputError as error:
@@ -73,7 +75,7 @@ def only(
     context: typer.Context, place: Place, *stages: str, again: bool = False, before: Before = lambda step: ()
 ) -> None:
     """Do what a command does that was told nothing: bring the steps of its own stages up to date, and no others."""
-    wanted = place.of_stage(*stages)
+    wanted = place.of_stage(*stages) or [place.step(stages[0])]  # which says why there is none
     _look_before(place, wanted)
     done = bring_up_to_date(context, place, wanted, again=again, before=before)
     console.emit([one.as_json() for one in done])

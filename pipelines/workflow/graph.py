@@ -5,13 +5,10 @@ rules that ``split`` writes, all go by it.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from pipelines.contracts.provenance import provenance_of
-from pipelines.errors import ContractError
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.experiment import Experiment
 from pipelines.settings.rig import load_rig
@@ -64,7 +61,7 @@ def graph(experiment: Experiment, config: Path, out: Path, imported: Collection[
     out : Path
         Folder of the results.
     imported : collection of str
-        Names of runs whose recordings came from elsewhere: no step makes those, see ``imported_runs``.
+        Names of runs whose recordings came from elsewhere: no step makes those, see ``with_imported``.
     """
     told, runs = ("--config", config.as_posix()), experiment.run
     validate = [run for run in runs if run.purpose == "validate"]
@@ -103,7 +100,9 @@ def graph(experiment: Experiment, config: Path, out: Path, imported: Collection[
             inputs, words = [model, recordings[name]], (*called, "--replay", recordings[name].as_posix())
             yield step(replay, folder / f"replay-{name}.parquet", inputs, ("filter", "mechanism"), *words, run=name)
 
-    steps += simulated(parameters, out / "simulated", "simulate", "replay")
+    # A machine from elsewhere need not be a leg, which the controller's gait is for.
+    loops = simulated(parameters, out / "simulated", "simulate", "replay")
+    steps += [replace(one, may_fail=bool(imported)) for one in loops]
     if validate:
         again = simulated(extended, out / "simulated" / "extended", "extended", "extended")
         steps += [replace(one, may_fail=True) for one in again]
@@ -139,17 +138,6 @@ def _recorded(experiment: Experiment, run: RunSettings, target: Path, designed: 
         run=run.name,
         watched=sealed_file(rig),
     )
-
-
-def imported_runs(experiment: Experiment, out: Path) -> frozenset[str]:
-    """Return the names of the runs whose recordings, in the folder of the results, were imported."""
-
-    def imported(path: Path) -> bool:
-        with suppress(ContractError):  # whoever reads it says what is wrong with it
-            return path.is_file() and "imported" in provenance_of(path)
-        return False
-
-    return frozenset(run.name for run in experiment.run if imported(out / "recordings" / f"{run.name}.parquet"))
 
 
 def sealed_file(rig: Path) -> Path | None:

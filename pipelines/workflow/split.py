@@ -12,22 +12,25 @@ from typing import Any
 from pipelines.contracts.atomic import write_text
 from pipelines.contracts.provenance import sha256
 from pipelines.settings.experiment import Experiment
-from pipelines.workflow.graph import Step, graph, imported_runs, sealed_file
+from pipelines.workflow.graph import Step, graph, sealed_file
+from pipelines.workflow.imported import with_imported
 
 
 def split(experiment: Experiment, folder: Path) -> None:
     """Write ``<section>.json``, ``run-<name>.json`` and ``graph.mk`` into a folder."""
-    experiment.refuse_missing_files()
-    for name, content in _sections(experiment).items():
-        _write_if_changed(folder / f"{name}.json", json.dumps(content, indent=1, sort_keys=True) + "\n")
-    imported = imported_runs(experiment, folder.parent)
+    experiment, imported = with_imported(experiment, folder.parent)
     # Names that make knows stand for the places, so that the rules hold wherever make is told to work.
     steps = graph(experiment, Path("$(CONFIG)"), Path("$(OUT)"), imported)
+    sections = experiment.sections("mechanism", "design", "acquire", "filter", "identify", "simulate")
+    if any(step.stage == "acquire" for step in steps):
+        experiment.refuse_missing_files()
+        _add_what_is_recorded(experiment, sections)
+    for name, content in sections.items():
+        _write_if_changed(folder / f"{name}.json", json.dumps(content, indent=1, sort_keys=True) + "\n")
     write_text(folder / "graph.mk", "\n".join(_rules(steps)) + "\n")
 
 
-def _sections(experiment: Experiment) -> dict[str, Any]:
-    sections = experiment.sections("mechanism", "design", "acquire", "filter", "identify", "simulate")
+def _add_what_is_recorded(experiment: Experiment, sections: dict[str, Any]) -> None:
     # A rig or an excitation is a setting too: its content counts, not the time of its file.
     rig = experiment.file(experiment.acquire.rig)
     sections["acquire"]["rig_sha256"] = sha256(rig)
@@ -38,7 +41,6 @@ def _sections(experiment: Experiment) -> dict[str, Any]:
         section = sections[f"run-{run.name}"] = run.model_dump(mode="json")
         if run.trajectory:
             section["trajectory_sha256"] = sha256(experiment.file(run.trajectory))
-    return sections
 
 
 def _write_if_changed(path: Path, text: str) -> None:

@@ -1,0 +1,62 @@
+"""An experiment whose recordings came from elsewhere: an empty exoid.toml beside them is enough."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pipelines.contracts import RECORDING
+
+RATE_HZ = 200.0
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Two recordings of a pendulum of 0.5 kg·m², as `exoid import` leaves them, and an empty exoid.toml."""
+    random = np.random.default_rng(3)
+    time = np.arange(0.0, 20.0, 1.0 / RATE_HZ)
+    for name, purpose, phase in (("Monday-1", "train", 0.0), ("Monday-2", "validate", 1.0)):
+        angle = 0.6 * np.sin(2.0 * time + phase) + 0.2 * np.sin(5.0 * time)
+        speed = 1.2 * np.cos(2.0 * time + phase) + np.cos(5.0 * time)
+        acceleration = -2.4 * np.sin(2.0 * time + phase) - 5.0 * np.sin(5.0 * time)
+        torque = 0.5 * acceleration + 3.0 * np.sin(angle) + 0.4 * np.sign(speed) + 0.2 * speed
+        frame = pd.DataFrame({"time_s": time, "arm_angle_rad": angle + 1e-4 * random.standard_normal(len(time))})
+        frame["arm_torque_nm"] = torque + 0.05 * random.standard_normal(len(time))
+        metadata = {
+            "run": "exo_alone", "purpose": purpose, "sample_rate_hz": RATE_HZ, "imported": {"log": "arm.csv"},
+            "joints": [{"name": "arm", "kind": "revolute"}],
+        }  # fmt: skip
+        RECORDING.write(tmp_path / "recordings" / f"{name}.parquet", frame, metadata)
+    (tmp_path / "exoid.toml").touch()
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_it_is_filtered_identified_and_never_recorded(exoid, folder):
+    stages = [one["stage"] for one in json.loads(exoid("status", "--json").out)]
+    assert stages[:4] == ["filter", "filter", "identify", "diagnose"]
+    outcome = exoid("run", "identify", "--json")
+    assert outcome.code == 0, outcome.err
+    assert [one["stage"] for one in json.loads(outcome.out)] == ["filter", "filter", "identify"]
+    told = json.loads(outcome.out)[-1]["result"]["parameters"]
+    (inertia,) = [row["value"] for row in told if row["unit"] == "kg·m²"]
+    assert inertia == pytest.approx(0.5, abs=0.02)
+    assert exoid("run", "identify").out == "Everything is up to date.\n"
+
+
+@pytest.mark.parametrize("words", [("acquire",), ("design",), ("acquire", "--run", "Monday-1")])
+def test_nothing_is_recorded_in_its_place(exoid, folder, words):
+    before = (folder / "recordings" / "Monday-1.parquet").read_bytes()
+    outcome = exoid(*words)
+    assert (outcome.code, outcome.err.count("\n")) == (2, 1)
+    assert "imported" in outcome.err
+    assert (folder / "recordings" / "Monday-1.parquet").read_bytes() == before
+
+
+def test_what_cannot_be_simulated_does_not_keep_the_rest_from_being_done(exoid, folder):
+    (folder / "exoid.toml").write_text("[identify]\nfigures = false\n")
+    outcome = exoid("run", "simulate")
+    assert outcome.code == 0, outcome.err
+    assert "the gait is a leg's" in outcome.err
+    assert (folder / "identified" / "parameters.parquet").exists()
