@@ -7,14 +7,16 @@ import typer
 from exoid_cli import completion
 from exoid_cli.console import console
 
-LINE = "{effect:<24}{side:<11}{joints:<20}{typical}"
-"""Of the list; the equation stands below, for it needs the whole width."""
-
 
 def effects(
     name: Annotated[
         str | None,
-        typer.Argument(help="One effect, for its page; without it the list of all.", autocompletion=completion.effects),
+        typer.Argument(
+            metavar="NAME",
+            help="One effect, for its page.",
+            show_default="a list of all",
+            autocompletion=completion.effects,
+        ),
     ] = None,
 ) -> None:
     """List the effects a model can have, or say all about one: equation, parameters, how to confirm it.
@@ -33,10 +35,12 @@ def effects(
         return
     told = [facts(effect) for effect in EFFECTS]
     console.emit(told)
-    console.say(LINE.format(effect="effect", side="side", joints="joints", typical="on exoskeletons"))
     for one in told:
-        console.say(f"\n{LINE.format(**one)}\n    {one['equation']}")
-    console.say("\n`exoid effects NAME` says how one looks in a plot and how to make sure of it.")
+        console.say(f"{one['effect']}, {one['side']}, joints: {one['joints']}")
+        console.note(one["equation"])
+        console.note(f"on exoskeletons {one['typical']}")
+        console.say("")
+    console.say("`exoid effects NAME` says how one looks in a plot and how to make sure of it.")
 
 
 def _page(effect: type) -> None:
@@ -44,10 +48,16 @@ def _page(effect: type) -> None:
 
     told = facts(effect)
     console.emit(told)
-    console.say(f"{told['title']} ({told['effect']}), side: {told['side']}, joints: {told['joints']}\n")
-    console.say(f"{told['meaning']}\n\n    {told['equation']}\n")
+    console.say(f"{told['title']} ({told['effect']})")
+    console.note(f"side: {told['side']}, joints: {told['joints']}")
+    console.say("")
+    console.note(told["meaning"])
+    console.say("")
+    console.note(told["equation"])
+    console.say("")
     headings = ("parameter", "symbol", "unit", "meaning", "on exoskeletons")
     console.table(headings, [(p.name, p.symbol, p.unit, p.meaning, typical_range(p)) for p in effect().parameters])
     for title, key in (("Runs", "runs"), ("Looks like", "looks_like"), ("To confirm", "confirm"), ("Source", "source")):
         text = told[key] if isinstance(told[key], str) else ", ".join(told[key])
-        console.say(f"\n{title}: {text}")
+        console.say(f"\n{title}")
+        console.note(text)

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 
 
 def import_(
-    files: Annotated[list[Path], typer.Argument(help="Logs: CSV, .mat, Parquet, JSON, HDF5, MCAP, ROS 2 bags.")],
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE", help="Logs: CSV, .mat, Parquet, JSON, HDF5, MCAP, ROS 2 bags.")
+    ],
     map_: Annotated[Path | None, typer.Option("--map", help="The map: what each column is, and in which unit.")] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the recordings.")] = Path("recordings"),
     guess: Annotated[

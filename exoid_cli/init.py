@@ -10,7 +10,9 @@ import typer
 from exoid_cli.console import console
 
 
-def init(folder: Annotated[Path, typer.Argument(help="Where the experiment shall live; made if need be.")]) -> None:
+def init(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where the experiment shall live; made if need be.")],
+) -> None:
     """Start a new experiment: a commented exoid.toml, rigs, and a Makefile.
 
     \b

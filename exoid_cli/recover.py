@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from exoid_cli.console import console
+from exoid_cli.place import place_of
 from pipelines.errors import InputError
 
 if TYPE_CHECKING:
@@ -13,7 +14,12 @@ if TYPE_CHECKING:
 
 
 def recover(
-    journals: Annotated[list[Path], typer.Argument(help="Journals that killed runs left, or folders of them.")],
+    journals: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="JOURNAL", help="Journals that killed runs left, or folders of them.", show_default="recordings/"
+        ),
+    ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="The recording to write, of one.")] = None,
 ) -> None:
     """Make a whole recording of what a killed run left, and say what is missing.
@@ -21,19 +27,22 @@ def recover(
     The journal goes once the recording is written. A file that is there is never overwritten.
 
     \b
-    Example:
+    Examples:
+      exoid recover
       exoid recover recordings/with_human_train.parquet.journal
     """
     from pipelines.acquisition.recover import journals_in
     from pipelines.acquisition.recover import recover as make_recording
 
-    found = [journal for place in journals for journal in journals_in(place)]
+    places = journals or [place_of(None, lacking="no journal is given").out / "recordings"]
+    found = [journal for place in places for journal in journals_in(place)]
     if output and len(found) > 1:
         raise InputError(f"-o: names one recording, but there are {len(found)} journals; leave it out")
     made, refused = [], list[InputError]()
     for journal in found:
         try:
-            made.append(make_recording(journal, output))
+            with console.working(f"recovering {journal.name}"):
+                made.append(make_recording(journal, output))
             console.say(_told(made[-1]))
         except InputError as error:  # one that is of no use must not keep the others from being recovered
             refused.append(error)

@@ -8,7 +8,7 @@ import typer
 from exoid_cli.console import console
 
 FoldersArgument = Annotated[
-    list[Path] | None, typer.Argument(metavar="DIR...", help="Folders that the stages wrote to; this one unless given.")
+    list[Path] | None, typer.Argument(metavar="DIR", help="Folders that the stages wrote to.", show_default="this one")
 ]
 
 
@@ -29,6 +29,7 @@ def report(
 
     \b
     Examples:
+      exoid report
       exoid report build/default -o report.html
       exoid report --compare monday/ tuesday/ -o compared.html
     """
@@ -45,8 +46,7 @@ def report(
         _compare(compare, output)
         return
     session = find(folders or [Path()], config)
-
-    with console.progress("writing the page", 1.0):
+    with console.working("writing the page"):
         page = page_of(session, title)
     write_text(output, page)
     for trouble in session.unreadable:

@@ -14,7 +14,7 @@ LOOPBACK = "127.0.0.1"
 
 
 def rig(
-    file: Annotated[Path, typer.Argument(help="The rig's description, with a [plant].")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The rig's description, with a [plant].")],
     run: Annotated[
         Literal["exo_alone", "with_human"], typer.Option(help="Nobody in the machine, or somebody.")
     ] = "with_human",

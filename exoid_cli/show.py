@@ -21,7 +21,9 @@ FEW = 6
 
 
 def show(
-    file: Annotated[Path, typer.Argument(help="A Parquet or JSON file of exoid's, or a trajectory as TOML.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A Parquet or JSON file of exoid's, or a trajectory as TOML.")
+    ],
 ) -> None:
     """Say what an exoid file is, where it came from, and its columns with units and ranges.
 

@@ -114,7 +114,7 @@ def test_a_fault_of_exoid_keeps_its_traceback_in_a_file(exoid, monkeypatch, tmp_
     [
         (["shw"], "exoid: shw: no such command; did you mean show?\n"),
         (["settings"], "exoid: missing command; see `exoid settings --help`\n"),
-        (["show"], "exoid: file: missing; see `exoid show --help`\n"),
+        (["show"], "exoid: FILE: missing; see `exoid show --help`\n"),
         (["show", "a", "--fast"], "exoid: --fast: no such option; `exoid show --help` lists those there are\n"),
         (["filter", "--cutof-hz", "3"], "exoid: --cutof-hz: no such option; did you mean --cutoff-hz?\n"),
         (["rig", "chek", "rig.toml"], "exoid: chek: no such command; did you mean check?\n"),

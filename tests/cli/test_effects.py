@@ -10,10 +10,12 @@ from pipelines.effects import EFFECTS
 def test_the_list_names_every_effect_with_equation_and_size(exoid):
     outcome = exoid("effects")
     assert outcome.code == 0
+    said = " ".join(outcome.out.split())
     for effect in EFFECTS:
-        assert effect.name in outcome.out
-        assert effect.equation in outcome.out
-    assert "stribeck_torque 0.3 to 6 N·m" in outcome.out
+        assert effect.name in said
+        assert " ".join(effect.equation.split()) in said
+    assert "stribeck_torque 0.3 to 6 N·m" in said
+    assert max(map(len, outcome.out.splitlines())) <= 80
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
@@ -21,7 +23,8 @@ def test_a_page_tells_how_to_see_it_and_how_to_make_sure(exoid, effect):
     outcome = exoid("effects", effect.name)
     assert outcome.code == 0
     for told in (effect.equation, effect.looks_like, effect.confirm, effect.source):
-        assert told in outcome.out
+        assert " ".join(told.split()) in " ".join(outcome.out.split())
+    assert max(map(len, outcome.out.splitlines())) <= 80
 
 
 def test_programs_get_the_same_as_json(exoid):
