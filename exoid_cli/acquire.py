@@ -82,7 +82,9 @@ def _record(
     experiment: "Experiment", run: str, trajectory: Path, output: Path, *, yes: bool, reset_faults: bool
 ) -> None:
     from pipelines.acquisition.acquire import acquire as record
+    from pipelines.workflow.imported import refuse_imported
 
+    refuse_imported(output)
     experiment.mechanism.refuse_all_but_the_leg("`exoid acquire`")
     settings, rate = experiment.run_named(run), experiment.acquire.sample_rate_hz
     reports: list[Callable[[Progress], None]] = []

@@ -45,7 +45,15 @@ def test_it_is_filtered_identified_and_never_recorded(exoid, folder):
     assert exoid("run", "identify").out == "Everything is up to date.\n"
 
 
-@pytest.mark.parametrize("words", [("acquire",), ("design",), ("acquire", "--run", "Monday-1")])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("acquire",),
+        ("design",),
+        ("acquire", "--run", "Monday-1"),
+        ("acquire", "--run", "Monday-1", "--trajectory", "mine.toml", "-o", "recordings/Monday-1.parquet"),
+    ],
+)
 def test_nothing_is_recorded_in_its_place(exoid, folder, words):
     before = (folder / "recordings" / "Monday-1.parquet").read_bytes()
     outcome = exoid(*words)
