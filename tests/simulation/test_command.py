@@ -151,11 +151,14 @@ def test_a_replay_tells_of_values_that_the_recording_need_not_share(
 
 def test_parameters_without_the_run_are_told_with_those_there_are(exoid, parameters_file, quick, tmp_path):
     parameters = parameters_file(run="exo_alone")
-    code, _, err = exoid("simulate", parameters, "--config", quick(), "-o", tmp_path / "out")
+    given = ("simulate", parameters, "--config", quick(), "-o", tmp_path / "out")
+    code, _, err = exoid(*given, "--run", "with_human")
     assert (code, err) == (
         2, f"exoid: {parameters}: holds no model of the run with_human, only of: exo_alone; choose one with --run"
     )  # fmt: skip
     assert not (tmp_path / "out").exists()
+    assert exoid(*given)[0] == 0  # of the only one there is
+    assert SIMULATION.read(tmp_path / "out" / "rbf.parquet").metadata["plant"]["run"] == "exo_alone"
 
 
 def test_parameters_of_no_real_leg_are_refused_with_the_reason(exoid, parameters_file, quick, tmp_path):
