@@ -124,3 +124,39 @@ def test_what_was_shown_is_what_runs_though_the_file_is_changed_meanwhile(exoid,
     answer("y\n")
     assert WENT_ON in exoid(*experiment()).err
     assert loads == ["with_human"]
+
+
+@pytest.fixture
+def with_excitation(experiment, tmp_path, monkeypatch):
+    """Make an experiment whose run has its excitation, and go to its folder."""
+
+    def make(**told):
+        experiment(**told)
+        config = tmp_path / "exoid.toml"
+        excitation = datasets() / "paper" / "trajectory.toml"
+        config.write_text(config.read_text() + f'trajectory = "{excitation.as_posix()}"\n')
+        monkeypatch.chdir(tmp_path)
+
+    return make
+
+
+@pytest.mark.parametrize("words", [("acquire",), ("run", "acquire")])
+def test_a_run_that_nobody_named_is_asked_about_before_it_moves_even_an_empty_machine(
+    exoid, with_excitation, monkeypatch, words
+):
+    monkeypatch.setattr("sys.stdin", io.StringIO("y\n"))
+    with_excitation(run="exo_alone")
+    outcome = exoid(*words)
+    assert (outcome.code, outcome.err.count("\n")) == (2, 1)
+    assert "run one moves the empty machine, which wants to be confirmed on a terminal" in outcome.err
+
+
+def test_a_no_to_it_moves_nothing_and_a_yes_goes_on_to_the_drives(exoid, with_excitation, answer):
+    with_excitation(run="exo_alone")
+    answer("no\n")
+    refused = exoid("acquire")
+    assert refused.code == 2
+    assert "run one was not confirmed; nothing was moved" in refused.err
+    answer("yes\n")
+    assert exoid("acquire").code == 3  # there is no rig to be found
+    assert exoid("acquire", "--yes").code == 3
