@@ -35,7 +35,7 @@ def run(
       exoid run identify
       exoid run --config my_experiment/exoid.toml
     """
-    from pipelines.workflow.freshness import Judge
+    from pipelines.workflow.freshness import Freshness, Judge
     from pipelines.workflow.graph import needed_for
     from pipelines.workflow.split import split
 
@@ -43,7 +43,9 @@ def run(
     wanted = needed_for(place.of_stage(*_known(stages or [], place)) if stages else place.steps, place.steps)
     if any(step.stage == "acquire" for step in wanted):
         place.experiment.refuse_what_cannot_run()
-    if all(one.done for one in Judge(place.out).all(place.steps) if one.step in wanted):
+    judged = [one for one in Judge(place.out).all(place.steps) if one.step in wanted]
+    # What was left out is tried again where it is asked for by name.
+    if all(one.state is Freshness.DONE if stages else one.done for one in judged):
         console.emit([])
         console.say("Everything is up to date.")
         return

@@ -37,7 +37,7 @@ def status(config: ConfigOption = None, out: OutOption = None) -> None:
 
 def _line(stage: "Sequence[Judged]", out: Path) -> tuple[str, ...]:
     count = Counter(one.state.value for one in stage)
-    state = next(word for word in ("missing", "stale", "done") if count[word])
+    state = next(word for word in ("missing", "stale", "left out", "done") if count[word])
     reasons = list(dict.fromkeys(reason for one in stage for reason in one.why))
     why = reasons[0] + (f" (and {len(reasons) - 1} more)" if len(reasons) > 1 else "") if reasons else ""
     targets = [one.step.target.relative_to(out) for one in stage]

@@ -22,6 +22,8 @@ class Freshness(Enum):
     DONE = "done"
     STALE = "stale"
     MISSING = "missing"
+    LEFT_OUT = "left out"
+    """It may be impossible, is not there, and what would need it was made without it."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class Judged:
     @property
     def done(self) -> bool:
         """Whether there is nothing to do."""
-        return self.state is Freshness.DONE
+        return self.state in (Freshness.DONE, Freshness.LEFT_OUT)
 
 
 @dataclass
@@ -49,7 +51,9 @@ class Judge:
 
     def all(self, steps: Sequence[Step]) -> list[Judged]:
         """Return every step with its state."""
-        return [self.judge(step) for step in steps]
+        judged = [self.judge(step) for step in steps]
+        done_without = {file for one in judged if one.done for file in one.step.inputs}
+        return [_left_out(one) if one.step.target in done_without else one for one in judged]
 
     def judge(self, step: Step) -> Judged:
         """Return a step with its state; the steps that make its inputs have been judged before."""
@@ -101,6 +105,12 @@ class Judge:
     def _name(self, file: Path) -> str:
         file = Path(os.path.normpath(file))
         return (file.relative_to(self.out) if file.is_relative_to(self.out) else file).as_posix()
+
+
+def _left_out(judged: Judged) -> Judged:
+    if not judged.step.may_fail or judged.state is not Freshness.MISSING:
+        return judged
+    return Judged(judged.step, Freshness.LEFT_OUT, (f"`exoid run {judged.step.stage}` says why",))
 
 
 def _other_settings(then: Mapping[str, Any], now: Mapping[str, Any], at: str = "") -> Iterator[str]:

@@ -128,6 +128,16 @@ def test_what_a_killed_or_stopped_run_left_is_told(tmp_path):
     )
 
 
+def test_what_was_impossible_is_left_out_once_the_rest_was_made_without_it(chain):
+    first, second = chain.steps
+    steps = (replace(first, may_fail=True), second)
+    first.target.unlink()
+    second.target.write_text(json.dumps({"provenance": describe([])}))
+    assert [one.state.value for one in Judge(chain.folder).all(steps)] == ["left out", "done"]
+    second.target.unlink()
+    assert [one.state.value for one in Judge(chain.folder).all(steps)] == ["missing", "missing"]
+
+
 def test_a_stage_needs_what_makes_its_inputs_and_nothing_else(chain):
     first, second = chain.steps
     assert needed_for([second], chain.steps) == [first, second]
