@@ -195,7 +195,7 @@ class DriveMap(Settings):
 
     identity: tuple[Identity, ...] = Field((), description="What tells the right device from a wrong one.")
     read: DriveRead = Field(description="Block that is read.")
-    write: DriveWrite = Field(description="Block that is written.")
+    write: DriveWrite = Field(description="Block that is written as a whole, without gaps.")
     enable: int = Field(1, description="Control word that makes the drive follow its set-point.")
     disable: int = Field(0, description="Control word that takes the torque away.")
     halt: int | None = Field(None, description="Control word that holds the leg where a stop has led it; else enable.")
@@ -212,6 +212,7 @@ class DriveMap(Settings):
     def _blocks_are_possible(self) -> Self:
         _refuse_bad_block(self.read, "read")
         _refuse_bad_block(self.write, "write")
+        _refuse_gap(self.write, "write")
         for name in ("fault_mask", "enabled_mask"):
             if getattr(self, name) and self.read.status is None:
                 raise ValueError(f"{name}: needs a status register; add read.status or leave the mask out")
@@ -309,6 +310,16 @@ def _refuse_bad_block(block: Settings, name: str) -> None:
         raise ValueError(
             f"{name}: spans {length} registers ({min(taken)} to {max(taken)}), expected at most "
             f"{MOST_REGISTERS[name]}, which is what one Modbus exchange carries"
+        )
+
+
+def _refuse_gap(block: Settings, name: str) -> None:
+    """Refuse a block with registers that nobody named: writing it would put something into them."""
+    named = {a for r in registers_of(block).values() for a in range(r.address, r.address + r.registers)}
+    if nameless := sorted(set(range(min(named), max(named))) - named):
+        raise ValueError(
+            f"{name}: names nothing at register {nameless[0]} between {min(named)} and {max(named)}, expected a block "
+            "without gaps, which is written as a whole; map the drive's registers side by side"
         )
 
 

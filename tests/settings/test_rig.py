@@ -43,6 +43,9 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
          "one address"),
         ("address = 113", "address = 400", "map.drive.servo: read: spans 301 registers (100 to 400), expected at most "
          "125, which is what one Modbus exchange carries"),
+        ("control = { address = 202", "control = { address = 204", "map.drive.servo: write: names nothing at register "
+         "202 between 200 and 204, expected a block without gaps, which is written as a whole; map the drive's "
+         "registers side by side"),
         ("scale = 0.1, unit = \"mA\"", "scale = 0.0, unit = \"mA\"", "map.drive.servo.read.current: scale: found 0, "
          "expected units per count; every value would be the offset"),
         ("angle_rad = [-0.35, 1.75]", "angle_rad = [1.75, -0.35]", "drive[0]: angle_rad: found [1.75, -0.35], expected "
