@@ -8,7 +8,7 @@ import numpy as np
 from pipelines.contracts import MOTION, RECORDING
 from pipelines.report.session import Artifact, Session
 
-RATE_TOLERANCE, ROUNDING = 0.005, 1e-6
+RATE_TOLERANCE, ROUNDING = 0.005, 1e-4
 
 
 @dataclass(frozen=True)

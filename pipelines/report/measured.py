@@ -1,6 +1,7 @@
 """Measured beside simulated over whole runs, before and after the causes are named."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -40,7 +41,7 @@ def torque_charts(session: Session) -> Iterator[Chart]:
 
 
 def _torque_chart(session: Session, run: str, joint: Joint, frame: pd.DataFrame, floor: float | None) -> Chart:
-    quantity, unit = ("force" if joint.kind == "prismatic" else "torque"), joint.unit("torque")
+    quantity, unit = names_of(joint)["torque"], joint.unit("torque")
     first = frame[frame["model"] == frame["model"].iloc[0]]
     torques, errors = [], []
     for model, (role, words) in models_of(session).items():
@@ -74,10 +75,10 @@ def angle_charts(session: Session) -> Iterator[Chart]:
             yield _angle_chart(run, joint, tables)
 
 
-def replayed(session: Session) -> dict[str, dict[str, Artifact]]:
-    """Return the replays in windows, by run and model."""
+def replayed(session: Session, what: str = "windows") -> dict[str, dict[str, Artifact]]:
+    """Return the replays of a kind (see ``session.simulated``), by run and model."""
     found: dict[str, dict[str, Artifact]] = {}
-    for model, replays in session.simulations_by_model("windows").items():
+    for model, replays in session.simulations_by_model(what).items():
         for one in replays:
             source = session.recorded(one)
             run = source.path.name if source else one.inputs[-1]["name"]
@@ -85,9 +86,49 @@ def replayed(session: Session) -> dict[str, dict[str, Artifact]]:
     return found
 
 
+@dataclass(frozen=True)
+class Score:
+    """How far off the replays of a run are, in one respect."""
+
+    words: str
+    values: tuple[float | None, ...]
+    """One a model, in the order of ``MODELS``; None where there is no such replay."""
+
+
+SCORES = {
+    "windows": (("simulation_rmse_rad", "angle", "1 s under the recorded {drive}", 1e3, "m"),),
+    "drives": (
+        ("closed_loop_rmse_rad", "angle", "in the drives' own loop", 1e3, "m"),
+        ("closed_loop_rmse_nm", "torque", "in the drives' own loop", 1.0, ""),
+    ),
+}
+"""Of each kind of replay: the metadata's key, what it is about, in words, and in which multiple of the unit."""
+
+
+def scores(session: Session, run: str) -> list[Score]:
+    """Return what the replays' files say of their errors, joint by joint."""
+    found = []
+    for what, rows in SCORES.items():
+        replays = replayed(session, what).get(run, {})
+        for key, quantity, words, times, prefix in rows if replays else ():
+            for joint in session.joints:
+                told = [replays[model].metadata.get(key, {}).get(joint.name) if model in replays else None
+                        for model in models_of(session)]  # fmt: skip
+                name, drive = names_of(joint)[quantity], names_of(joint)["torque"]
+                where = f"{joint.name} {name}, {words.format(drive=drive)}, {prefix}{joint.unit(quantity)}"
+                found.append(Score(where, tuple(None if value is None else times * value for value in told)))
+    return [score for score in found if any(value is not None for value in score.values)]
+
+
+def names_of(joint: Joint) -> dict[str, str]:
+    """Return what a joint's angle and torque are called: position and force where it slides."""
+    slides = joint.kind == "prismatic"
+    return {"angle": "position" if slides else "angle", "torque": "force" if slides else "torque"}
+
+
 def _angle_chart(run: str, joint: Joint, tables: dict[str, pd.DataFrame]) -> Chart:
     first = next(iter(tables.values()))
-    where = "position" if joint.kind == "prismatic" else "angle"
+    where, drive = names_of(joint)["angle"], names_of(joint)["torque"]
     angles, errors = [], []
     for model, frame in tables.items():
         if len(frame) != len(first):
@@ -100,8 +141,8 @@ def _angle_chart(run: str, joint: Joint, tables: dict[str, pd.DataFrame]) -> Cha
     return Chart(
         key=f"angle-{_stem(run)}-{joint.name}",
         title=f"{joint.name} {where} in simulations of one second",
-        caption=f"Each second the model starts where the machine was and gets the recorded "
-        f"{'force' if joint.kind == 'prismatic' else 'torque'}; below, how far it strays.",
+        caption=f"Each second the model starts where the machine was and gets the recorded {drive}; below, how far it "
+        "strays.",
         x_label="time, s",
         x=first["time_s"].to_numpy(),
         panels=(Panel(f"{where}, {unit}", tuple(angles)), Panel(f"error, m{unit}", tuple(errors))),

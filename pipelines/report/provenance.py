@@ -1,7 +1,6 @@
 """Where everything on the page comes from: files, hashes, settings, and the command lines that make them again."""
 
 import shlex
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -33,6 +32,11 @@ class Origin:
     created_at: str
     sha256: str
     inputs: tuple[Input, ...]
+
+    @property
+    def here(self) -> list[str]:
+        """Names of the inputs that the session holds, and so lists with their own hashes."""
+        return [one.name for one in self.inputs if one.state == "found"]
 
 
 def origins(session: Session) -> list[Origin]:
@@ -191,14 +195,3 @@ _MADE_BY = {
     "simulation": _simulate,
 }  # fmt: skip
 """By contract, in the order of an experiment: the words of the command that makes such a file."""
-
-
-def digests(session: Session) -> Iterator[tuple[str, str]]:
-    """Yield name and SHA-256 of every file that went into the session and is not in it, once each."""
-    seen = {
-        (one.name, one.sha256)
-        for origin in origins(session)
-        for one in origin.inputs
-        if one.state == "elsewhere"
-    }  # fmt: skip
-    yield from sorted(seen)

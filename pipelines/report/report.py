@@ -14,7 +14,16 @@ from pipelines.report.bars import budget, cause_label, causes_in_words, falls, l
 from pipelines.report.chart import Chart, thinned_alike
 from pipelines.report.control import control_charts, loops
 from pipelines.report.excitation import excitations
-from pipelines.report.measured import angle_charts, replayed, run_names, torque_charts
+from pipelines.report.measured import (
+    Score,
+    angle_charts,
+    models_of,
+    names_of,
+    replayed,
+    run_names,
+    scores,
+    torque_charts,
+)
 from pipelines.report.numbers import digits
 from pipelines.report.page import VALUES, indented, render
 from pipelines.report.parameters import models, side_by_side
@@ -95,7 +104,7 @@ def report(session: Session, title: str | None = None) -> str:
         "verdict": verdict,
         "quantity": quantity,
         "warnings": [*provenance.stale(session), *provenance.changed_settings(session)],
-        "tiles": _tiles(verdict) if verdict else [],
+        "tiles": _tiles(session, verdict) if verdict else [],
         "falls": falls(verdict) if verdict else [],
         "budget": budget(verdict) if verdict else [],
         "hero": drawn.hero,
@@ -123,7 +132,7 @@ def report(session: Session, title: str | None = None) -> str:
 
 
 def _quantity(session: Session) -> str:
-    return "force" if session.joints and session.joints[0].kind == "prismatic" else "torque"
+    return names_of(session.joints[0])["torque"] if session.joints else "torque"
 
 
 def machine(session: Session) -> str:
@@ -166,24 +175,19 @@ class Tile:
 
     title: str
     big: str
+    unit: str
     small: str
 
 
-def _tiles(verdict: dict[str, Any]) -> list[Tile]:
+def _tiles(session: Session, verdict: dict[str, Any]) -> list[Tile]:
     """Return what a hurried reader wants: how sure, how much, how much is left, and what simulations make of it."""
     tiles = [tile for cause in verdict["causes"][:2] for tile in _cause_tiles(verdict, cause)]
     for fall in falls(verdict):
         if fall.unexplained is not None:
             after = "" if fall.after is None else f" → {digits(fall.after / fall.floor)}"
-            tiles.append(
-                Tile(
-                    f"Error at the {fall.joint}, times the noise floor",
-                    f"{digits(fall.before / fall.floor)}{after}",
-                    "1 would be nothing but noise",
-                )
-            )
-    gained = {cause["gain"].get("joint") for cause in verdict["causes"]}
-    return tiles + [tile for joint, tile in _simulation_tiles(verdict).items() if not gained or joint in gained]
+            big = f"{digits(fall.before / fall.floor)}{after}"
+            tiles.append(Tile(f"{fall.joint} error", big, "× floor", "1 is the noise floor, and nothing else"))
+    return [*tiles, *_simulation_tiles(session, verdict), *_loop_tiles(session)]
 
 
 def _cause_tiles(verdict: dict[str, Any], cause: dict[str, Any]) -> list[Tile]:
@@ -193,29 +197,48 @@ def _cause_tiles(verdict: dict[str, Any], cause: dict[str, Any]) -> list[Tile]:
     words = label_in_words(cause_label(cause))
     return [
         Tile(
-            "Probability" + (", with its ties" if ties else ""),
-            f"{cause['probability']:.0%}",
+            "probability" + (", with its ties" if ties else ""),
+            f"{100 * cause['probability']:.0f}",
+            "%",
             words + (f", or one of {ties} that these data cannot tell from it" if ties else ""),
         ),
         Tile(
-            f"Gain at the {joint}",
-            f"{digits(-gain)} {unit}",
+            f"gain at the {joint}",
+            digits(-gain),
+            unit,
             f"of {digits(verdict['baseline_rmse_nm'][joint])} {unit}; 95 %: {digits(-high)} … {digits(-low)}",
         ),
     ]
 
 
-def _simulation_tiles(verdict: dict[str, Any]) -> dict[str, Tile]:
-    tiles = {}
-    named = bool(verdict["causes"])
-    for joint, before in verdict["baseline_simulation_rmse_rad"].items():
-        after = verdict["extended_simulation_rmse_rad"][joint]
-        if before is None:
-            continue
-        unit = verdict.get("units", {}).get(joint, {}).get("angle", "rad")
-        big = digits(1e3 * before) + (f" → {digits(1e3 * after)}" if named and after is not None else "")
-        tiles[joint] = Tile(f"Simulations of 1 s stray, {joint}", f"{big} m{unit}", "rms, driven by what was recorded")
-    return tiles
+def _simulation_tiles(session: Session, verdict: dict[str, Any]) -> list[Tile]:
+    """Return how far simulations of a second stray, at the joint that matters most."""
+    joint = _worst(session)
+    before = verdict["baseline_simulation_rmse_rad"].get(joint.name) if joint else None
+    if not joint or before is None:
+        return []
+    after = verdict["extended_simulation_rmse_rad"][joint.name] if verdict["causes"] else None
+    big = digits(1e3 * before) + ("" if after is None else f" → {digits(1e3 * after)}")
+    return [
+        Tile(f"{joint.name}, simulated for 1 s", big, f"m{joint.unit('angle')}", "rms, driven by what was recorded")
+    ]
+
+
+def _loop_tiles(session: Session) -> list[Tile]:
+    """Return how far the drives' simulated torque is off, of the run where naming the causes gains most."""
+    joint, key = _worst(session), "closed_loop_rmse_nm"
+    pairs = [
+        [one[model].metadata[key][joint.name] for model in ("baseline", "extended")]
+        for one in replayed(session, "drives").values()
+        if joint and len(one) == 2 and all(joint.name in made.metadata.get(key, {}) for made in one.values())
+    ]
+    if not joint or not pairs:
+        return []
+    before, after = max(pairs, key=lambda pair: pair[0] - pair[1])
+    small = f"rms error of the simulated {names_of(joint)['torque']}"
+    return [
+        Tile(f"{joint.name}, in the drives' loop", f"{digits(before)} → {digits(after)}", joint.unit("torque"), small)
+    ]
 
 
 @dataclass(frozen=True)
@@ -226,13 +249,23 @@ class ShownRun:
     about: str
     charts: tuple[Chart, ...]
     replayed: bool
+    models: tuple[str, ...]
+    """What the columns of its scores are of."""
+    scores: tuple[Score, ...]
 
 
 def _runs(session: Session, drawn: Sequence[Chart]) -> list[ShownRun]:
     replays = replayed(session)
     names = dict.fromkeys([*run_names(session), *replays])
     return [
-        ShownRun(name, _about_run(session, name), tuple(c for c in drawn if c.group == name), name in replays)
+        ShownRun(
+            name,
+            _about_run(session, name),
+            tuple(chart for chart in drawn if chart.group == name),
+            name in replays,
+            tuple(words for _, words in models_of(session).values()),
+            tuple(scores(session, name)),
+        )
         for name in sorted(names, key=lambda name: "human" not in name)
     ]
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
 from pipelines.report.chart import GAP, Chart, Mark, Panel, Series
-from pipelines.report.measured import MODELS, models_of
+from pipelines.report.measured import MODELS, models_of, names_of
 from pipelines.report.session import Session
 
 BINS, FEWEST = 40, 8
@@ -45,8 +45,7 @@ def against(session: Session, joint: Joint) -> list[Against]:
 
 def _along(joint: Joint, quantity: str, variable: str) -> Against:
     words = variable.removeprefix("other_")
-    if joint.kind == "prismatic":
-        words = {"angle": "position"}.get(words, words)
+    words = names_of(joint).get(words, words)
     title = f"{joint.name} {words}"
     return Against(variable, title, f"{title}, {joint.unit(quantity)}", joint.column(quantity))
 
@@ -88,7 +87,7 @@ def _chart(session: Session, frame: pd.DataFrame, joint: Joint, one: Against, re
         line[len(places) - len(middles) :] = binned_mean(x, y)[1]
         clouds.append(Series("", dots[order], role, Mark.DOTS))
         means.append(Series(words, line[order], role, Mark.MEAN))
-    quantity = "force" if joint.kind == "prismatic" else "torque"
+    quantity = names_of(joint)["torque"]
     floor = (session.verdict or {}).get("noise_floor_nm", {}).get(joint.name)
     return Chart(
         key=f"residual-{joint.name}-{one.variable.replace('_', '-')}",
@@ -121,12 +120,15 @@ def _bins(x: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def telling(session: Session, joint: Joint) -> str:
-    """Return the variable with which naming the causes took most away; where none is named, what goes with most."""
+    """Return the variable that foretold most of what naming the causes took away; of all there is, where none is named.
+
+    Shares are of the variance that each model leaves, so they count by its mean square.
+    """
     verdict = session.verdict or {}
     known = {one.variable for one in against(session, joint)}
     ranking = [one for one in verdict.get("depends_on", {}).get(joint.name, []) if one["variable"] in known]
     if not ranking:
         return "angle"
-    if verdict["causes"]:
-        return max(ranking, key=lambda one: one["share_before"] - one["share_after"])["variable"]
-    return ranking[0]["variable"]
+    before, after = (verdict[f"{model}_rmse_nm"][joint.name] ** 2 for model in ("baseline", "extended"))
+    taken = after if verdict["causes"] else 0.0
+    return max(ranking, key=lambda one: one["share_before"] * before - one["share_after"] * taken)["variable"]

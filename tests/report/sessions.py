@@ -158,7 +158,11 @@ def write_replay(folder, parameters, recording, joints=LEG, seconds=20.0, rate_h
         values = (angle, angle - error, speed, error, torque, np.full(len(time), np.nan))
         quantities = ("reference", "angle", "velocity", "error", "torque", "network")
         columns |= {joint.column(name): value for name, value in zip(quantities, values, strict=True)}
-    about = {"joints": named(joints), "windows": 2 * int(seconds) - 1, "simulation_rmse_rad": {}}
+    about = {
+        "joints": named(joints),
+        "windows": 2 * int(seconds) - 1,
+        "simulation_rmse_rad": {joint.name: off / 5**0.5 for joint in joints},
+    }
     path = folder / "simulated" / parameters.parent.name / f"replay-{recording.name}"
     SIMULATION.write(path, pd.DataFrame(columns), about | describe([parameters, recording]))
     return path
