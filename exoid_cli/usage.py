@@ -19,7 +19,8 @@ def told(error: TyperException) -> str:
         return _unknown(match[1], "command", list(context.command.commands) if context else [], called)
     parameter = getattr(error, "param", None)
     if parameter is not None:
-        return f"{_name(parameter)}: {_about(parameter, error.message)}; see {called}"
+        about = _about(parameter, error.message)
+        return f"{_name(parameter)}: {about}" + ("" if about.endswith("?") else f"; see {called}")
     return f"{message[:1].lower()}{message[1:]}; see {called}"
 
 
