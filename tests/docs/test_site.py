@@ -61,4 +61,6 @@ def test_equations_are_drawn_not_left_as_latex(site):
     page = (site / "science.html").read_text(encoding="utf-8")
     source = (DOCS / "science.md").read_text(encoding="utf-8")
     assert page.count('<div class="equation"><svg') == source.count("$$") // 2 > 10
+    heights = [float(height) for height in re.findall(r'<svg [^>]*?height="([\d.]+)"', page)]
+    assert max(heights) < 120, "a bracket that grows without end"
     assert not re.search(r"\$\$|\\frac", re.sub(r'(?:aria-label|title)="[^"]*"', "", page))
