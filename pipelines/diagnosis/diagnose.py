@@ -1,7 +1,7 @@
 """The whole diagnosis: recordings in, verdict and tables out."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.diagnosis import tables
+from pipelines.diagnosis.angle_noise import is_loud
 from pipelines.diagnosis.bank import Bank, fill, silent
 from pipelines.diagnosis.choice import (
     Choice,
@@ -27,7 +28,7 @@ from pipelines.diagnosis.fitted_model import model_of_run
 from pipelines.diagnosis.floor import Floor, noise_floor
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, like_trained, observe, with_load
 from pipelines.diagnosis.search import imperfection
-from pipelines.diagnosis.second_look import slower
+from pipelines.diagnosis.second_look import CUTOFF_HZ, below, slower
 from pipelines.diagnosis.session import refuse_unfit
 from pipelines.diagnosis.status import Standing, status_of
 from pipelines.diagnosis.thinned import thinned
@@ -72,6 +73,8 @@ class Diagnosis:
     faults: tuple[Fault, ...]
     strayed: dict[str, NDArray | None]
     """(J,) rad: the 1 s simulation error of the baseline and of the extended model."""
+    noisy_angles: bool = False
+    """Whether only what the angles hold below 5 Hz was looked at, for above it is noise."""
 
     @property
     def causes(self) -> tuple[str, ...]:
@@ -117,12 +120,14 @@ def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = s
     refuse_unfit(motions)
     faults = tuple(find_faults(motions))
     sound = [thinned(motion) for motion in excluding(motions, faults)]
+    if noisy := is_loud(sound):
+        sound = [below(motion, CUTOFF_HZ) for motion in sound]
     if not any(fault.spoils for fault in faults):
         _refuse_without_floor([observe(motion) for motion in sound if motion.purpose == "validate"])
-    first = _look(sound, faults, report)
+    first = replace(_look(sound, faults, report), noisy_angles=noisy)
     if first.spoilt or not (first.status == "unknown_cause" or (first.unsteady and _rings(first))):
         return first
-    second = _look([slower(m) for m in sound], faults, report)
+    second = replace(_look([slower(m) for m in sound], faults, report), noisy_angles=noisy)
     # Slow motion shows a transmission that rang too loud, and what was only hidden in noise; what failed as anything
     # else may not come back.
     hidden = bool(second.causes) and not first.choice.named.labels and not first.choice.refuted

@@ -61,6 +61,8 @@ class Scan:
     def columns(self, effect: Effect, shape: Sequence[float], r: int) -> NDArray:
         """Return the weighted columns of a torque effect in one run, (m * O, k)."""
         own = effect.columns(self.coarse[r], tuple(shape))
+        if not np.isfinite(own).all():  # a memory so fast that block rate cannot follow it promises nothing here
+            own = np.zeros_like(own)
         both = np.concatenate([own, own if effect.on_limb else np.zeros_like(own)], axis=1)
         return (both * self.roots[r][:, :, np.newaxis]).reshape(-1, own.shape[2])
 

@@ -20,22 +20,27 @@ EDGE_PERIODS = 1.5
 
 def slower(motion: Motion) -> Motion:
     """Return the motion filtered to where transmissions follow their loads; it must have been faster."""
+    block = BlockAverage.lasting(BLOCK_S, motion.sample_rate_hz)
+    told = {**motion.metadata, "regression_filter": block.as_metadata(motion.sample_rate_hz)}
+    return replace(below(motion, CUTOFF_HZ), metadata=told)
+
+
+def below(motion: Motion, cutoff_hz: float) -> Motion:
+    """Return what a motion holds below a cut-off; it must have been faster."""
     rate = motion.sample_rate_hz
     q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
     valid = motion.valid.copy()
-    edge = int(np.ceil(EDGE_PERIODS * rate / CUTOFF_HZ))
+    edge = int(np.ceil(EDGE_PERIODS * rate / cutoff_hz))
     for stretch in motion.segments():
-        if stretch.stop - stretch.start < shortest(rate, CUTOFF_HZ):
+        if stretch.stop - stretch.start < shortest(rate, cutoff_hz):
             valid[stretch] = False
             continue
-        q[stretch] = low_pass(motion.q[stretch], rate, CUTOFF_HZ)
+        q[stretch] = low_pass(motion.q[stretch], rate, cutoff_hz)
         dq[stretch], ddq[stretch] = (derivative(q[stretch], rate, order) for order in (1, 2))
         valid[stretch.start : stretch.start + edge] = False
         valid[max(stretch.start, stretch.stop - edge) : stretch.stop] = False
-    block = BlockAverage.lasting(BLOCK_S, rate)
     return replace(
-        motion, q=q, dq=dq, ddq=ddq, valid=valid, cutoff_hz=CUTOFF_HZ,
-        metadata={**motion.metadata, "regression_filter": block.as_metadata(rate)},
+        motion, q=q, dq=dq, ddq=ddq, valid=valid, cutoff_hz=cutoff_hz,
         # What a fit to the faster motion estimated is not that of this one.
         load=None, limb_load=None, body=None, limb_body=None,
     )  # fmt: skip

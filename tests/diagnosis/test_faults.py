@@ -11,8 +11,10 @@ import pytest
 
 from pipelines.contracts.table import Table
 from pipelines.diagnosis.faults import excluding, find_faults
+from pipelines.diagnosis.faults.body import averages
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.kinematics import motion_table
+from pipelines.mechanics.leg import LEG
 from pipelines.mechanics.motion import CUFFS, Motion, motion_from_table
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
@@ -283,3 +285,12 @@ def test_what_physics_can_do_to_a_torque_is_no_fault(session, spoil):
 def test_no_effect_of_the_catalogue_is_taken_for_a_fault(term):
     made = [record(Plant(PlantSettings(), kind, i, (term,)), RICH, 30.0) for i, kind in enumerate(KINDS)]
     assert [fault.what for fault in faults_of(made)] == []
+
+
+def test_what_nature_allows_is_said_of_the_leg_that_moves(sound):
+    """Wiring is judged by parameters that cannot be negative: the same leg, in other terms."""
+    moved = motion(*sound[0], "exo_alone.parquet")
+    run = averages(moved)
+    X1, X2, X3, X4 = 1.5, 0.2, 0.4, 2.0
+    leg = LEG.regressor(run.q, run.dq, run.ddq, moved.geometry) @ [X1, X2, X3, X4]
+    np.testing.assert_allclose(run.body() @ [X1 - X2, X2, X3, X4], leg, atol=1e-12)

@@ -25,6 +25,8 @@ from pipelines.mechanics.motion import CUFFS, Motion
 FAR_BETTER = 0.5
 """By which the power left unexplained must fall for each channel said to be wrong: the more channels, the less
 likely. Missing physics of a quarter of the torque changes it by a few tenths."""
+A_LIMB = 0.05
+"""Share of the cuffs' power: with less of it left unexplained they feel a limb, whatever would explain more."""
 FOLLOWS = 0.9
 """Correlation of an angle with its set-point."""
 SIGN, SWAP = "reversed", "exchanged"
@@ -115,7 +117,7 @@ def cuff_faults(run: Averages) -> Iterator[Fault]:
     as_recorded = cuff_misfit(run, run.cuffs)
     misfits = {what: cuff_misfit(run, cuffs) for what, cuffs in readings.items()}
     best = min(misfits, key=misfits.__getitem__)
-    if misfits[best] < FAR_BETTER**2 * as_recorded:
+    if as_recorded > A_LIMB and misfits[best] < FAR_BETTER**2 * as_recorded:
         chosen = [cuff for cuff in CUFFS if "all" in best or "exchanged" in best or cuff.split("_")[0] in best]
         yield Fault(
             run.motion.file,
