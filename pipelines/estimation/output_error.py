@@ -86,13 +86,17 @@ def _weights(errors: Sequence[NDArray]) -> NDArray:
 def _searched(problem: Problem, values: NDArray, size: NDArray, weights: NDArray) -> tuple[NDArray, int]:
     """Return the values with the least weighted square error, and how many simulations of all runs that took."""
     unit, root = size[problem.fitted], np.sqrt(weights)
+    outputs = sum(error.size for error in _errors(problem, problem.completed(values)))
 
     def completed(step: NDArray) -> NDArray:
         return problem.completed(values + unit * step)
 
     def residual(step: NDArray) -> NDArray:
-        found = np.concatenate([(error * root).ravel() for error in _errors(problem, completed(step))])
-        # What runs away is refused by the search, which then takes a shorter step.
+        # What runs away, or has a mass matrix that no machine has, is refused by the search: it takes a shorter step.
+        try:
+            found = np.concatenate([(error * root).ravel() for error in _errors(problem, completed(step))])
+        except ZeroDivisionError:
+            return np.full(outputs, np.nan)
         return found if np.all(np.abs(found) < RAN_AWAY * root.max()) else np.full_like(found, np.nan)
 
     def jacobian(step: NDArray) -> NDArray:

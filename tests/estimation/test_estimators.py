@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.stats import binom
 
 from pipelines.errors import InputError
+from pipelines.estimation import output_error
 from pipelines.estimation.estimator import estimated
 from pipelines.estimation.estimators import ESTIMATORS, estimator_named
 from pipelines.estimation.instrumental_variables import InstrumentalVariables
@@ -157,3 +158,25 @@ def test_a_method_that_does_not_exist_is_told_with_the_nearest_that_does():
         InputError, match="there is no method 'instrumental_variable'; did you mean instrumental_variab"
     ):
         estimator_named("instrumental_variable")
+
+
+STEPPED = 9
+"""The simulation that tries the search's first step: one for the weights, one to count, one at the start, five and one
+for the slopes there."""
+
+
+def test_output_error_takes_back_a_step_to_a_machine_without_inertia(clean, monkeypatch):
+    """Such a machine has no motion to be held against the recorded one."""
+    replayed, calls = output_error.replay, []
+
+    def without_inertia_once(*arguments):
+        calls.append(1)
+        if len(calls) == STEPPED:
+            raise ZeroDivisionError
+        return replayed(*arguments)
+
+    undisturbed = OutputError().fit(clean)
+    monkeypatch.setattr(output_error, "replay", without_inertia_once)
+    found = OutputError().fit(clean)
+    assert len(calls) > STEPPED
+    assert np.all(np.abs(found.values - undisturbed.values) < 0.5 * error(estimated(undisturbed)))
