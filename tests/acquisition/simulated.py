@@ -12,6 +12,7 @@ from pipelines.acquisition import journal, loop, machine, pace
 from pipelines.acquisition.acquire import _finish, _record
 from pipelines.acquisition.device import Device
 from pipelines.acquisition.line import Line
+from pipelines.acquisition.lock import locked
 from pipelines.acquisition.loop import Loop, run_to_its_end
 from pipelines.acquisition.states import Supervisor
 from pipelines.errors import DeviceError, Unanswered
@@ -317,7 +318,8 @@ def simulate(rig, settings, trajectory, path, events, rest, *, plan=None, own=No
                 ),
                 supervisor.abort,
             )
-            run.result = _finish(path, path.with_suffix(".journal"), supervisor)
+            with locked(path.with_suffix(".journal")) as lock:
+                run.result = _finish(path, lock, supervisor)
         except BaseException as error:
             run.result = error
     return run
