@@ -21,6 +21,7 @@ from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.pace import urgent
 from pipelines.acquisition.plan import check_start, check_trajectory, make_plan
 from pipelines.acquisition.recorded import account_of, place_for, write_recording
+from pipelines.acquisition.resolution import refuse_coarse_set_points
 from pipelines.acquisition.sampling import sampling_of
 from pipelines.acquisition.states import State, Supervisor
 from pipelines.contracts import RECORDING
@@ -82,6 +83,8 @@ def acquire(
     trajectory = read_trajectory(trajectory_path)
     with about(trajectory_path):
         check_trajectory(rig, trajectory, run.duration_s, sample_rate_hz)
+    with about(rig_path):
+        refuse_coarse_set_points(rig, sample_rate_hz)
     if rig.clock == "real_time":
         with about(rig_path):
             refuse_slow_lines(rig, sample_rate_hz, with_sensors=run.run == "with_human")

@@ -193,7 +193,9 @@ class Drive:
                 f"{self.device.label}: a set-point of {reference:.3f} rad was due, outside its limits {low:g} to "
                 f"{high:g} rad; it was not sent"
             )
-        return self._encoded(control, reference)
+        # Within the limits once rounded, too: what is half a count from a limit may be rounded beyond it.
+        half = self.map.write.reference.step / 2.0
+        return self._encoded(control, min(max(reference, low + half), high - half))
 
     async def idle_words(self, control: int, angle: float) -> list[int]:
         """Return the registers that tell a control word to a drive that is not to follow, its leg at ``angle`` (rad).

@@ -75,6 +75,11 @@ class Register(Settings):
         return self.scale * UNITS[self.unit], self.offset * UNITS[self.unit]
 
     @property
+    def step(self) -> float:
+        """How far the SI values of neighbouring counts are apart; 0 for a float."""
+        return 0.0 if self.type.startswith("float") else abs(self.si[0])
+
+    @property
     def counts(self) -> tuple[int, int] | None:
         """The least and the greatest count of an integer; None for a float."""
         if self.type.startswith("float"):
@@ -521,14 +526,28 @@ class RigSettings(Settings):
             raise ValueError("plant: missing; a virtual rig (embedded, or in lockstep) needs the machine it plays")
         self._refuse_impossible_sampling()
         self._refuse_torque_that_is_never_told()
+        self._refuse_impossible_set_points()
+        return self
+
+    def _refuse_impossible_set_points(self) -> None:
+        """Refuse registers that cannot hold every set-point, or so coarsely that rounding leads the leg astray."""
         for drive in self.drive:
-            low, high = drive.angle_rad
-            if not self.map.drive[drive.map].write.reference.holds(low, high):
+            register, (low, high) = self.map.drive[drive.map].write.reference, drive.angle_rad
+            if not register.holds(low, high):
                 raise ValueError(
                     f"map.drive.{drive.map}.write.reference: cannot hold {low:g} to {high:g} rad, the {drive.joint}'s "
                     "limits; correct its type or scale"
                 )
-        return self
+        careful = self.in_force("with_human")
+        for drive in careful.drive:
+            register, (low, high) = self.map.drive[drive.map].write.reference, drive.angle_rad
+            coarsest = min(careful.safety.following_error_rad, high - low) / 4.0
+            if register.step > coarsest:
+                raise ValueError(
+                    f"map.drive.{drive.map}.write.reference: one count is {register.step:.3g} rad, expected at most "
+                    f"{coarsest:.3g} rad, a quarter of safety.following_error_rad or of the {drive.joint}'s range; "
+                    "correct its scale"
+                )
 
     def _refuse_torque_that_is_never_told(self) -> None:
         """Refuse limits that a drive never tells more than, since it saturates: they would be watched in vain."""

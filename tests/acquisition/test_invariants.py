@@ -22,8 +22,9 @@ from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import RigSettings
 from tests.acquisition.simulated import RATE, Event, simulate
 
-ROUNDING_RAD = 2e-6
-"""Half a count of the set-point's register, twice."""
+FINE_RAD, COARSE_RAD = 1e-6, 0.01
+"""Counts of the set-point's register: six of the coarse ones make the longest step, four would be allowed."""
+NOTHING_RAD = 1e-9
 REST_RAD = (0.6, -0.8)
 TRAJECTORY = FourierTrajectory(
     np.array(REST_RAD), np.array([[0.16, 0.02], [-0.13, 0.02]]), np.array([[0.05, -0.03], [0.11, 0.02]]), 4 * np.pi
@@ -36,14 +37,14 @@ REGISTERS = {
 }  # fmt: skip
 
 
-def rig_that(clock, *, reads_back=True):
+def rig_that(clock, *, reads_back=True, count_rad=FINE_RAD):
     """Return a rig of two drives and two cuff sensors."""
     read = {
         name: {"address": 100 + 4 * k, "type": kind, "unit": unit, "scale": scale}
         for k, (name, (kind, unit, scale)) in enumerate(REGISTERS.items())
     }
     write = {
-        "reference": {"address": 200, "type": "int32", "scale": 1e-6, "unit": "rad"},
+        "reference": {"address": 200, "type": "int32", "scale": count_rad, "unit": "rad"},
         "control": {"address": 202, "type": "uint16"},
     }
     servo = {"read": read, "write": write, "enable": 15, "halt": 271, "fault_mask": 8}
@@ -72,9 +73,10 @@ def rig_that(clock, *, reads_back=True):
 
 
 RIGS = {
-    (clock, reads_back): rig_that(clock, reads_back=reads_back)
+    (clock, reads_back, count_rad): rig_that(clock, reads_back=reads_back, count_rad=count_rad)
     for clock in ("real_time", "lockstep")
     for reads_back in (True, False)
+    for count_rad in (FINE_RAD, COARSE_RAD)
 }
 
 
@@ -127,8 +129,8 @@ def bad_plans(draw):
     return spoil
 
 
-def check_every_invariant(clock, reads_back, goes_on, human, happens, plan, own):
-    rig = RIGS[clock, reads_back]
+def check_every_invariant(clock, reads_back, count_rad, goes_on, human, happens, plan, own):
+    rig = RIGS[clock, reads_back, count_rad]
     run = RunSettings(name="x", run="with_human" if human else "exo_alone", purpose="train", duration_s=0.5)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "x.parquet"
@@ -142,6 +144,11 @@ def check_every_invariant(clock, reads_back, goes_on, human, happens, plan, own)
         only_drawn_transitions_were_made(simulated)
 
 
+def rounding_of(run):
+    """Return by how much rounding lengthens a step at most, rad."""
+    return run.rig.rig.map.drive["servo"].write.reference.step + NOTHING_RAD
+
+
 def sent_is_within_limits(run):
     """As docs/safety.md states it: between any two set-points of a joint, not only between neighbours."""
     rig = run.rig.rig
@@ -151,20 +158,20 @@ def sent_is_within_limits(run):
             continue
         sent, at = np.array([(told.reference, told.time) for told in mine]).T
         low, high = drive.angle_rad
-        assert low - ROUNDING_RAD <= sent.min() and sent.max() <= high + ROUNDING_RAD
+        assert low - NOTHING_RAD <= sent.min() and sent.max() <= high + NOTHING_RAD
         # In lockstep cycles are the time.
         time_s = np.arange(len(at)) / RATE if rig.clock == "lockstep" else 1.05 * at
         allowed_s = np.abs(time_s - time_s[:, np.newaxis]) + 2.0 / RATE
-        assert (np.abs(sent - sent[:, np.newaxis]) <= drive.speed_rad_s * allowed_s + ROUNDING_RAD).all()
+        assert (np.abs(sent - sent[:, np.newaxis]) <= drive.speed_rad_s * allowed_s + rounding_of(run)).all()
         assert abs(sent[0] - REST_RAD[j]) <= drive.speed_rad_s / RATE
         if not run.rig.goes_on:
-            assert (np.abs(np.diff(sent)) <= drive.speed_rad_s / RATE + ROUNDING_RAD).all()
+            assert (np.abs(np.diff(sent)) <= drive.speed_rad_s / RATE + rounding_of(run)).all()
 
 
 def no_drive_leaps(run):
     """As docs/safety.md states it: from where a drive is, whatever it made of a silence and of what never arrived."""
     for drive in run.rig.drives:
-        assert drive.largest_leap <= 3.0 * drive.settings.speed_rad_s / RATE + ROUNDING_RAD
+        assert drive.largest_leap <= 3.0 * drive.settings.speed_rad_s / RATE + rounding_of(run)
 
 
 def a_drive_that_says_it_is_not_enabled_is_told_to_disable_and_nothing_else(run):
@@ -181,7 +188,7 @@ def motion_stops_within_the_stated_number_of_cycles(run):
         told = [t for t in run.rig.told if t.joint == j and t.control != 0]
         before = [t.reference for t in told if t.time <= run.aborted_at]
         after = [t.reference for t in told if t.time > run.aborted_at]
-        moving = np.flatnonzero(np.abs(np.diff(before[-1:] + after)) > ROUNDING_RAD)
+        moving = np.flatnonzero(np.abs(np.diff(before[-1:] + after)) > NOTHING_RAD)
         slowing = ceil(drive.speed_rad_s / run.rig.rig.safety.deceleration_rad_s2 * RATE)
         assert moving.size == 0 or moving[-1] < slowing
         assert len(after) <= slowing + HOLD_SAMPLES
@@ -235,8 +242,9 @@ def only_drawn_transitions_were_made(run):
 
 
 sequences = given(
-    clock=st.sampled_from(["real_time", "lockstep"]), reads_back=st.booleans(), goes_on=st.booleans(),
-    human=st.booleans(), happens=sequences_of_events(), plan=st.none() | bad_plans(), own=own_errors,
+    clock=st.sampled_from(["real_time", "lockstep"]), reads_back=st.booleans(),
+    count_rad=st.sampled_from([FINE_RAD, COARSE_RAD]), goes_on=st.booleans(), human=st.booleans(),
+    happens=sequences_of_events(), plan=st.none() | bad_plans(), own=own_errors,
 )  # fmt: skip
 relaxed = dict(deadline=None, suppress_health_check=list(HealthCheck))
 
@@ -244,24 +252,24 @@ relaxed = dict(deadline=None, suppress_health_check=list(HealthCheck))
 @sequences
 @settings(max_examples=60, derandomize=True, **relaxed)
 def test_whatever_happens_the_leg_is_stopped_within_its_limits_and_it_is_said_why(
-    clock, reads_back, goes_on, human, happens, plan, own
+    clock, reads_back, count_rad, goes_on, human, happens, plan, own
 ):
-    check_every_invariant(clock, reads_back, goes_on, human, happens, plan, own)
+    check_every_invariant(clock, reads_back, count_rad, goes_on, human, happens, plan, own)
 
 
 @pytest.mark.slow
 @sequences
 @settings(max_examples=10_000, database=None, **relaxed)
 def test_ten_thousand_times_the_leg_is_stopped_within_its_limits_and_it_is_said_why(
-    clock, reads_back, goes_on, human, happens, plan, own
+    clock, reads_back, count_rad, goes_on, human, happens, plan, own
 ):
-    check_every_invariant(clock, reads_back, goes_on, human, happens, plan, own)
+    check_every_invariant(clock, reads_back, count_rad, goes_on, human, happens, plan, own)
 
 
 def test_a_simulated_run_to_which_nothing_happens_is_complete(tmp_path):
     run = RunSettings(name="x", run="with_human", purpose="train", duration_s=0.5)
     for clock in ("real_time", "lockstep"):
-        simulated = simulate(RIGS[clock, True], run, TRAJECTORY, tmp_path / f"{clock}.parquet", [], REST_RAD)
+        simulated = simulate(RIGS[clock, True, FINE_RAD], run, TRAJECTORY, tmp_path / f"{clock}.parquet", [], REST_RAD)
         assert isinstance(simulated.result, Outcome), simulated.result
         assert (simulated.result.samples, simulated.result.missed) == (25, 0)
         assert simulated.states == [

@@ -61,6 +61,9 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
          "have meanings of their own; correct it"),
         ('scale = 1e-6, unit = "rad" }\ncontrol', 'scale = 1e-10, unit = "rad" }\ncontrol',
          "map.drive.servo.write.reference: cannot hold -0.35 to 1.75 rad, the hip's limits; correct its type or scale"),
+        ('scale = 1e-6, unit = "rad" }\ncontrol', 'scale = 5.0, unit = "deg" }\ncontrol',
+         "map.drive.servo.write.reference: one count is 0.0873 rad, expected at most 0.025 rad, a quarter of "
+         "safety.following_error_rad or of the hip's range; correct its scale"),
         ("[plant]\n", "[controller.knee]\nlimit_nm = 110.0\n[plant]\n", "torque_nm: found 110 of the knee, expected "
          "less than its controller.limit_nm (110), which the drive never goes beyond; lower it"),
         ("following_error_rad = 0.1\n", "following_error_rad = 0.2\n", "safety: with_human.following_error_rad: found "
