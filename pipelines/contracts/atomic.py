@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from pipelines.errors import InputError
+
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
@@ -15,6 +17,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     The folder is made if need be. On any failure, Ctrl-C included, the temporary file goes and ``path``
     stays as it was.
     """
+    refuse_what_is_no_file(path)
     path = Path(os.path.realpath(path))  # a link keeps pointing at the file it names
     path.parent.mkdir(parents=True, exist_ok=True)
     # Not tempfile: its files are readable by their owner alone, and would stay so under the final name.
@@ -30,6 +33,13 @@ def whole_file(path: Path) -> Iterator[Path]:
         raise
     with suppress(OSError):  # some file systems cannot sync a folder; the file itself is safe
         _sync(path.parent, os.O_RDONLY)
+
+
+def refuse_what_is_no_file(path: Path) -> None:
+    """Refuse to replace a folder, a pipe or a device: a file in its place would take it from all who use it."""
+    if path.exists() and not path.is_file():
+        kind = "a folder" if path.is_dir() else "a pipe or a device"
+        raise InputError(f"{path}: is {kind}, expected the name of a file to write; name another")
 
 
 def open_folder(path: Path) -> None:

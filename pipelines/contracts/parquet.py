@@ -10,7 +10,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from pipelines.contracts.atomic import whole_file
+from pipelines.contracts.atomic import refuse_what_is_no_file, whole_file
 from pipelines.errors import ContractError
 
 KEY = b"exoid"
@@ -76,6 +76,7 @@ def refuse_place(path: Path, contract: str) -> None:
     """Refuse to write where a folder is, or what is no older version of the same: a recording cannot be made again."""
     if path.is_dir():
         raise ContractError(f"{path}: is a folder, expected the name of a Parquet file to write")
+    refuse_what_is_no_file(path)
     if not path.exists() or path.stat().st_size == 0:
         return
     try:
