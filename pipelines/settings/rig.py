@@ -531,6 +531,7 @@ class RigSettings(Settings):
 
     def _refuse_impossible_set_points(self) -> None:
         """Refuse registers that cannot hold every set-point, or so coarsely that rounding leads the leg astray."""
+        following_rad = self.safety.with_human.following_error_rad or self.safety.following_error_rad
         for drive in self.drive:
             register, (low, high) = self.map.drive[drive.map].write.reference, drive.angle_rad
             if not register.holds(low, high):
@@ -538,10 +539,8 @@ class RigSettings(Settings):
                     f"map.drive.{drive.map}.write.reference: cannot hold {low:g} to {high:g} rad, the {drive.joint}'s "
                     "limits; correct its type or scale"
                 )
-        careful = self.in_force("with_human")
-        for drive in careful.drive:
-            register, (low, high) = self.map.drive[drive.map].write.reference, drive.angle_rad
-            coarsest = min(careful.safety.following_error_rad, high - low) / 4.0
+            low, high = drive.with_human.angle_rad or drive.angle_rad
+            coarsest = min(following_rad, high - low) / 4.0
             if register.step > coarsest:
                 raise ValueError(
                     f"map.drive.{drive.map}.write.reference: one count is {register.step:.3g} rad, expected at most "
