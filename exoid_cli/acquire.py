@@ -46,6 +46,7 @@ def acquire(
     ] = None,
     again: AgainOption = False,
     yes: YesOption = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a real rig's recording.")] = False,
     reset_faults: Annotated[
         bool, typer.Option("--reset-faults", help="First clear the faults that drives report.")
     ] = False,
@@ -65,26 +66,36 @@ def acquire(
     if run is None:
         if trajectory or output:
             raise InputError("--run: missing; --trajectory and -o are of one run, name it")
-        faults = ("--reset-faults",) if reset_faults else ()
+        told = (*(("--overwrite",) if overwrite else ()), *(("--reset-faults",) if reset_faults else ()))
         only(
             context, place, "acquire", again=again,
-            before=lambda step: (*ask_before(place.experiment, step, yes=yes), *faults),
+            before=lambda step: (*ask_before(place.experiment, step, yes=yes), *told),
         )  # fmt: skip
         return
     place.experiment.run_named(run)
     if trajectory is None or output is None:
         step = place.step("acquire", run)
         trajectory, output = trajectory or step.inputs[0], output or step.target
-    _record(place.experiment, run, trajectory, output, yes=yes, reset_faults=reset_faults)
+    _record(place.experiment, run, trajectory, output, yes=yes, overwrite=overwrite, reset_faults=reset_faults)
 
 
 def _record(
-    experiment: "Experiment", run: str, trajectory: Path, output: Path, *, yes: bool, reset_faults: bool
+    experiment: "Experiment",
+    run: str,
+    trajectory: Path,
+    output: Path,
+    *,
+    yes: bool,
+    overwrite: bool,
+    reset_faults: bool,
 ) -> None:
     from pipelines.acquisition.acquire import acquire as record
     from pipelines.workflow.imported import refuse_imported
+    from pipelines.workflow.kept import refuse_recorded
 
     refuse_imported(output)
+    if not overwrite:
+        refuse_recorded(output)
     experiment.mechanism.refuse_all_but_the_leg("`exoid acquire`")
     settings, rate = experiment.run_named(run), experiment.acquire.sample_rate_hz
     reports: list[Callable[[Progress], None]] = []

@@ -2,8 +2,10 @@
 
 import io
 
+import pandas as pd
 import pytest
 
+from pipelines.contracts import RECORDING
 from pipelines.settings import datasets
 from pipelines.settings.rig import RigSettings
 
@@ -160,3 +162,46 @@ def test_a_no_to_it_moves_nothing_and_a_yes_goes_on_to_the_drives(exoid, with_ex
     answer("yes\n")
     assert exoid("acquire").code == 3  # there is no rig to be found
     assert exoid("acquire", "--yes").code == 3
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    """Leave a recording where the run's is to be; returns its path."""
+
+    def leave(embedded):
+        path = tmp_path / "one.parquet"
+        rig = {"name": "leg", "embedded": embedded}
+        metadata = {"run": "exo_alone", "purpose": "train", "sample_rate_hz": 200.0, "config": {"rig": rig}}
+        frame = pd.DataFrame({name: [0.0, 0.005] for name in ("time_s", "hip_angle_rad", "hip_torque_nm")})
+        RECORDING.write(path, frame, metadata | {"joints": [{"name": "hip", "kind": "revolute"}]})
+        return path
+
+    return leave
+
+
+def test_a_recording_of_a_real_rig_is_replaced_only_where_that_is_said(exoid, experiment, recorded):
+    path, arguments = recorded(embedded=False), experiment("exo_alone")
+    before = path.read_bytes()
+    refused = exoid(*arguments, "--yes")
+    assert (refused.code, refused.err) == (
+        2,
+        f"exoid: {path}: is a recording of the rig leg, not overwritten; --overwrite replaces it, -o writes another "
+        "file\n",
+    )
+    assert WENT_ON in exoid(*arguments, "--overwrite").err
+    assert path.read_bytes() == before
+
+
+def test_a_recording_of_a_virtual_leg_is_made_anew(exoid, experiment, recorded):
+    recorded(embedded=True)
+    assert WENT_ON in exoid(*experiment("exo_alone")).err
+
+
+@pytest.mark.parametrize(("more", "code"), [((), 2), (("--overwrite",), 3)])
+def test_a_stale_recording_of_a_real_rig_is_not_lost_to_a_run_that_nobody_named(
+    exoid, with_excitation, recorded, tmp_path, more, code
+):
+    with_excitation(run="exo_alone")
+    (tmp_path / "recordings").mkdir()
+    recorded(embedded=False).rename(tmp_path / "recordings" / "one.parquet")
+    assert exoid("acquire", "--yes", *more).code == code
