@@ -39,6 +39,10 @@ class DeviceError(ExoidError):
     exit_code = 3
 
 
+class Refused(DeviceError):
+    """A device answered that it will not do what it was asked."""
+
+
 class Unanswered(DeviceError):
     """A device gave no answer in time; while the leg moves, one such is survived."""
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from pipelines.acquisition.alone import alone
 from pipelines.acquisition.columns import columns_of
 from pipelines.acquisition.embedded import embedded
 from pipelines.acquisition.journal import Journal, JournalFile, journal_of, refuse_leftover
@@ -102,7 +103,12 @@ def acquire(
     metadata |= describe([trajectory_path, rig_path], config)
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)  # what it would print, our errors say
     place = embedded(rig, rig_path, run, sample_rate_hz) if rig.embedded else nullcontext(rig)
-    with place as present, nullcontext() if rig.clock == "lockstep" else urgent(), _signals() as stopped_by:
+    with (
+        place as present,
+        alone(present),
+        nullcontext() if rig.clock == "lockstep" else urgent(),
+        _signals() as stopped_by,
+    ):
         sensors = present.sensor if run.run == "with_human" else ()
         supervisor = Supervisor(present, sample_rate_hz, sensors)
         recording = _record(supervisor, run, trajectory, journal, metadata, report, stopped_by, reset_faults)
@@ -129,6 +135,7 @@ async def _record(
     try:
         supervisor.check()
         await machine.connect()
+        await machine.refuse_driven()
         if reset_faults:
             await machine.reset_faults()
         await machine.make_idle()

@@ -9,7 +9,7 @@ from pymodbus.pdu import ModbusPDU
 
 from pipelines.acquisition.line import Line
 from pipelines.acquisition.reply import NoReply
-from pipelines.errors import DeviceError, Unanswered
+from pipelines.errors import DeviceError, Refused, Unanswered
 from pipelines.registers import Block
 from pipelines.settings.rig import Identity, SafetySettings
 
@@ -136,7 +136,7 @@ class Device:
         if response.isError():
             code = int(getattr(response, "exception_code", 0))
             meaning = f": {MEANING[code]}" if code in MEANING else ""
-            raise DeviceError(
+            raise Refused(
                 f"{self.label}: answered {what} with Modbus exception {code}{meaning}; "
                 "compare the register map in the rig file with the device's manual"
             )

@@ -16,7 +16,7 @@ from pipelines.acquisition.device import Device
 from pipelines.acquisition.line import Line, lines_of
 from pipelines.acquisition.patience import Patience
 from pipelines.acquisition.ring import Queue, Ring
-from pipelines.errors import DeviceError, SettingsError, Unanswered
+from pipelines.errors import DeviceError, Refused, SettingsError, Unanswered
 from pipelines.mechanics.motion import CUFFS
 from pipelines.registers import Block
 from pipelines.settings.rig import DriveSettings, RigSettings, SensorSettings, registers_of
@@ -24,8 +24,16 @@ from pipelines.settings.rig import DriveSettings, RigSettings, SensorSettings, r
 LAG_PAUSE_S = 0.0002
 """Before a drive is asked again that has not latched its sample yet."""
 
+WATCH_PAUSE_S = 0.05
+"""From one look at a drive that may be driven to the next."""
+
 STATUS_PAUSE_S = 0.002
 """Before a drive is asked again whether it has taken a control word."""
+
+WATCH_S = 0.5
+"""How long a drive is watched that may be enabled before the run: whoever drives it tells it something meanwhile."""
+DRIVEN_RAD = 0.005
+"""How far the angle of a drive goes in that time that somebody moves."""
 
 LOOKS = 9
 """Readings from which the distance between the drives' counters is taken."""
@@ -144,6 +152,31 @@ class Drive:
         await self._tell_idle(self.map.disable, angle)
         if self.map.enabled_mask:
             await self._until(lambda status: not self._is_enabled(status), "to disable", "see its manual")
+
+    async def is_driven(self) -> bool:
+        """Tell whether somebody else drives it, by watching it for a while; one that says it is disabled nobody does.
+
+        Nothing is written: a torque that is taken away comes back with the other's next set-point.
+        """
+        told = self._decoded(self.told, await self.device.read(self.told.address, self.told.count))
+        if self.map.enabled_mask and not self._is_enabled(int(told["status"])):
+            return False
+        until, first = time.monotonic() + WATCH_S, await self._all_told()
+        while time.monotonic() < until:
+            await asyncio.sleep(WATCH_PAUSE_S)
+            now = await self._all_told()
+            if now[0] != first[0] or not abs(now[1] - first[1]) <= DRIVEN_RAD:
+                return True
+        return False
+
+    async def _all_told(self) -> tuple[object, float]:
+        """Return what the drive has been told, as far as it tells, and its angle (rad)."""
+        told = self._decoded(self.told, await self.device.read(self.told.address, self.told.count))
+        try:
+            written: object = await self.device.read(self.tell.address, self.tell.count)
+        except Refused:  # not every drive lets what is written be read; then its angle must tell
+            written = None
+        return written, told["angle"]
 
     async def make_idle(self) -> bool:
         """Disable the drive before a run, whatever it does; tell whether it said that it was enabled."""
@@ -387,6 +420,15 @@ class Machine:
         for part in self._parts:
             await part.device.line.connect()
             await part.device.check_identity(part.map.identity)
+
+    async def refuse_driven(self) -> None:
+        """Refuse to write anything to a rig that somebody else drives."""
+        driven = await all_answers(drive.is_driven() for drive in self.drives)
+        if found := [drive.device.label for drive, is_so in zip(self.drives, driven, strict=True) if is_so]:
+            raise DeviceError(
+                f"{' and '.join(found)}: driven by somebody else, since angle or set-point change while exoid sends "
+                "nothing; end the other program, or hold the leg still; nothing was sent"
+            )
 
     async def reset_faults(self) -> None:
         """Clear the faults that drives report."""

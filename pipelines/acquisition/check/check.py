@@ -6,6 +6,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Literal
 
+from pipelines.acquisition.alone import alone
 from pipelines.acquisition.check.by_hand import Operator, by_hand
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.guided import guided, refuse_far_from_zero
@@ -57,7 +58,9 @@ def check_rig(
     settings = RunSettings(name="check", run=run, purpose="train")
     place = embedded(rig, path, settings, rate_hz) if rig.embedded and rate_hz else nullcontext(rig)
     with place as present, nullcontext() if rig.clock == "lockstep" else urgent():
-        report, start = asyncio.run(_check(present, rate_hz, run == "exo_alone", operator))
+        # Who only asks takes nobody's torque; the guided movement holds the lines itself.
+        with alone(present) if operator else nullcontext():
+            report, start = asyncio.run(_check(present, rate_hz, run == "exo_alone", operator))
         if move and not report.findings:
             try:
                 if not report.by_hand:
@@ -94,6 +97,7 @@ async def _check(
         if operator and all(device.latency for device in report.devices):
             report.by_hand = True
             try:
+                await machine.refuse_driven()
                 report.findings += await by_hand(probes_of(machine), rig, rate_hz, operator)
             except DeviceError as error:
                 report.findings.append(Finding("rig", str(error)))
