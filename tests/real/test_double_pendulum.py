@@ -22,3 +22,20 @@ def test_the_extended_model_is_better_than_the_published_parameters(fourier, the
         ours = slow_error(fourier.model.torque(motion), motion)
         published = slow_error(their_torque(theirs, motion), motion)
         assert (ours.rms < published.rms).all(), motion.file
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("design", ["A0", "C1"])
+def test_in_free_swings_nothing_is_accused_and_the_shoulder_is_foretold_as_well_as_its_makers_do(
+    design, real_data, tmp_path_factory
+):
+    """Inertia and gravity nearly cancel there: noise of the angles must pass for no cause, nor for a wrong sign."""
+    swings = diagnosed(LOGS[f"{design}-swings"], real_data, tmp_path_factory.mktemp(design))
+    assert swings.causes == []
+    assert not any("reversed" in fault["what"] for fault in swings.verdict["data_faults"])
+    assert any("no torque goes with" in caveat for caveat in swings.verdict["caveats"])
+    theirs = double_pendulum(real_data / "double_pendulum" / f"{design}_published_parameters.yml")
+    for motion in swings.motions:
+        ours = slow_error(swings.model.torque(motion), motion)
+        published = slow_error(their_torque(theirs, motion), motion)
+        assert ours.rms[0] < 1.1 * published.rms[0], motion.file
