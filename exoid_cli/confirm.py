@@ -74,13 +74,32 @@ def confirm_move() -> None:
 def _refuse_nobody_to_ask(why: str) -> None:
     from pipelines.errors import InputError
 
-    if not sys.stdin.isatty():
+    if not _somebody_sees_and_answers():
         raise InputError(f"{why}; give --yes where a script starts it; nothing was moved")
+
+
+def _somebody_sees_and_answers() -> bool:
+    # Where what is asked goes to a file, a terminal's yes is no answer to it.
+    return sys.stdin.isatty() and sys.stderr.isatty()
+
+
+def _forget_what_was_typed() -> None:
+    """Leave nothing on the terminal that was typed before the question, and so is no answer to it."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        while msvcrt.kbhit():
+            msvcrt.getwch()
+    else:
+        import termios
+
+        termios.tcflush(sys.stdin, termios.TCIFLUSH)
 
 
 def _ask(question: str, what: str) -> None:
     from pipelines.errors import InputError
 
+    _forget_what_was_typed()
     console.err.print(f"{question} [y/N] ", markup=False, end="")
     if sys.stdin.readline().strip().lower() not in ("y", "yes"):
         raise InputError(f"{what} was not confirmed; nothing was moved")

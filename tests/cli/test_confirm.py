@@ -1,6 +1,9 @@
 """A leg with somebody in it is moved only after somebody has said yes."""
 
 import io
+import os
+import subprocess
+import sys
 
 import pandas as pd
 import pytest
@@ -44,11 +47,57 @@ def experiment(tmp_path):
 def answer(monkeypatch):
     """Let somebody sit at the terminal who answers."""
 
-    class Terminal(io.StringIO):
-        def isatty(self):
-            return True
+    def sit(text):
+        monkeypatch.setattr("sys.stdin", io.StringIO(text))
+        monkeypatch.setattr("exoid_cli.confirm._somebody_sees_and_answers", lambda: True)
+        monkeypatch.setattr("exoid_cli.confirm._forget_what_was_typed", lambda: None)
 
-    return lambda text: monkeypatch.setattr("sys.stdin", Terminal(text))
+    return sit
+
+
+@pytest.fixture
+def typed_ahead(experiment):
+    """Start the experiment's run in a process of its own, with a yes typed before it asks; returns it and its end."""
+    pty = pytest.importorskip("pty")
+
+    def start(err=None):
+        here, there = pty.openpty()
+        os.write(here, b"y\n")
+        command = [sys.executable, "-m", "exoid_cli.app", *map(str, experiment())]
+        process = subprocess.Popen(command, stdin=there, stdout=subprocess.DEVNULL, stderr=err or there)
+        os.close(there)
+        return process, here
+
+    return start
+
+
+def read_until(terminal, words=None):
+    """Return what a terminal shows, up to some words or its end."""
+    seen = b""
+    while words is None or words not in seen:
+        try:
+            part = os.read(terminal, 65536)
+        except OSError:  # the end, as Linux has it
+            part = b""
+        if not part:
+            break
+        seen += part
+    return seen.decode()
+
+
+def test_a_yes_that_was_typed_before_the_question_is_no_answer_to_it(typed_ahead):
+    process, terminal = typed_ahead()
+    assert "limits -2.1 to +0.35 rad" in read_until(terminal, b"[y/N]")
+    os.write(terminal, b"n\n")
+    assert "run one was not confirmed; nothing was moved" in read_until(terminal)
+    assert process.wait() == 2
+
+
+def test_a_question_that_nobody_sees_is_not_asked(typed_ahead, tmp_path):
+    with open(tmp_path / "err", "w") as err:
+        process, _ = typed_ahead(err)
+        assert process.wait() == 2
+    assert "which wants to be confirmed on a terminal; give --yes" in (tmp_path / "err").read_text()
 
 
 WENT_ON = "drive hip (127.0.0.1:1, unit 1): refuses the connection"
