@@ -5,9 +5,10 @@ people's output is silent under ``--json``, and ``emit`` is silent without it.
 """
 
 import json
+import math
 import shlex
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from textwrap import wrap
@@ -93,7 +94,7 @@ class Console:
         if self._gathered is not None:
             self._gathered.append(data)
         elif self.json:
-            print(json.dumps(data, ensure_ascii=False, indent=2, default=_plain), file=sys.stdout)
+            print(json.dumps(_plain(data), ensure_ascii=False, indent=2, allow_nan=False), file=sys.stdout)
 
     @contextmanager
     def gathering(self) -> Iterator[list[Any]]:
@@ -163,7 +164,16 @@ class Console:
 
 
 def _plain(value: Any) -> Any:
-    return value.tolist() if hasattr(value, "tolist") else str(value)
+    """Return what JSON has words for; it has none for NaN and infinity, so that a number that is none is null."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(below) for key, below in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(below) for below in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    if value is None or isinstance(value, str | int):
+        return value
+    return _plain(value.tolist()) if hasattr(value, "tolist") else str(value)
 
 
 console = Console()

@@ -56,8 +56,9 @@ def test_filter_then_identify_as_a_user_would(exoid, recordings, tmp_path):
 def test_recordings_need_no_filter_command_and_no_settings(exoid, recordings, tmp_path):
     outcome = exoid("identify", *sorted(recordings.iterdir()), "-o", tmp_path, "--json")
     assert outcome.code == 0, outcome.err
-    said = json.loads(outcome.out)
+    said = json.loads(outcome.out, parse_constant=pytest.fail)  # NaN is no JSON, though Python reads it
     assert {"hip", "knee"} == set(said["validation"]["all"])
+    assert {row["joint"] for row in said["parameters"]} == {"hip", "knee", None}
 
 
 @pytest.mark.parametrize("method", ["iteratively_reweighted", "instrumental_variables", "realizable"])
