@@ -3,6 +3,7 @@
 import ast
 import operator
 import re
+import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -15,6 +16,9 @@ OPERATORS: dict[type, Callable] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
     ast.UAdd: operator.pos, ast.USub: operator.neg,
 }  # fmt: skip
+MOST_OPERATIONS = 100
+"""In one expression; what machines write by the thousand, nobody could check."""
+LARGEST = sys.float_info.max
 QUOTED = re.compile(r"`([^`]*)`")
 
 
@@ -26,8 +30,8 @@ class Expression:
         self._quoted: list[str] = []
         try:
             self._tree = ast.parse(QUOTED.sub(self._placeholder, text).strip(), mode="eval").body
-        except SyntaxError as error:
-            raise SettingsError(f"{where}: found {text!r}, {_EXPECTED}") from error
+        except (SyntaxError, ValueError, RecursionError, MemoryError) as error:  # the parser's, by what it is fed
+            raise self._refusal() from error
         self._refuse_what_is_more(self._tree)
 
     @property
@@ -62,10 +66,22 @@ class Expression:
 
     def _refuse_what_is_more(self, tree: ast.expr) -> None:
         for node in ast.walk(tree):
-            number = isinstance(node, ast.Constant) and type(node.value) in (int, float)
+            number = isinstance(node, ast.Constant) and _is_number(node.value)
             known = isinstance(node, ast.BinOp | ast.UnaryOp | ast.Name | ast.Load) or type(node) in OPERATORS
             if not (number or known) or (hasattr(node, "op") and type(node.op) not in OPERATORS):
-                raise SettingsError(f"{self._where}: found {self._text!r}, {_EXPECTED}")
+                raise self._refusal()
+        if sum(hasattr(node, "op") for node in ast.walk(tree)) > MOST_OPERATIONS:
+            raise self._refusal(f", at most {MOST_OPERATIONS} of them; write what they make into a column of its own")
+        if not self.names:
+            raise self._refusal(", one column at least")
+
+    def _refusal(self, more: str = "") -> SettingsError:
+        text = self._text if len(self._text) <= 60 else f"{self._text[:57]}..."
+        return SettingsError(f"{self._where}: found {text!r}, {_EXPECTED}{more}")
 
 
 _EXPECTED = "expected numbers and columns with + - * / ( ), names with blanks or signs in `backquotes`"
+
+
+def _is_number(value: Any) -> bool:
+    return type(value) in (int, float) and value <= LARGEST

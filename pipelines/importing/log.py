@@ -67,6 +67,10 @@ class Log:
                     f"its own, name that in the map: {channel.where}.time"
                 )
             picked[name] = values if len(values) == 1 else values[run.rows]
+        if all(len(self.columns[name]) == 1 for name in names):
+            raise InputError(
+                f"{channel.where}: {', '.join(names)} have one row each, expected one column with a row of each stamp"
+            )
         return quantity(channel.reading, channel.gain, picked, channel.target, findings)
 
     def _interpolated(self, channel: Channel, run: Run, findings: list[Finding]) -> NDArray:

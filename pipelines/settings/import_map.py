@@ -23,7 +23,7 @@ Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 class SourceSettings(Settings):
     """How the log is to be read; what is left out is found by looking at the file."""
 
-    delimiter: str | None = Field(None, min_length=1, description="What stands between the fields of a text file.")
+    delimiter: str | None = Field(None, description="The one character between the fields of a text file.")
     decimal: Literal[".", ","] | None = Field(None, description="Decimal point of a text file.")
     comment: str | None = Field(None, min_length=1, max_length=1, description="What a line to be skipped starts with.")
     skip_rows: int | None = Field(None, ge=0, description="Lines of a text file before its header.")
@@ -32,6 +32,16 @@ class SourceSettings(Settings):
     table: str | None = Field(
         None, description="Where in the file the columns are: a key (JSON), group (HDF5), struct (.mat) or topic (ROS)."
     )
+
+    @field_validator("delimiter")
+    @classmethod
+    def _is_one_character(cls, delimiter: str | None) -> str | None:
+        if delimiter is not None and (len(delimiter) != 1 or delimiter in '"\r\n\0'):
+            raise ValueError(
+                f'found {delimiter!r}, expected one character, such as "," or ";" or "\\t" for tabs; " " stands for '
+                "any number of blanks and tabs"
+            )
+        return delimiter
 
 
 class TimeSettings(Settings):

@@ -5,6 +5,8 @@ import subprocess
 import sys
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from pipelines.contracts import RECORDING
@@ -75,6 +77,59 @@ def test_a_file_that_is_no_log_is_refused(imported, tmp_path, content, line):
 def test_a_file_that_is_not_there_is_refused(imported, tmp_path):
     assert imported(tmp_path / "log.csv").err.endswith("log.csv: no such file; check the name\n")
     assert "is a folder, expected a log or the folder of a ROS 2 bag" in imported(tmp_path).err
+
+
+SLIPS = [
+    *(("[time]", f"[source]\ndelimiter = {d}\n[time]", "source.delimiter: found", "expected one character, such as")
+      for d in ('"::"', '", "', '"tab"', "'\\s+'", '""')),
+    ('column = "torque"', 'expression = "5.0"', "torque.expression: found '5.0', expected", "one column at least"),
+    ('column = "torque"', f'expression = "torque * {"9" * 500}"', "torque.expression: found 'torque * 999", "expected"),
+    ('column = "torque"', 'expression = "1e999 * torque"', "torque.expression: found '1e999 * torque', expected"),
+    ('column = "torque"', f'expression = "torque{" + torque" * 5000}"', "expression: found 'torque + ", "expected"),
+    ('column = "torque"', f'expression = "{"-" * 300}torque"', "at most 100 of them; write what they make"),
+    ('column = "torque"', f'expression = "{"(" * 500}torque{")" * 500}"', "torque.expression: found '((((", "expected"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("right", "wrong", "parts"), [(a, b, c) for a, b, *c in SLIPS], ids=range(len(SLIPS)))
+def test_a_slip_in_a_map_is_the_users_to_mend(imported, pendulum, write_csv, right, wrong, parts):
+    outcome = imported(write_csv(pendulum.columns()), map_text=MAP.replace(right, wrong, 1))
+    assert (outcome.code, len(outcome.err.splitlines())) == (2, 1), outcome.err
+    assert all(part in outcome.err for part in parts), outcome.err
+
+
+def test_a_parquet_file_with_a_column_twice_or_damaged_pages_is_named(imported, pendulum, tmp_path):
+    columns = pendulum.columns()
+    twice = pa.Table.from_arrays([*columns.values(), columns["angle"]], [*columns, "angle"])
+    pq.write_table(twice, tmp_path / "twice.parquet")
+    outcome = imported(tmp_path / "twice.parquet")
+    assert (outcome.code, "twice.parquet: has two columns 'angle'" in outcome.err) == (2, True), outcome.err
+    path = tmp_path / "damaged.parquet"
+    pq.write_table(pa.table(columns), path, compression="snappy", use_dictionary=False)
+    damaged = bytearray(path.read_bytes())
+    damaged[100:9000] = b"\xff" * 8900
+    path.write_bytes(damaged)
+    outcome = imported(path)
+    assert (outcome.code, "damaged.parquet: is a damaged or truncated Parquet file" in outcome.err) == (2, True), (
+        outcome.err
+    )
+
+
+def test_a_data_set_is_no_group_and_an_empty_one_no_column(imported, pendulum, tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        for name, values in pendulum.columns().items():
+            file[name] = values
+        file["empty"] = np.empty((0, 3))
+    assert imported(tmp_path / "log.h5").code == 0
+    outcome = imported(tmp_path / "log.h5", map_text=f'[source]\ntable = "angle"\n{MAP}')
+    assert (outcome.code, "names 'angle', which is a data set, expected the group" in outcome.err) == (2, True)
+
+
+def test_json_that_is_nested_without_end_is_refused(imported, tmp_path):
+    (tmp_path / "log.json").write_text('{"a":' * 5000 + "1" + "}" * 5000)
+    outcome = imported(tmp_path / "log.json")
+    assert (outcome.code, "log.json: nests lists or tables deeper than any log does" in outcome.err) == (2, True)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")

@@ -1,6 +1,7 @@
 """Columns with plain names out of whatever is nested: ``hip.position``, ``q[0]``."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -63,6 +64,6 @@ def _numbered(array: np.ndarray, name: str) -> Iterator[tuple[str, np.ndarray]]:
     if max(array.shape) == array.size:
         yield name, array.reshape(-1)
         return
-    flat = array.reshape(len(array), -1)
+    flat = array.reshape(len(array), prod(array.shape[1:]))
     for k in range(flat.shape[1]):
         yield f"{name}[{k}]", flat[:, k]

@@ -47,6 +47,11 @@ def _group(file: Any, table: str | None) -> Any:
         return file
     if table not in file:
         raise InputError(f"has no group {table!r}, which source.table names; it has {', '.join(file)}")
+    if not hasattr(file[table], "visititems"):
+        raise InputError(
+            f"source.table names {table!r}, which is a data set, expected the group that holds it; leave source.table "
+            "out and name the data set as a column"
+        )
     return file[table]
 
 

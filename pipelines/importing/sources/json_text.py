@@ -13,8 +13,17 @@ from pipelines.validation import suggestion
 
 
 def open_json(path: Path, settings: SourceSettings) -> Source:
-    """Return the log in a JSON file."""
-    columns = _flattened(_content(path), settings.table)
+    """Return the log in a JSON file.
+
+    Raises
+    ------
+    InputError
+        Where it is no JSON, or nested too deep to be a log.
+    """
+    try:
+        columns = _flattened(_content(path), settings.table)
+    except RecursionError as error:
+        raise InputError("nests lists or tables deeper than any log does; write it again, flatter") from error
     notes = (f"records under {settings.table}",) if settings.table else ()
     return Source(path, "JSON", tuple(columns), lambda names: {name: columns[name] for name in names}, notes)
 

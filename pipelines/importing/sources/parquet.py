@@ -1,6 +1,8 @@
 """Logs in Parquet."""
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import pyarrow as pa
@@ -14,26 +16,54 @@ from pipelines.settings.import_map import SourceSettings
 
 
 def open_parquet(path: Path, settings: SourceSettings) -> Source:
-    """Return the log in a Parquet file; columns of a struct have dotted names, those of a list numbered ones."""
-    empty = _unnested(_opened(path).schema_arrow.empty_table())
+    """Return the log in a Parquet file; columns of a struct have dotted names, those of a list numbered ones.
+
+    Raises
+    ------
+    InputError
+        Where the file is damaged, or two of its columns have one name.
+    """
+    schema = _opened(path).schema_arrow
+    _refuse_twins(schema.names)
+    empty = _unnested(schema.empty_table())
+    _refuse_twins(empty.column_names)
     if any(pa.types.is_nested(field.type) for field in empty.schema):
-        columns = flattened(_opened(path).read().to_pydict())
+        with _damage_told():
+            columns = flattened(_opened(path).read().to_pydict())
         return Source(path, "Parquet", tuple(columns), lambda names: {name: columns[name] for name in names})
 
     def load(names: Sequence[str]) -> Columns:
         file = _opened(path)
         tops = [top for top in file.schema_arrow.names if any(f"{name}.".startswith(f"{top}.") for name in names)]
-        table = _unnested(file.read(columns=tops))
+        with _damage_told():
+            table = _unnested(file.read(columns=tops))
         return {name: _numpy(table.column(name)) for name in names}
 
     return Source(path, "Parquet", tuple(empty.column_names), load)
 
 
 def _opened(path: Path) -> pq.ParquetFile:
-    try:
+    with _damage_told():
         return pq.ParquetFile(path)
-    except pa.ArrowException as error:
+
+
+@contextmanager
+def _damage_told() -> Iterator[None]:
+    """Say of whatever a damaged file makes the library say that the file is damaged."""
+    try:
+        yield
+    except (pa.ArrowException, OSError) as error:
+        if isinstance(error, OSError) and error.errno is not None:
+            raise  # the system's word: no permission, no such file
         raise InputError(f"is a damaged or truncated Parquet file ({error}); copy it again") from error
+
+
+def _refuse_twins(names: Sequence[str]) -> None:
+    twins = [name for name, times in Counter(names).items() if times > 1]
+    if twins:
+        raise InputError(
+            f"has two columns {twins[0]!r}, and nobody knows which is meant; rename one and write it again"
+        )
 
 
 def _unnested(table: pa.Table) -> pa.Table:
