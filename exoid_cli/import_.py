@@ -58,50 +58,53 @@ def _propose(files: list[Path], place: Path | None) -> None:
 
 
 def _import(files: list[Path], map_: Path, output: Path) -> None:
-    from pipelines.contracts.atomic import open_folder
-    from pipelines.importing.recordings import recordings
+    from pipelines.contracts.atomic import all_or_none, open_folder
+    from pipelines.importing.recordings import recordings, refuse_to_overwrite
     from pipelines.settings.import_map import load_map
 
     settings = load_map(map_)
     open_folder(output)
-    written: dict[Path, Path] = {}
+    sources: dict[Path, Path] = {}
     told: list[dict[str, Any]] = []
-    for file in files:
-        made = []
-        with console.working(f"reading {file.name}"):
-            found = list(recordings(file, settings, map_))  # all are right before the first is written
-        for recording in found:
-            path = output / f"{recording.name}.parquet"
-            if path in written:
-                raise InputError(
-                    f"{file}: its recording {path} would replace that of {written[path]}; "
-                    "give [[recording]] in the map names that differ, with {file} in them"
-                )
-            made.append((recording.write(output), recording))
-            written[path] = file
-        _say(file, made)
-        told.append(_as_json(file, made))
+    with all_or_none(output) as folder:
+        for file in files:
+            made: list[dict[str, Any]] = []
+            with console.working(f"reading {file.name}"):
+                for recording in recordings(file, settings, map_):
+                    path = output / recording.file
+                    if path in sources:
+                        raise InputError(
+                            f"{file}: its recording {path} would replace that of {sources[path]}; "
+                            "give [[recording]] in the map names that differ, with {file} in them"
+                        )
+                    refuse_to_overwrite(path)
+                    recording.write(folder)
+                    sources[path] = file
+                    made.append(_as_json(path, recording))
+            told.append({"file": file, "recordings": made})
+    for one in told:
+        _say(one)
     console.emit(told)
 
 
-def _say(file: Path, made: list[tuple[Path, "Imported"]]) -> None:
-    for path, recording in made:
-        count = len(recording)
-        time, purpose = recording.columns["time_s"], recording.metadata["purpose"]
-        span = f"{time[0]:.3f} to {time[-1]:.3f} s of {file.name}"
-        console.say(f"{path}: {purpose}, {count} samples, {recording.sampling.rate_hz:.6g} Hz")
-        console.note(span)
-    for finding in dict.fromkeys(finding for _, recording in made for finding in recording.findings):
+def _say(told: dict[str, Any]) -> None:
+    from pipelines.importing.finding import Finding
+
+    for made in told["recordings"]:
+        console.say(f"{made['path']}: {made['purpose']}, {made['samples']} samples, {made['sample_rate_hz']:.6g} Hz")
+        console.note(f"{made['span_s'][0]:.3f} to {made['span_s'][1]:.3f} s of {told['file'].name}")
+    for finding in dict.fromkeys(Finding(**found) for made in told["recordings"] for found in made["findings"]):
         console.note(f"- {finding}")
 
 
-def _as_json(file: Path, made: list[tuple[Path, "Imported"]]) -> dict[str, Any]:
+def _as_json(path: Path, recording: "Imported") -> dict[str, Any]:
+    time = recording.columns["time_s"]
     return {
-        "file": file,
-        "recordings": [
-            {"path": path, "samples": len(recording), "sample_rate_hz": recording.sampling.rate_hz,
-             "purpose": recording.metadata["purpose"], "gaps": recording.metadata["gaps"],
-             "findings": recording.metadata["imported"]["findings"]}
-            for path, recording in made
-        ],
-    }  # fmt: skip
+        "path": path,
+        "samples": len(recording),
+        "sample_rate_hz": recording.sampling.rate_hz,
+        "purpose": recording.metadata["purpose"],
+        "span_s": [float(time[0]), float(time[-1])],
+        "gaps": recording.metadata["gaps"],
+        "findings": recording.metadata["imported"]["findings"],
+    }

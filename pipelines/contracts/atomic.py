@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from pipelines.errors import InputError
+from pipelines.errors import ExoidError, InputError
 
 
 @contextmanager
@@ -40,6 +40,24 @@ def refuse_what_is_no_file(path: Path) -> None:
     if path.exists() and not path.is_file():
         kind = "a folder" if path.is_dir() else "a pipe or a device"
         raise InputError(f"{path}: is {kind}, expected the name of a file to write; name another")
+
+
+@contextmanager
+def all_or_none(folder: Path) -> Iterator[Path]:
+    """Yield a temporary folder within ``folder``; the files written there move up once the block ends well.
+
+    On any failure, Ctrl-C included, they go and ``folder`` stays as it was.
+    """
+    with tempfile.TemporaryDirectory(prefix=".", suffix=".tmp", dir=folder) as temporary:
+        try:
+            yield Path(temporary)
+        except ExoidError as error:  # of a file by a name that nobody knows
+            raise type(error)(str(error).replace(temporary, str(folder))) from error
+        made = {file: Path(os.path.realpath(folder / file.name)) for file in sorted(Path(temporary).iterdir())}
+        for path in made.values():
+            refuse_what_is_no_file(path)
+        for file, path in made.items():
+            os.replace(file, path)
 
 
 def open_folder(path: Path) -> None:

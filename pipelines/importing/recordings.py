@@ -41,12 +41,14 @@ class Imported:
         for first in range(0, len(self), parquet.ROWS):
             yield pa.table({name: values[first : first + parquet.ROWS] for name, values in self.columns.items()})
 
-    def write(self, folder: Path) -> Path:
-        """Write the recording into a folder; one that was not imported is never overwritten."""
-        path = folder / f"{self.name}.parquet"
-        _refuse_to_overwrite_what_was_measured(path)
-        RECORDING.write_pieces(path, self.pieces(), self.metadata)
-        return path
+    def write(self, folder: Path) -> None:
+        """Write the recording into a folder."""
+        RECORDING.write_pieces(folder / self.file, self.pieces(), self.metadata)
+
+    @property
+    def file(self) -> str:
+        """Name of its file."""
+        return f"{self.name}.parquet"
 
 
 def recordings(path: Path, settings: ImportMap, map_path: Path) -> Iterator[Imported]:
@@ -211,12 +213,14 @@ def _metadata(settings: ImportMap, recording: RecordingSettings, sampling: Sampl
     } | {key: value for key, value in known.items() if value is not None}
 
 
-def _refuse_to_overwrite_what_was_measured(path: Path) -> None:
+def refuse_to_overwrite(path: Path) -> None:
+    """Refuse to put a recording where something else stands: another file, or a recording that was not imported."""
+    RECORDING.refuse_place(path)
     if not path.is_file():
         return
     try:
         _, metadata = parquet.header(path)
     except ContractError:
-        return  # what it is instead, writing it will tell
+        return
     if metadata["contract"] == RECORDING.label and "imported" not in metadata:
         raise ContractError(f"{path}: holds a recording that was not imported, not overwritten; choose another folder")

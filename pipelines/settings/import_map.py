@@ -1,5 +1,6 @@
 """A map: what the columns of a log from elsewhere are, so that ``exoid import`` can make recordings of it."""
 
+import re
 from collections import Counter
 from collections.abc import Iterator
 from fnmatch import fnmatch
@@ -198,6 +199,16 @@ class RecordingSettings(Settings):
     period_s: float | None = Field(None, gt=0.0, description="Period of the excitation, where it repeats.")
     subject: str | None = Field(None, description="Who was in the machine.")
     session: str | None = Field(None, description="Of which session it is.")
+
+    @field_validator("name")
+    @classmethod
+    def _is_a_files_name(cls, name: str) -> str:
+        if re.fullmatch(r"""[^\x00-\x1f/\\:*?"<>|]+""", name) is None:
+            raise ValueError(
+                f"found {name!r}, expected a file's name without its folder, and without control characters and "
+                '/ \\ : * ? " < > |; -o names the folder'
+            )
+        return name
 
     @model_validator(mode="after")
     def _is_one_span(self) -> Self:

@@ -1,5 +1,6 @@
 """A guess is right where it is sure, says where it is not, and runs as it is."""
 
+import json
 import re
 import tomllib
 
@@ -18,10 +19,9 @@ def guessed(tmp_path, capsys):
 
     def call(*files):
         path = tmp_path / "guess.toml"
-        assert run(["import", *map(str, files), "--guess", "--map", str(path)]) == 0, capsys.readouterr().err
-        told = capsys.readouterr().out
-        doubts = dict(re.findall(r"^  (?:unsure|fill in): (\S+): (.*)$", told, flags=re.MULTILINE))
-        return path.read_text(encoding="utf-8"), doubts
+        assert run(["import", *map(str, files), "--guess", "--map", str(path), "--json"]) == 0, capsys.readouterr().err
+        told = json.loads(capsys.readouterr().out)
+        return path.read_text(encoding="utf-8"), {doubt["key"]: doubt["why"] for doubt in told["doubts"]}
 
     return call
 

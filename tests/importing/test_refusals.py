@@ -33,6 +33,8 @@ BAD_MAPS = [
     ('purpose = "train"', 'purpose = "train"\nfiles = "x*"', "no [[recording]] is of log.csv, only of x*; add one"),
     ('unit = "s"', 'unit = "s"\nrate_hz = 5.0', "expected either column or rate_hz"),
     ('unit = "N·m"', 'unit = "N·m", range = [90, 100]', "pivot_torque_nm has no value in any row"),
+    *(('name = "whole"', f'name = "{name}"', "recording[0].name: found", "expected a file's name without its folder")
+      for name in ("", "../../evil", "/tmp/evil", "a\\u0000b", "c:evil")),
     ('name = "pivot"', 'name = "Pivot 1"', "joint[0].name: found 'Pivot 1', expected text matching"),
 ]  # fmt: skip
 
@@ -175,6 +177,19 @@ def test_two_files_do_not_become_one_recording(imported, pendulum, write_csv):
     outcome = imported(*files)
     assert outcome.code == 2
     assert "whole.parquet would replace that of" in outcome.err
+    assert list(outcome.folder.iterdir()) == []
+
+
+def test_a_file_that_is_refused_takes_those_before_it_along(imported, pendulum, write_csv, tmp_path):
+    """Of what was there before nothing changes, and nothing new is half there."""
+    text = MAP.replace('"whole"', '"{file}"')
+    good, bad = write_csv(pendulum.columns(), name="good.csv"), tmp_path / "bad.csv"
+    bad.write_text("dear diary")
+    outcome = imported(good, bad, map_text=text)
+    assert (outcome.code, outcome.out, list(outcome.folder.iterdir())) == (2, "", [])
+    other = write_csv(pendulum.columns(), name="other.csv")
+    outcome = imported(good, other, map_text=text)
+    assert sorted(path.name for path in outcome.folder.iterdir()) == ["good.parquet", "other.parquet"]
 
 
 def test_the_map_page_is_up_to_date(request):
