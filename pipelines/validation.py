@@ -27,11 +27,23 @@ def explain(error: ValidationError, data: Any, known_keys: Callable[[str], list[
     """
     faults: dict[str, list[dict[str, Any]]] = {}
     # A misspelt key comes first: the missing key it leaves behind is only its consequence.
-    for fault in sorted(error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden"):
+    for fault in sorted(_own(error), key=lambda fault: fault["type"] != "extra_forbidden"):
         faults.setdefault(_key_path(fault, data), []).append(dict(fault))
     path, about = next(iter(faults.items()))
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     return _sentence(path, about, known_keys) + more
+
+
+def _own(error: ValidationError) -> list[Any]:
+    """Return the faults without those that are others' shadows: a list lacks the tables that have a fault."""
+    found = error.errors(include_url=False)
+    at = [fault["loc"] for fault in found]
+    return [
+        fault
+        for fault in found
+        if fault["type"] != "too_short"
+        or not any(loc[: len(fault["loc"])] == fault["loc"] and len(loc) > len(fault["loc"]) for loc in at)
+    ]
 
 
 def suggestion(word: str, known: list[str]) -> str:

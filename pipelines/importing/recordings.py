@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from pipelines.contracts import RECORDING, describe, parquet
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
+from pipelines.contracts.provenance import sha256
 from pipelines.errors import ContractError, InputError, SettingsError, about
 from pipelines.importing.clock import Run, Sampling
 from pipelines.importing.finding import Finding, counted
@@ -106,13 +108,17 @@ def _recordings_of(
     columns = {"time_s": time} | {name: values[whole] for name, values in columns.items()}
     _refuse_absurd_angles(columns, settings)
     findings += look_at(columns, settings)
-    for recording in wanted:
-        rows = _span(time, float(run.time_s[-1]), recording)
+    spans = [_span(time, float(run.time_s[-1]), recording) for recording in wanted]
+    _refuse_overlap(time, wanted, spans)
+    for recording, rows in zip(wanted, spans, strict=True):
         own = {name: values[rows] for name, values in columns.items()}
         begin, end = np.searchsorted(run.time_s, own["time_s"][[0, -1]])
         cut = Sampling.of(run.time_s[begin : end + 1], own["time_s"])
         metadata = _metadata(settings, recording, cut) | provenance
-        metadata["imported"] = _account(path, log, run, sampling, findings)
+        in_source = run.rows[whole][rows]
+        metadata["imported"] = _account(path, log, run, sampling, findings) | {
+            "rows": [int(in_source[0]), int(in_source[-1])]
+        }
         name = recording.name.replace("{file}", path.stem).replace("{purpose}", recording.purpose) + suffix
         yield Imported(name, own, metadata, cut, tuple(findings))
 
@@ -121,6 +127,7 @@ def _account(path: Path, log: Log, run: Run, sampling: Sampling, findings: Seque
     """Return what the recording tells of how it was made."""
     return {
         "source": path.name,
+        "sha256": [sha256(file) for file in _files(path)],
         "format": log.source.format,
         "notes": list(log.source.notes),
         "rows_in_source": log.rows,
@@ -197,6 +204,18 @@ def _span(time: NDArray, duration_s: float, recording: RecordingSettings) -> sli
             f"expected at least {FEWEST}; correct its span in the map"
         )
     return slice(int(first), int(last))
+
+
+def _refuse_overlap(time: NDArray, wanted: Sequence[RecordingSettings], spans: Sequence[slice]) -> None:
+    """Refuse to judge a fit on samples that it was made from."""
+    for (one, first), (other, second) in combinations(zip(wanted, spans, strict=True), 2):
+        both = slice(max(first.start, second.start), min(first.stop, second.stop))
+        if one.purpose != other.purpose and both.start < both.stop:
+            begin, end = time[both][[0, -1]]
+            raise SettingsError(
+                f"{begin:.6g} to {end:.6g} s would be to train and to validate, expected no sample in both: a fit is "
+                "judged on data that it has not seen; correct the spans of [[recording]] in the map"
+            )
 
 
 def _metadata(settings: ImportMap, recording: RecordingSettings, sampling: Sampling) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from pipelines.mechanics.kinematics import filtered, motion_table
 from pipelines.mechanics.motion import Motion, motion_from_table
 from pipelines.mechanics.run import Run, StoredRun
 from pipelines.mechanics.scale import on_one_scale
+from pipelines.mechanics.unseen import refuse_seen
 from pipelines.settings.filter import FilterSettings
 from pipelines.settings.mechanism import MechanismSettings
 
@@ -48,13 +49,15 @@ def read_motion(path: Path, settings: FilterSettings | None = None, default_geom
 def read_motions(
     paths: Sequence[Path], settings: FilterSettings | None = None, default_geometry: Geometry | None = None
 ) -> list[Motion]:
-    """Return the motions in several files; the same data twice is refused, whatever the names.
+    """Return the motions in several files; the same data twice is refused, whatever the names, and so are data
+    of one log that would both train and validate.
 
     Files of one name in several folders are told apart by their paths.
     """
     _refuse_twins(paths)
     motions = [read_motion(path, settings, default_geometry) for path in paths]
     named = [replace(motion, file=name) for motion, name in zip(motions, _told_apart(paths), strict=True)]
+    refuse_seen(named)
     return on_one_scale(named)
 
 
@@ -65,6 +68,7 @@ def read_runs(paths: Sequence[Path], settings: FilterSettings, default_geometry:
         StoredRun(_motion_rows(path, settings), default_geometry, name)
         for path, name in zip(paths, _told_apart(paths), strict=True)
     ]
+    refuse_seen(runs)
     return on_one_scale(runs)
 
 

@@ -47,6 +47,7 @@ def test_a_wrong_map_is_refused_with_its_key(imported, pendulum, write_csv, righ
     for part in line.split(" ... "):
         assert part in outcome.err
     assert list(outcome.folder.glob("*")) == []
+    assert "more)" not in outcome.err  # one slip is one fault
 
 
 @pytest.mark.parametrize(
@@ -190,6 +191,21 @@ def test_a_file_that_is_refused_takes_those_before_it_along(imported, pendulum, 
     other = write_csv(pendulum.columns(), name="other.csv")
     outcome = imported(good, other, map_text=text)
     assert sorted(path.name for path in outcome.folder.iterdir()) == ["good.parquet", "other.parquet"]
+
+
+def test_what_trains_does_not_validate(exoid, imported, pendulum, write_csv, tmp_path):
+    """Neither by one map, nor by two maps of the same log."""
+    path = write_csv(pendulum.columns())
+    validate = '[[recording]]\nname = "judge"\npurpose = "validate"\n'
+    outcome = imported(path, map_text=f"{MAP}span = [0.0, 0.6]\n{validate}span_s = [5.0, 10.0]\n")
+    assert (outcome.code, list(outcome.folder.iterdir())) == (2, [])
+    assert "log.csv: 5 to 5.995 s would be to train and to validate, expected no sample in both" in outcome.err
+    assert imported(path, map_text=f"{MAP}span = [0.0, 0.6]\n{validate}span = [0.6, 1.0]\n").code == 0
+    again = imported(path, map_text=MAP)
+    files = [again.folder / name for name in ("whole.parquet", "judge.parquet")]
+    outcome = exoid("identify", *files, "-o", tmp_path / "identified")
+    assert outcome.code == 2
+    assert "have 800 rows of log.csv in common, expected none: a model is judged on data that no fit" in outcome.err
 
 
 def test_the_map_page_is_up_to_date(request):
