@@ -62,6 +62,7 @@ def export(
             "to": to,
             "run": made.run,
             "files": [str(file) for file in files],
+            "warnings": made.driving(),
             "terms": [
                 {
                     "term": term.effect.label,
@@ -79,6 +80,8 @@ def export(
     console.table(
         ("term", "held", "how"), [(term.effect.label, holding.degree, holding.how) for term, holding in holdings]
     )
+    for sentence in made.driving():
+        console.warn(sentence)
     for term, holding in holdings:
         if holding.degree == "left out":
             console.warn(f"{term.effect.label} is not in the file ({holding.how}): {values_in_words(term)}")

@@ -65,8 +65,15 @@ def bodies(exported: Exported) -> tuple[Body, ...]:
     Raises
     ------
     InputError
-        Where no bodies have such X: the mass matrix is then positive definite by a rotor's inertia alone.
+        Where no bodies have such X: the mass matrix is then positive definite by a rotor's inertia alone. And where it
+        is not known how a mechanism's bodies are chosen.
     """
+    mechanism = exported.machine.mechanism
+    if mechanism not in MADE:
+        raise InputError(
+            f"{mechanism.name}: {mechanism.title} has no bodies that exoid could choose masses for, only "
+            f"{', '.join(sorted(known.title for known in MADE))}; export to c, matlab or json, which need no bodies"
+        )
     return MADE[exported.machine.mechanism](exported)
 
 

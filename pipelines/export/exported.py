@@ -13,6 +13,7 @@ from pipelines.contracts.table import Table
 from pipelines.dynamics.assembly import cuffed
 from pipelines.dynamics.plant import make_plant
 from pipelines.effects import Side
+from pipelines.effects.friction import Friction
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError, about
 from pipelines.export.format import Format, Holding, left_out
@@ -65,6 +66,17 @@ class Exported:
         """Return what becomes of each term of the file, none passed over."""
         return [(term, format.holding(term)) for term in self.terms] + list(self.absent)
 
+    def driving(self) -> list[str]:
+        """Return which friction would drive its joint, which a simulation or a controller must not be given unseen."""
+        return [
+            f"{term.effect.label}: {p.name} = {value:.3g} {p.unit} is negative: it drives the joint, and a simulation "
+            "of it may run away; identify again, or set it to 0"
+            for term in self.terms
+            if isinstance(term.effect, Friction)
+            for p, value in zip(term.effect.parameters, term.values, strict=True)
+            if value < 0.0
+        ]
+
     def shift(self, side: Side | None = None) -> NDArray:
         """Return by how much the encoders' angles are more than the links' own, (J,) rad, at a prismatic joint m.
 
@@ -80,6 +92,7 @@ class Exported:
             yield f"from {self.table.path.name} (SHA-256 {sha256(self.table.path)[:16]}), run {self.run}"
         yield "SI units; angles as the encoders give them, torques as the drives deliver them"
         yield ""
+        yield from (f"WARNING: {sentence}" for sentence in self.driving())
         for term, holding in self.holdings(format):
             yield f"{term.effect.label}: {holding.degree} ({holding.how})"
             if holding.degree != "exactly":

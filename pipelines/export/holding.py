@@ -3,8 +3,24 @@
 from collections.abc import Callable, Mapping
 
 from pipelines.export.exported import shift_of
-from pipelines.export.format import Holding, exact, left_out
+from pipelines.export.format import Holding, approximate, exact, left_out
 from pipelines.model import Term
+
+
+def sound_friction(term: Term) -> tuple[float, float]:
+    """Return Coulomb and viscous friction of a term, 0 in place of a negative one: simulators refuse what drives."""
+    coulomb, viscous = (max(float(value), 0.0) for value in term.values)
+    return coulomb, viscous
+
+
+def held_friction(term: Term, whole: Holding) -> Holding:
+    """Return ``whole`` where both halves of a friction can be held, else which of them is not."""
+    negative = [p.name for p, value in zip(term.effect.parameters, term.values, strict=True) if value < 0.0]
+    if not negative:
+        return whole
+    why = f"its {' and '.join(negative)} friction is negative, which would drive the joint"
+    return left_out(why) if len(negative) == 2 else approximate(f"its other half alone: {why}")
+
 
 Held = Mapping[str, Callable[[Term], Holding]]
 """What becomes of a term, by its effect's name."""

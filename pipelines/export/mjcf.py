@@ -13,8 +13,8 @@ from pipelines.contracts import Joint
 from pipelines.effects.joint_elasticity import DAMPING_RATIO
 from pipelines.export.bodies import Body, bodies
 from pipelines.export.exported import Exported
-from pipelines.export.format import Format, Holding, approximate, exact, left_out
-from pipelines.export.holding import Held, looked_up
+from pipelines.export.format import Format, Holding, approximate, exact
+from pipelines.export.holding import Held, held_friction, looked_up, sound_friction
 from pipelines.export.language import one_line, unique
 from pipelines.export.xml_text import document, number, numbers
 from pipelines.model import Term
@@ -23,10 +23,9 @@ TIMESTEP_S = 0.001
 
 
 def _friction(term: Term) -> Holding:
-    coulomb, viscous = term.values
-    if coulomb < 0.0 or viscous < 0.0:
-        return left_out("its Coulomb or viscous friction is negative, which would drive the joint")
-    return approximate("joint damping and frictionloss: exact while the joint moves, stuck joints creep a little")
+    return held_friction(
+        term, approximate("joint damping and frictionloss: exact while the joint moves, stuck joints creep a little")
+    )
 
 
 def _elasticity(term: Term) -> Holding:
@@ -100,8 +99,8 @@ def _joint(body: Body, exported: Exported) -> dict[str, str]:
     damping = [0.0, 0.0]
     friction, drag = exported.of("friction", name), exported.of("quadratic_drag", name)
     if friction and _friction(friction).degree != "left out":
-        damping[0] = friction.values[1]
-        says["frictionloss"] = number(friction.values[0])
+        coulomb, damping[0] = sound_friction(friction)
+        says["frictionloss"] = number(coulomb)
         # Fast enough to hold within two steps, the fastest that MuJoCo allows.
         says["solreffriction"] = numbers(2.0 * TIMESTEP_S, 1.0)
     if drag:

@@ -12,17 +12,15 @@ import numpy as np
 
 from pipelines.export.bodies import Body, bodies
 from pipelines.export.exported import Exported
-from pipelines.export.format import Format, Holding, exact, left_out
-from pipelines.export.holding import Held, looked_up
+from pipelines.export.format import Format, Holding, exact
+from pipelines.export.holding import Held, held_friction, looked_up, sound_friction
 from pipelines.export.language import one_line, unique
 from pipelines.export.xml_text import document, number, numbers
 from pipelines.model import Term
 
 
 def _friction(term: Term) -> Holding:
-    if min(term.values) < 0.0:
-        return left_out("its Coulomb or viscous friction is negative, which would drive the joint")
-    return exact("dynamics of the joint: damping and friction; not every reader heeds them")
+    return held_friction(term, exact("dynamics of the joint: damping and friction; not every reader heeds them"))
 
 
 HELD: Held = {
@@ -72,8 +70,8 @@ def _joint(root: ET.Element, name: str, parent: str, link: str, body: Body, expo
     ET.SubElement(joint, "axis", xyz=numbers(*body.axis))
     ET.SubElement(joint, "limit", lower=number(-pi), upper=number(pi), effort="1e6", velocity="1e3")
     friction = exported.of("friction", body.joint.name)
-    if friction and _friction(friction).degree == "exactly":
-        coulomb, viscous = friction.values
+    if friction and _friction(friction).degree != "left out":
+        coulomb, viscous = sound_friction(friction)
         ET.SubElement(joint, "dynamics", damping=number(viscous), friction=number(coulomb))
 
 

@@ -52,7 +52,7 @@ class Identified:
     collinear: list[str]
     """What this motion cannot separate, a sentence each."""
     unrealizable: list[str]
-    """Which rigid bodies no real leg could have, a sentence each."""
+    """Which rigid bodies, and which friction, no real leg could have, a sentence each."""
     method: dict[str, Any]
     """How it was found, for the file's metadata."""
     remarks: list[str]
@@ -207,4 +207,10 @@ def _unrealizable(table: pd.DataFrame, runs: Runs) -> list[str]:
     for run in bodies["run"].unique():
         X = bodies.loc[bodies["run"] == run, "value"].to_numpy(float)
         sentences += [f"{run}: {reason}" for reason in mechanism.unrealizable(X, geometry)]
-    return sentences
+    driving = table[(table["effect"] == "friction") & (table["ci95_high"] < 0.0)]
+    return sentences + [
+        f"{row['name']} friction of {row['joint']} is {row['value']:.3g} {row['unit']} ({row['ci95_low']:.3g} to "
+        f"{row['ci95_high']:.3g}) and would drive the joint; look for a wrong sign of its torque or its angle, or for "
+        "what is taken for friction (exoid diagnose)"
+        for row in driving.to_dict("records")
+    ]

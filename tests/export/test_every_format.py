@@ -1,6 +1,7 @@
 """Nothing is dropped silently, and nothing that a file says can break another program's file."""
 
 import re
+from dataclasses import replace
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -124,3 +125,33 @@ def test_a_leg_that_cannot_be_is_refused_with_the_reason():
     body = type(LEG[0])(LEG[0].effect, np.array([1.0, 0.9, 2.0, 5.0]))
     with pytest.raises(InputError, match=r"no real leg: X2 \(X1 - X2\) = 0\.09 is not above"):
         machine(body)
+
+
+@pytest.mark.parametrize("format", FORMATS, ids=lambda format: format.name)
+def test_friction_that_drives_is_warned_of_and_bodies_keep_its_sound_half(format):
+    """A negative half of it is no other program's to run into unseen, and takes no sound half along."""
+    made = machine(
+        LEG[0], replace(LEG[1], values=np.array([2.5, -0.4])), replace(LEG[2], values=np.array([-0.3, -0.1]))
+    )
+    warned = made.driving()
+    assert [sentence.partition(" is negative")[0] for sentence in warned] == [
+        "friction@hip: viscous = -0.4 N·m·s/rad",
+        "friction@knee: coulomb = -0.3 N·m",
+        "friction@knee: viscous = -0.1 N·m·s/rad",
+    ]  # fmt: skip
+    text = "\n".join(format.write(made, "leg").values())
+    assert ("WARNING: friction@hip: viscous = -0.4" in text) == (format is not JSON)
+    degrees = {term.effect.label: holding.degree for term, holding in made.holdings(format)}
+    if format in (MJCF, URDF):
+        assert (degrees["friction@hip"], degrees["friction@knee"]) == (Degree.APPROXIMATE, Degree.NOT)
+        hip = r'frictionloss="2\.5"' if format is MJCF else r'damping="0(\.0)?" friction="2\.5"'
+        assert len(re.findall(hip, text)) == 1
+
+
+@pytest.mark.parametrize("format", [MJCF, URDF], ids=lambda format: format.name)
+def test_a_mechanism_without_known_bodies_is_refused_in_a_line(format):
+    """As of a mechanism that another file brings; equations can be written of it all the same."""
+    known = machine(*LEG)
+    other = replace(known, machine=replace(known.machine, mechanism=replace(known.machine.mechanism, title="a crane")))
+    with pytest.raises(InputError, match=r"a crane has no bodies .* export to c, matlab or json, which need no bodies"):
+        format.write(other, "crane")

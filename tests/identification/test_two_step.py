@@ -161,6 +161,15 @@ def test_unrealizable_results_are_said(noiseless_motions):
     assert any(s.startswith("human: X2") for s in identify(lighter).unrealizable)
 
 
+def test_friction_that_drives_is_said_where_its_whole_interval_is_below_nought(noiseless_motions):
+    """Of the knee's 7.36 N·m·s/rad of viscous friction a drive takes 10 away."""
+    less = np.array([0.0, 10.0])
+    driven = [replace(motion, torque=motion.torque - less * motion.dq) for motion in noiseless_motions]
+    (said,) = identify(driven).unrealizable
+    assert said.startswith("viscous friction of knee is -2.6")
+    assert identify(noiseless_motions).unrealizable == []
+
+
 def test_without_an_empty_run_friction_cannot_be_fitted(noiseless_motions):
     with pytest.raises(InputError, match=r"found no exo_alone run to train on among: with_human_train\.parquet"):
         identify([m for m in noiseless_motions if m.run == "with_human"])
