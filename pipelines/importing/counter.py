@@ -1,9 +1,14 @@
 """Counters: registers logged without their sign, and readings that start anew at 0 when they are full."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.importing.finding import Finding, counted
+
+REGISTERS = tuple(2.0**bits for bits in range(8, 33))
+"""Where counters of whole numbers are full."""
 
 
 def signed(values: NDArray, bits: int, where: str, findings: list[Finding]) -> NDArray:
@@ -38,3 +43,26 @@ def unwrapped(values: NDArray, modulus: float, where: str, findings: list[Findin
     found = values.copy()
     found[known] = values[known] + modulus * np.concatenate([[0.0], np.cumsum(turns)])
     return found
+
+
+def full_at(values: NDArray, turns: Iterable[float]) -> float | None:
+    """Return at which reading a counter (n,) was full that nobody counted on; None where none was.
+
+    It is one of ``turns`` or, of whole numbers, of registers, and with it counted on the steps at which the counter
+    starts anew are as small as all others.
+    """
+    known = values[np.isfinite(values)]
+    steps = np.abs(np.diff(known))
+    far = steps > 0.5 * np.ptp(known) if len(known) else np.zeros(0, dtype=bool)
+    if not far.any() or far.all():
+        return None
+    moved = 1.5 * float(np.max(steps[~far]))
+    whole = bool(np.all(known == np.round(known)))
+    return next(
+        (
+            modulus
+            for modulus in sorted((*turns, *(REGISTERS if whole else ())))
+            if moved < 0.25 * modulus and np.median(np.abs(steps[far] - modulus)) <= moved
+        ),
+        None,
+    )

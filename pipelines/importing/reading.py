@@ -5,12 +5,12 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.importing.counter import signed, unwrapped
+from pipelines.importing.counter import full_at, signed, unwrapped
 from pipelines.importing.expression import Expression
 from pipelines.importing.finding import Finding, counted
 from pipelines.importing.numbers import numbers
 from pipelines.settings.import_map import ReadingSettings
-from pipelines.settings.units import unit_named
+from pipelines.settings.units import Unit, unit_named
 
 
 def columns_of(reading: ReadingSettings, where: str) -> tuple[str, ...]:
@@ -36,7 +36,17 @@ def quantity(
         raw = unwrapped(raw, reading.wraps_at, where, findings)
     unit = unit_named(reading.unit)
     assert unit is not None, "was looked at with the map"
+    if reading.wraps_at is None and (full := full_at(raw, _turns(reading, unit))) is not None:
+        seen = f"steps by {full:.6g} from one row to the next, as a counter does that is full"
+        findings.append(Finding(where, seen, f"kept; set wraps_at = {full:.10g} at it"))
     return reading.sign * gain * (unit.factor * (reading.scale * raw - reading.zero) + unit.offset)
+
+
+def _turns(reading: ReadingSettings, unit: Unit) -> tuple[float, ...]:
+    """Return the raw reading that is a full turn of what an encoder sits on, where the reading is one's."""
+    counts = getattr(reading, "counts_per_turn", None) if unit.dimension == "counts" else None
+    turn = 2.0 * np.pi / unit.factor if unit.dimension == "angle" else counts
+    return () if turn is None else (abs(turn / reading.scale),)
 
 
 def _raw(reading: ReadingSettings, columns: Mapping[str, NDArray], where: str, findings: list[Finding]) -> NDArray:

@@ -232,3 +232,11 @@ def test_joint_states_of_ros_are_guessed_too(imported, guessed, pendulum, bag):
     frame = outcome.recording("bag_train").frame
     assert_allclose(frame["pivot_torque_nm"], pendulum.torque[: len(frame)], atol=1e-12)
     assert_allclose(frame["time_s"], pendulum.time[: len(frame)], atol=1e-9)
+
+
+@pytest.mark.parametrize(("unit", "turn"), [("deg", 360.0), ("rad", 2.0 * np.pi), ("rev", 1.0)])
+def test_a_counter_that_starts_anew_is_counted_on(imported, guessed, pendulum, write_csv, unit, turn):
+    columns = swinging(pendulum)
+    path = write_csv(columns | {"angle": columns["angle"] * turn / (2.0 * np.pi) % turn})
+    found = tomllib.loads(guessed(path)[0])["joint"][0]["angle"]
+    assert (found["unit"], found["wraps_at"]) == (unit, turn)

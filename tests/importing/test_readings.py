@@ -187,3 +187,27 @@ def test_where_one_recording_is_refused_none_is_written(imported, pendulum, writ
     text = MAP + '[[recording]]\nname = "late"\npurpose = "validate"\nspan_s = [50, 60]\n'
     outcome = imported(write_csv(pendulum.columns()), map_text=text)
     assert (outcome.code, list(outcome.folder.glob("*"))) == (2, [])
+
+
+TURNING = [("deg", 360.0, ""), ("rad", 2.0 * np.pi, ""), ("counts", 4096.0, ", counts_per_turn = 4096")]
+
+
+@pytest.mark.parametrize(("unit", "turn", "keys"), TURNING, ids=lambda value: str(value)[:6])
+def test_a_counter_that_starts_anew_is_told_with_what_counts_it_on(imported, pendulum, write_csv, unit, turn, keys):
+    """An encoder whose zero lies within the swing; the joint itself never turned by more than a radian."""
+    logged = pendulum.angle * turn / (2.0 * np.pi) % turn
+    path = write_csv(pendulum.columns() | {"angle": np.floor(logged) if unit == "counts" else logged})
+    text = MAP.replace('column = "angle", unit = "rad"', f'column = "angle", unit = "{unit}"{keys}')
+    outcome = imported(path, map_text=text)
+    assert f"pivot_angle_rad: steps by {turn:.6g} from one row to the next" in outcome.told
+    assert f"kept; set wraps_at = {turn:.10g} at it" in outcome.told
+    outcome = imported(path, map_text=text.replace(f'"{unit}"{keys}', f'"{unit}"{keys}, wraps_at = {turn:.17g}'))
+    assert "kept; set" not in outcome.told
+    assert_allclose(np.ptp(outcome.recording().frame["pivot_angle_rad"]), np.ptp(pendulum.angle), atol=0.002)
+
+
+def test_what_jumps_otherwise_is_no_full_counter(imported, pendulum, write_csv):
+    """Neither a spike, nor steps that a motion asks for, nor one that an encoder lost."""
+    for jump in (np.where(np.arange(2000) == 700, 4.0, 0.0), np.where(np.arange(2000) > 700, 2.5, 0.0)):
+        path = write_csv(pendulum.columns() | {"angle": pendulum.angle + jump})
+        assert "wraps_at" not in imported(path).told

@@ -1,12 +1,13 @@
 """The tables of a joint in a map: its columns, their units, signs and zeros, each with its reason."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.contracts.joints import Kind
-from pipelines.importing.counter import signed
+from pipelines.importing.counter import full_at, signed, unwrapped
 from pipelines.importing.guess.joints import DRIVES, JointColumns
 from pipelines.importing.guess.motion import TURNS, Units, guess_units
 from pipelines.importing.guess.proposal import Proposal
@@ -37,9 +38,15 @@ def write_joint(
         if width is not None:
             logged[quantity] = signed(logged[quantity], width, quantity, [])
     angle, velocity = joint.columns["angle"], joint.columns.get("velocity")
+    full = full_at(logged["angle"], [turn for unit, turn in TURNS.items() if angle.unit in (None, unit)])
+    if full is not None:
+        logged["angle"] = unwrapped(logged["angle"], full, "angle", [])
+    round_in = next((unit for unit, turn in TURNS.items() if turn == full), None)
     units = guess_units(
-        time_s, logged["angle"], angle.unit, logged.get("velocity"), velocity.unit if velocity else None
+        time_s, logged["angle"], angle.unit or round_in, logged.get("velocity"), velocity.unit if velocity else None
     )
+    if round_in and angle.unit is None:
+        units = replace(units, why=f"starts anew after {full:.6g}, a turn")
     kind: Kind = "prismatic" if UNITS[units.angle].dimension == "length" else "revolute"
     proposal.table("[[joint]]", where)
     proposal.key("name", joint.name)
@@ -53,6 +60,8 @@ def write_joint(
         angle_rad = logged["angle"] * UNITS[units.angle].factor
         fit = fit_torque(time_s, angle_rad, logged[drive]) if drive else None
     used = [_write_angle(proposal, where, joint, units, bits["angle"], fit if alone else None)]
+    if full is not None:
+        proposal.key("wraps_at", full, "steps by so much from one row to the next: its counter was full")
     if velocity is not None:
         used.append(_write_velocity(proposal, where, joint, units))
     used.append(_write_torque(proposal, where, joint, kind, bits, fit if alone else None))
