@@ -21,6 +21,9 @@ LEAD_ROWS, LEAD_PERIODS, LEAD_S = 5, 20, 0.2
 REGISTERS = (2.0**16, 2.0**31, 2.0**32)
 """Where counters are full."""
 NEAR = 0.01
+BACKWARDS = 0.9
+SLOWEST_HZ, FASTEST_HZ = 10.0, 1e4
+"""Between these a machine is sampled; three decades, so that of s, ms, us and ns only one fits."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +101,7 @@ def runs(time_s: NDArray, raw: NDArray, findings: list[Finding]) -> list[Run]:
     rows = np.flatnonzero(np.isfinite(time_s))
     if len(rows) < len(time_s):
         findings.append(Finding("time", f"{counted(len(time_s) - len(rows), 'row')} without a stamp", "left out"))
+    _refuse_backwards(time_s[rows])
     rows = _without_strays(rows, time_s, findings)
     begins = _begins(time_s[rows])
     for k in begins[1:]:
@@ -106,6 +110,20 @@ def runs(time_s: NDArray, raw: NDArray, findings: list[Finding]) -> list[Run]:
         findings.append(Finding("time", seen, _if_full(float(raw[rows[k - 1]]), float(raw[rows[k]]))))
     found = [_ordered(part, time_s) for part in np.split(rows, begins[1:])]
     return [run for run in found if len(run) > 1]
+
+
+def runs_backwards(time: NDArray) -> bool:
+    """Tell whether a clock (n,) goes back at nine steps of ten."""
+    steps = np.diff(time)
+    return bool(len(steps)) and bool(np.mean(steps < 0.0) > BACKWARDS)
+
+
+def _refuse_backwards(time: NDArray) -> None:
+    if runs_backwards(time):
+        raise InputError(
+            f"its clock runs backwards, by {time[0] - time[-1]:.6g} s from the first row to the last; turn the order "
+            "of its rows round, or correct time.column in the map"
+        )
 
 
 def _period(time_s: NDArray) -> float:

@@ -14,7 +14,7 @@ from pipelines.contracts import RECORDING, describe, parquet
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
 from pipelines.contracts.provenance import sha256
 from pipelines.errors import ContractError, InputError, SettingsError, about
-from pipelines.importing.clock import Run, Sampling
+from pipelines.importing.clock import FASTEST_HZ, SLOWEST_HZ, Run, Sampling
 from pipelines.importing.finding import Finding, counted
 from pipelines.importing.log import Log, read_log
 from pipelines.importing.plausible import look_at
@@ -162,6 +162,9 @@ def _whole_rows(columns: Mapping[str, NDArray], required: Sequence[str], finding
 
 def _sampling_findings(sampling: Sampling) -> list[Finding]:
     found = []
+    if not SLOWEST_HZ <= sampling.rate_hz <= FASTEST_HZ:
+        seen = f"{sampling.rate_hz:.4g} Hz, where machines are sampled at {SLOWEST_HZ:g} to {FASTEST_HZ:g} Hz"
+        found.append(Finding("time", seen, "kept; check time.unit, s or ms, or time.rate_hz"))
     if sampling.irregular > 0.05:
         shortest, median, longest = (1e3 * step for step in sampling.steps_s)
         seen = (

@@ -180,3 +180,26 @@ def test_a_short_irregular_recording_can_be_filtered(imported, pendulum, write_c
     assert (
         run(["-q", "filter", str(outcome.folder / "whole.parquet"), "-o", str(outcome.folder / "motion.parquet")]) == 0
     )
+
+
+@pytest.mark.parametrize(("factor", "rate"), [(1e3, "0.2"), (1e-3, "2e+05")])
+def test_a_unit_that_makes_no_machines_rate_is_told(imported, pendulum, write_csv, factor, rate):
+    """Milliseconds taken for seconds, and seconds for milliseconds: imported as the map says, and told."""
+    outcome = imported(write_csv(pendulum.columns() | {"time": factor * pendulum.time}))
+    assert outcome.code == 0
+    assert f"time: {rate} Hz, where machines are sampled at 10 to 10000 Hz; kept; check time.unit" in outcome.told
+    assert "check time.unit" not in imported(write_csv(pendulum.columns())).told
+
+
+def test_a_log_whose_rows_are_reversed_is_told_so(imported, exoid, pendulum, write_csv):
+    path = write_csv({name: values[::-1] for name, values in pendulum.columns().items()})
+    outcome = imported(path)
+    assert (outcome.code, "its clock runs backwards, by 9.995 s from the first row to the last" in outcome.err) == (
+        2,
+        True,
+    )
+    outcome = exoid("import", path, "--guess")
+    assert (outcome.code, "its clock, 'time', runs backwards; turn the order of its rows round" in outcome.err) == (
+        2,
+        True,
+    )

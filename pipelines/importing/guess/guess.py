@@ -37,6 +37,9 @@ def propose(paths: Sequence[Path]) -> Proposal:
         found = meanings(source.names)
         time = guess_time(found, columns)
         if time is None:
+            back = [m.column for m in found if m.quantity == "time" and _goes_back(columns[m.column])]
+            if back:
+                raise InputError(f"its clock, {back[0]!r}, runs backwards; turn the order of its rows round")
             raise InputError(
                 f"none of {', '.join(source.names)} goes forward as a clock does, over ten rows or more; write the map "
                 "by hand, with time.rate_hz where rows are uniform: docs/import.md tells how"
@@ -74,6 +77,10 @@ def _refuse_other_columns(path: Path, first: Source) -> None:
             raise InputError(
                 f"has no column {', '.join(sorted(lacking))}, which {first} has; guess a map for each of both kinds"
             )
+
+
+def _goes_back(values: NDArray) -> bool:
+    return values.dtype.kind in "iuf" and clock.runs_backwards(values.astype(float))
 
 
 def _numeric(values: NDArray) -> NDArray:

@@ -12,8 +12,6 @@ from pipelines.importing.guess.names import Meaning
 from pipelines.importing.guess.proposal import Proposal
 from pipelines.settings.units import UNITS
 
-SLOWEST_HZ, FASTEST_HZ = 10.0, 1e4
-"""Between these a machine is sampled; three decades, so that of s, ms, us and ns only one fits."""
 ADVANCES = 0.9
 """Share of the steps of a clock that go forward."""
 
@@ -37,7 +35,9 @@ def guess_time(meanings: Sequence[Meaning], columns: Mapping[str, NDArray]) -> T
     for found in sorted(candidates, key=lambda meaning: meaning.unit is None):
         values = columns[found.column].astype(float)
         step = float(np.median(np.diff(values)[np.diff(values) > 0]))
-        fitting = [u for u in ("s", "ms", "us", "ns") if SLOWEST_HZ <= 1.0 / (step * UNITS[u].factor) <= FASTEST_HZ]
+        fitting = [
+            u for u in ("s", "ms", "us", "ns") if clock.SLOWEST_HZ <= 1.0 / (step * UNITS[u].factor) <= clock.FASTEST_HZ
+        ]
         unit = found.unit if found.unit and UNITS[found.unit].dimension == "time" else None
         if unit is None and not fitting:
             continue
