@@ -38,6 +38,11 @@ def confirm(
         )
     cuffs = f"{rig.safety.cuff_force_n:g} N on {len(rig.sensor)} cuff sensors" if rig.sensor else "none on the cuffs"
     lines.append(f"  force {cuffs}; ramps of {rig.safety.ramp_s:g} s or longer lead in and out; Ctrl-C stops it")
+    stop_s = max(drive.speed_rad_s for drive in rig.drive) / rig.safety.deceleration_rad_s2
+    lines.append(
+        f"  a stop takes up to {stop_s:.2g} s; stopped after {rig.safety.watchdog_s:g} s of silence, or "
+        f"{rig.safety.following_error_rad:g} rad from a set-point"
+    )
     console.err.print("\n".join(lines), markup=False, soft_wrap=True)
     _ask("Is everybody ready, and the emergency stop at hand?", f"run {run.name}")
 

@@ -12,6 +12,7 @@ from pydantic.main import IncEx
 
 from pipelines.errors import SettingsError
 from pipelines.settings.base import Settings, load_toml
+from pipelines.settings.bounds import refuse_absurd
 from pipelines.settings.line import LineSettings, TcpLine
 from pipelines.settings.plant import PlantSettings
 
@@ -526,6 +527,8 @@ class RigSettings(Settings):
             raise ValueError("plant: missing; a virtual rig (embedded, or in lockstep) needs the machine it plays")
         self._refuse_impossible_sampling()
         self._refuse_torque_that_is_never_told()
+        if self.plant is None:  # nobody is in a virtual one
+            refuse_absurd(self)
         self._refuse_impossible_set_points()
         return self
 

@@ -1,0 +1,52 @@
+"""A rig file whose limits would keep nobody from harm is refused."""
+
+import re
+
+import pytest
+
+from pipelines.errors import SettingsError
+from pipelines.settings import datasets
+from pipelines.settings.rig import load_rig
+
+LAB = (datasets() / "rigs" / "lab.toml").read_text()
+
+
+def loaded(tmp_path, key, value, text=LAB):
+    changed, count = re.subn(rf"^{key} = [^#\n]*", f"{key} = {value} ", text, count=1, flags=re.MULTILINE)
+    assert count, key
+    path = tmp_path / "rig.toml"
+    path.write_text(changed)
+    return load_rig(path)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("watchdog_s", 3600.0, "safety.watchdog_s: found 3600, expected at most 1"),
+        ("following_error_rad", 1e9, "safety.following_error_rad: found 1e+09, expected at most 0.5"),
+        ("cuff_force_n", 1e9, "safety.cuff_force_n: found 1e+09, expected at most 2000"),
+        ("control_s", 1e9, "safety.control_s: found 1e+09, expected at most 30"),
+        ("connect_s", 1e9, "safety.connect_s: found 1e+09, expected at most 60"),
+        ("speed_rad_s", 1e6, "drive[0].speed_rad_s: found 1e+06, expected at most 20"),
+        ("torque_nm", 1e9, "torque_nm: found 1e+09 "),
+        ("angle_rad", "[-1000.0, 1.0]", "drive[0].angle_rad: found -1000, expected radians, at most one turn"),
+        ("deceleration_rad_s2", 1e-6, "safety.deceleration_rad_s2: found 1e-06, with which the hip takes 1e+06 s and "
+         "5e+05 rad to stop from its 1 rad/s (exo_alone), expected at least 1"),
+        ("deceleration_rad_s2", 0.9, "safety.deceleration_rad_s2: found 0.9"),
+    ],
+)  # fmt: skip
+def test_a_limit_that_would_keep_nobody_from_harm_is_refused(tmp_path, key, value, message):
+    with pytest.raises(SettingsError) as caught:
+        loaded(tmp_path, key, value)
+    assert message in str(caught.value)
+
+
+def test_a_stop_that_leads_beyond_all_angles_of_a_joint_is_refused_though_it_is_short(tmp_path):
+    text = LAB.replace("speed_rad_s = 1.0", "speed_rad_s = 6.0")
+    with pytest.raises(SettingsError, match=r"takes 0.75 s and 2.25 rad to stop from its 6 rad/s \(exo_alone\)"):
+        loaded(tmp_path, "deceleration_rad_s2", 8.0, text)
+
+
+def test_a_virtual_rig_has_nobody_in_it_and_may_try_anything(tmp_path):
+    text = (datasets() / "rigs" / "plain.toml").read_text()
+    assert loaded(tmp_path, "watchdog_s", 3600.0, text).safety.watchdog_s == 3600.0
