@@ -30,6 +30,11 @@ def test_the_drawing_has_the_transitions_of_the_code_and_no_others():
     }
 
 
+def test_the_page_on_safety_names_the_setting_that_bounds_each_control_word_that_is_read_back():
+    rows = re.findall(r"^\| `(\w+)` \|.*within `safety\.(\w+)`", DRAWING.read_text(), flags=re.MULTILINE)
+    assert dict(rows) == dict.fromkeys(("enable", "disable", "fault_reset"), "control_s")
+
+
 def test_every_state_leads_to_rest():
     for state in State:
         if state not in (State.IDLE, State.DISABLED):
