@@ -1,0 +1,67 @@
+"""A stop heeds what the drives tell meanwhile, and what they told before it that nobody had come to judge."""
+
+import numpy as np
+import pytest
+
+from pipelines.acquisition.machine import Reading
+from pipelines.acquisition.plan import Plan
+from pipelines.acquisition.states import Supervisor
+from pipelines.errors import DeviceError
+from pipelines.settings import datasets
+from pipelines.settings.acquire import RunSettings
+from pipelines.settings.rig import load_rig
+from tests.acquisition.simulated import Event, simulate
+from tests.acquisition.test_invariants import (
+    FINE_RAD,
+    REST_RAD,
+    RIGS,
+    TRAJECTORY,
+    a_drive_that_says_it_is_not_enabled_is_told_to_disable_and_nothing_else,
+    no_drive_leaps,
+)
+
+RUN = RunSettings(name="x", run="exo_alone", purpose="train", duration_s=0.5)
+
+
+def run_with(tmp_path, *events):
+    """Run on drives that read back and go on for a while when they are told nothing."""
+    path = tmp_path / "x.parquet"
+    return simulate(RIGS["real_time", True, FINE_RAD], RUN, TRAJECTORY, path, list(events), REST_RAD, goes_on=True)
+
+
+@pytest.mark.parametrize(
+    ("joint", "found"),
+    [(0, {"torque": 151.0}), (1, {"torque": -111.0}), (1, {"torque": np.nan}),
+     (0, {"angle": 0.16}), (1, {"angle": -0.16}), (0, {"angle": np.nan})],
+)  # fmt: skip
+def test_a_stop_lets_go_of_a_leg_that_is_pressed_or_does_not_follow(joint, found):
+    supervisor = Supervisor(load_rig(datasets() / "rigs" / "real_time.toml"), 200.0)
+    supervisor.check()
+    supervisor.take(Plan(np.zeros((200, 2)), 50, 150), np.zeros(2))
+    supervisor.abort(DeviceError("made up"))
+    stopping = supervisor.stopping(joint)
+    at_rest = Reading(0, 0.0, 0.0, 0.0, 0.0, 0.0, 20.0, 0.0, enabled=True)
+    supervisor.feel(joint, at_rest)
+    assert next(stopping) == (0.0, True)
+    supervisor.feel(joint, Reading(**{**vars(at_rest), **found}))
+    assert next(stopping, None) is None
+
+
+@pytest.mark.parametrize("at", range(150, 162))
+def test_a_drive_that_said_beside_anothers_failure_that_it_is_not_enabled_is_told_disable_alone(tmp_path, at):
+    run = run_with(tmp_path, Event(at, "power"), Event(at, "raise", lambda: DeviceError("made up")))
+    assert run.supervisor.why
+    a_drive_that_says_it_is_not_enabled_is_told_to_disable_and_nothing_else(run)
+
+
+def test_a_signal_is_heeded_while_a_drive_is_waited_for_that_does_not_say_it_is_enabled(tmp_path):
+    run = run_with(tmp_path, Event(1, "power"), Event(100, "signal"))
+    assert any(told.control == run.rig.rig.map.drive["servo"].enable for told in run.rig.told)
+    assert run.supervisor.why == "stopped by SIGTERM"
+
+
+@pytest.mark.parametrize("at", range(125, 205, 5))
+def test_a_drive_that_went_on_through_a_silence_is_stopped_from_where_it_is(tmp_path, at):
+    run = run_with(tmp_path, Event(at, "dead", 30))
+    assert run.supervisor.why
+    no_drive_leaps(run)
