@@ -10,9 +10,8 @@ from pipelines.acquisition.set_points import SetPoints
 from pipelines.errors import InputError
 from pipelines.mechanics.ramp import smooth_share
 from pipelines.mechanics.trajectory import Trajectory
-from pipelines.settings.rig import RigSettings
+from pipelines.settings.rig import LONGEST_RAMP_S, RigSettings
 
-LONGEST_RAMP_S = 60.0
 RAMP_GROWTH = 1.2
 
 

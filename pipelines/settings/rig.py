@@ -42,6 +42,9 @@ DIMENSION = {
 MOST_REGISTERS = {"read": 125, "write": 121, "record": 125}
 """What one exchange carries."""
 
+LONGEST_RAMP_S = 60.0
+"""Longest way from rest into a motion, s."""
+
 MOST_QUEUED = 31
 """Registers that one FC24 answer carries."""
 
@@ -54,7 +57,7 @@ class Register(Settings):
     word_order: Literal["big", "little"] = Field("big", description="Which half of a long value comes first.")
     byte_order: Literal["big", "little"] = Field("big", description="Which half of each register comes first.")
     scale: float = Field(1.0, description="Units per count; negative turns the sign.")
-    offset: float = Field(0.0, description="Value at a raw 0, in the unit.")
+    offset: float = Field(0.0, ge=-1e12, le=1e12, description="Value at a raw 0, in the unit.")
     unit: Unit = Field("1", description="Unit of the scaled value.")
 
     @model_validator(mode="after")
@@ -123,12 +126,6 @@ class DriveWrite(Settings):
     control: Register = Field(description="Control word.")
     heartbeat: Register | None = Field(None, description="Counts up with every write: the host lives.")
 
-    @model_validator(mode="after")
-    def _heartbeat_counts(self) -> Self:
-        if self.heartbeat and not self.heartbeat.type.startswith("u"):
-            raise ValueError(f"heartbeat.type: found {self.heartbeat.type}, expected uint16, uint32 or uint64")
-        return self
-
 
 class RingRecord(Settings):
     """One record of a ring; addresses count from the record's own beginning."""
@@ -167,6 +164,7 @@ class RingSettings(Settings):
         if self.fifo is not None and self.words > MOST_QUEUED:
             raise ValueError(f"words: found {self.words}, expected at most {MOST_QUEUED}, what an FC24 answer carries")
         if self.newest is not None:
+            _refuse_what_does_not_count(self.newest, "newest")
             self._refuse_bad_ring(self.newest)
         return self
 
@@ -303,6 +301,13 @@ def _refuse_bad_block(block: Settings, name: str) -> None:
         if register.unit not in DIMENSION[quantity]:
             allowed = " or ".join(DIMENSION[quantity])
             raise ValueError(f"{name}.{quantity}.unit: found {register.unit!r}, expected {allowed}; correct the unit")
+    for quantity in ("sequence", "heartbeat"):
+        if quantity in registers:
+            _refuse_what_does_not_count(registers[quantity], f"{name}.{quantity}")
+    if "time" in registers and registers["time"].scale < 0.0:
+        raise ValueError(
+            f"{name}.time.scale: found {registers['time'].scale:g}, expected a clock that goes forward; turn its sign"
+        )
     taken: dict[int, str] = {}
     for quantity, register in registers.items():
         for address in range(register.address, register.address + register.registers):
@@ -316,6 +321,15 @@ def _refuse_bad_block(block: Settings, name: str) -> None:
         raise ValueError(
             f"{name}: spans {length} registers ({min(taken)} to {max(taken)}), expected at most "
             f"{MOST_REGISTERS[name]}, which is what one Modbus exchange carries"
+        )
+
+
+def _refuse_what_does_not_count(register: Register, name: str) -> None:
+    """Refuse a counter whose raw value is not the count: where it begins anew would be anybody's guess."""
+    if not register.type.startswith("u") or (register.scale, register.offset) != (1.0, 0.0):
+        raise ValueError(
+            f"{name}: found {register.type} with scale {register.scale:g} and offset {register.offset:g}, expected "
+            "uint16, uint32 or uint64 as it is: it is a count; correct it"
         )
 
 
@@ -448,7 +462,7 @@ class SafetySettings(Settings):
     connect_s: float = Field(5.0, gt=0.0, description="Longest wait, before anything moves, for a line or a reply.")
     control_s: float = Field(1.0, gt=0.0, description="Longest a drive may take to do what a control word tells it.")
     deceleration_rad_s2: float = Field(8.0, gt=0.0, description="How a stop slows the set-points down.")
-    ramp_s: float = Field(3.0, gt=0.0, description="Shortest time to go from rest into the motion and back.")
+    ramp_s: float = Field(3.0, gt=0.0, le=LONGEST_RAMP_S, description="Shortest way into the motion, and back.")
     settle_s: float = Field(1.0, ge=0.0, description="Motion before the recording begins, for transients to fade.")
     with_human: HumanSafetySettings = Field(HumanSafetySettings(), description="Tighter limits of runs with_human.")
 

@@ -64,6 +64,20 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
         ('scale = 1e-6, unit = "rad" }\ncontrol', 'scale = 5.0, unit = "deg" }\ncontrol',
          "map.drive.servo.write.reference: one count is 0.0873 rad, expected at most 0.025 rad, a quarter of "
          "safety.following_error_rad or of the hip's range; correct its scale"),
+        ("ramp_s = 3.0", "ramp_s = 1e9", "safety.ramp_s: found 1000000000.0, expected less than or equal to 60"),
+        ('sequence = { address = 100, type = "uint32"', 'sequence = { address = 100, type = "float32"',
+         "map.drive.servo: read.sequence: found float32 with scale 1 and offset 0, expected uint16, uint32 or uint64 "
+         "as it is: it is a count; correct it"),
+        ('sequence = { address = 100, type = "uint32"', 'sequence = { address = 100, type = "uint32", scale = 0.5',
+         "map.drive.servo: read.sequence: found uint32 with scale 0.5 and offset 0, expected uint16, uint32 or uint64 "
+         "as it is: it is a count; correct it"),
+        ('control = { address = 202, type = "uint16" }', 'control = { address = 202, type = "uint16" }\n'
+         'heartbeat = { address = 203, type = "uint16", scale = 1e-6 }', "map.drive.servo: write.heartbeat: found "
+         "uint16 with scale 1e-06 and offset 0, expected uint16, uint32 or uint64 as it is: it is a count; correct it"),
+        ('unit = "us"', 'scale = -1.0, unit = "us"', "map.drive.servo: read.time.scale: found -1, expected a clock "
+         "that goes forward; turn its sign"),
+        ('scale = 0.1, unit = "mA"', 'scale = 0.1, offset = 1e308, unit = "mA"', "map.drive.servo.read.current."
+         "offset: found 1e+308, expected less than or equal to 1000000000000"),
         ("[plant]\n", "[controller.knee]\nlimit_nm = 110.0\n[plant]\n", "torque_nm: found 110 of the knee, expected "
          "less than its controller.limit_nm (110), which the drive never goes beyond; lower it"),
         ("following_error_rad = 0.1\n", "following_error_rad = 0.2\n", "safety: with_human.following_error_rad: found "
