@@ -16,7 +16,7 @@ from typing import Any, BinaryIO, Self
 import pyarrow as pa
 
 from pipelines.acquisition.lock import locked, take
-from pipelines.contracts.parquet import KEY, to_json
+from pipelines.contracts.parquet import KEY, MAGIC, to_json
 from pipelines.errors import ContractError, InputError
 
 FLUSH_S = 0.2
@@ -170,9 +170,7 @@ class JournalFile:
                 self._head = _between(file, 0, file.tell())
             self.metadata: dict[str, Any] = json.loads(self.schema.metadata[KEY])
         except (pa.ArrowException, EOFError, KeyError, TypeError, ValueError) as error:
-            raise ContractError(
-                f"{path}: is no journal of a run, or not even its head was written and so no sample; delete it"
-            ) from error
+            raise ContractError(f"{path}: {_why_no_journal(path)}") from error
 
     def batches(self) -> Iterator[Batch]:
         """Yield batch after batch; one that was cut off or is damaged is left out, and what comes after it looked for.
@@ -214,6 +212,16 @@ class JournalFile:
         except (pa.ArrowException, EOFError, StopIteration, ValueError):
             return None
         return Batch(rows, None if words is None else dict(words))
+
+
+def _why_no_journal(path: Path) -> str:
+    with open(path, "rb") as file:
+        if file.read(len(MAGIC)) == MAGIC:
+            return "is no journal of a run but a Parquet file, of which nothing is to be recovered; see `exoid show`"
+    # Only what bears a journal's name can be what is left of one.
+    if path.name.endswith(ENDING):
+        return "is no journal of a run, or not even its head was written and so no sample; delete it"
+    return f"is no journal of a run, nothing was changed; name the *{ENDING} that a killed run left"
 
 
 def _between(file: BinaryIO, begin: int, end: int) -> bytes:

@@ -51,6 +51,8 @@ def recover(path: Path, output: Path | None = None) -> Recovered:
     """
     if not path.exists():
         raise InputError(f"{path}: no such file; `exoid recover` takes the journal that a killed run left")
+    if not path.is_file():  # a pipe would be waited for
+        raise InputError(f"{path}: is no file, expected the journal that a killed run left; name another")
     with locked(path) as lock:
         if not lock.free:
             raise InputError(f"{path}: a run is recording there now; wait for its end, or stop it with Ctrl-C")

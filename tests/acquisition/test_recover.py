@@ -1,5 +1,6 @@
 """What a killed run left becomes a whole recording, and what is missing is said."""
 
+import os
 import subprocess
 import sys
 
@@ -248,3 +249,29 @@ def test_at_1_khz_memory_does_not_grow_with_the_length_of_what_is_written_as_a_r
     grown = memory_of_recovery(tmp_path / "long.parquet", 1000 * seconds)
     print(f"\n{seconds} s at 1 kHz: {grown:.0f} MiB")
     assert 1.0 < grown < 64.0  # an hour of these columns is 165 MiB, and as a frame twice that
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("one.parquet", b"PAR1 and so on", "is no journal of a run but a Parquet file, of which nothing is to be"),
+        ("one.parquet.journal", b"PAR1 and so on", "is no journal of a run but a Parquet file, of which nothing is"),
+        ("t.toml", b"unit = 'rad'", "is no journal of a run, nothing was changed; name the *.journal that a killed"),
+        ("one.parquet.journal", b"", "is no journal of a run, or not even its head was written and so no sample; del"),
+    ],
+)
+def test_only_what_is_left_of_a_journal_without_a_sample_is_to_be_deleted(tmp_path, name, content, words):
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(InputError) as refused:
+        recover(path)
+    assert str(refused.value).startswith(f"{path}: {words}")
+    assert ("delete" in str(refused.value)) == (not content)
+    assert path.read_bytes() == content
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="is no file, expected the journal that a killed run left"):
+        recover(tmp_path / "pipe")
