@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pipelines.acquisition.columns import columns_of
 from pipelines.acquisition.journal import Journal
+from pipelines.acquisition.latency import Latencies
 from pipelines.acquisition.machine import Answers, Machine, Row, all_answers
 from pipelines.acquisition.pace import Lockstep, PhaseLock
 from pipelines.acquisition.plan import Plan
@@ -68,6 +69,7 @@ class Loop:
         """Sample of the recording that is to come next."""
         self._recording_began: float | None = None
         self._columns = columns_of(self.machine)
+        self._latencies = Latencies()
         self._cycle = 0
         self._row: Row | None = None
         self._enabled_at = self._reported = 0.0
@@ -82,8 +84,8 @@ class Loop:
 
     def found(self) -> dict[str, Any]:
         """Return what the run found out for the recording's metadata."""
-        clocks = self.sampling.clocks(self._recording_began or 0.0)
-        return {"clocks": clocks} if clocks else {}
+        clocks, latency = self.sampling.clocks(self._recording_began or 0.0), self._latencies.metadata()
+        return ({"clocks": clocks} if clocks else {}) | ({"latency": latency} if latency else {})
 
     def _pace(self) -> Lockstep | PhaseLock:
         rig = self.machine.rig
@@ -140,7 +142,10 @@ class Loop:
 
     async def _exchange(self, reference: NDArray) -> Answers:
         self._cycle += 1
-        return await self.machine.cycle(reference, self._cycle)
+        asked = time.perf_counter()
+        answers = await self.machine.cycle(reference, self._cycle)
+        self._latencies.add(time.perf_counter() - asked)
+        return answers
 
     def _keep(self, row: Row) -> None:
         """Write a sample, and note those missed before it."""

@@ -88,6 +88,15 @@ class Clock(Keys):
     corrected: bool
 
 
+class Latency(Keys):
+    """How long the drives and sensors took to answer a cycle, on the host's clock."""
+
+    cycles: Annotated[int, Field(gt=0)]
+    median_ms: NotNegative
+    p99_ms: NotNegative
+    longest_ms: NotNegative
+
+
 class RunKeys(TableKeys):
     """What a run knows of itself."""
 
@@ -103,5 +112,6 @@ class RunKeys(TableKeys):
     abort: str | None = None
     recovered: bool | None = None
     clocks: dict[str, Clock] | None = None
+    latency: Latency | None = None
     controller: dict[str, Controller] | None = None
     geometry: Geometry | None = None

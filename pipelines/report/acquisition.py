@@ -32,6 +32,8 @@ class Run:
     missing: int
     abort: str
     recovered: bool
+    latency: dict[str, float] | None
+    """How long answers took: ``median_ms``, ``p99_ms``, ``longest_ms``; None where the file does not say."""
     clocks: tuple[str, ...]
     imported: str
     filter: str
@@ -84,6 +86,7 @@ def _run(session: Session, artifact: Artifact, motion: Artifact | None) -> Run:
         missing=sum(count for _, count in gaps),
         abort=about.get("abort") or "",
         recovered=bool(about.get("recovered")),
+        latency=about.get("latency"),
         clocks=tuple(_clock(joint, clock) for joint, clock in (about.get("clocks") or {}).items()),
         imported=_imported(about.get("imported")),
         filter=_filter(motion.metadata.get("filter")) if motion else "",

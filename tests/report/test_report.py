@@ -79,6 +79,14 @@ def test_an_experiment_that_lacks_a_stage_has_a_page_that_says_so(session_folder
     assert "Not here yet" in page
 
 
+def test_latencies_gaps_and_an_early_end_of_a_recording_are_told(tmp_path):
+    latency = {"cycles": 4000, "median_ms": 1.25, "p99_ms": 3.5, "longest_ms": 41.0}
+    write_recording(tmp_path, latency=latency, gaps=[[3.0, 7]], abort="watchdog: no new sample")
+    page = report(find([tmp_path]))
+    for words in ("1.25 ms", "99 %: 3.50, longest 41.0", "1, 7 samples", "watchdog: no new sample"):
+        assert words in page
+
+
 def test_a_machine_with_one_sliding_joint_is_told_of_in_newtons(tmp_path):
     page = report(find([write_session(tmp_path / "axis", AXIS)]))
     assert "axis force" in page
