@@ -25,13 +25,15 @@ from pipelines.report.measured import (
     torque_charts,
 )
 from pipelines.report.numbers import digits
-from pipelines.report.page import VALUES, indented, render
+from pipelines.report.page import LARGEST_BYTES, VALUES, indented, render
 from pipelines.report.parameters import models, side_by_side
 from pipelines.report.residual import against, residual_charts, telling
 from pipelines.report.session import Session
 
 MOST_CANDIDATES = 12
 """In sight; the others unfold."""
+FEWEST_VALUES = 20_000
+"""Numbers in all charts below which a page is not made smaller: what is large then is no chart."""
 STATUS = {
     "explained": ("explained", "good"),
     "partly_explained": ("partly explained", "warn"),
@@ -93,8 +95,15 @@ def _worst(session: Session) -> Joint | None:
 
 
 def report(session: Session, title: str | None = None) -> str:
-    """Return the page of a session."""
-    drawn, verdict, shown = charts(session), session.verdict, animations(session)
+    """Return the page of a session, its charts as thin as it takes to stay below ``LARGEST_BYTES``."""
+    values = VALUES
+    while len((page := _page(session, title, values)).encode()) > LARGEST_BYTES and values > FEWEST_VALUES:
+        values //= 2
+    return page
+
+
+def _page(session: Session, title: str | None, values: int) -> str:
+    drawn, verdict, shown = charts(session, values), session.verdict, animations(session)
     quantity = _quantity(session)
     told = {
         "title": title or session.name,
@@ -186,7 +195,7 @@ def _tiles(session: Session, verdict: dict[str, Any]) -> list[Tile]:
         if fall.unexplained is not None:
             after = "" if fall.after is None else f" → {digits(fall.after / fall.floor)}"
             big = f"{digits(fall.before / fall.floor)}{after}"
-            tiles.append(Tile(f"{fall.joint} error", big, "× floor", "1 is the noise floor, and nothing else"))
+            tiles.append(Tile(f"{fall.joint} error", big, "× floor", "1 would be noise alone"))
     return [*tiles, *_simulation_tiles(session, verdict), *_loop_tiles(session)]
 
 

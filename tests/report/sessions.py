@@ -36,15 +36,15 @@ def motion_of(joints, time):
     return states
 
 
-def write_recording(folder, joints=LEG, seconds=20.0, rate_hz=200.0, **metadata):
+def write_recording(folder, joints=LEG, seconds=20.0, rate_hz=200.0, name=RUN, **metadata):
     time = np.arange(round(seconds * rate_hz)) / rate_hz
     columns = {"time_s": time}
     for joint in joints:
         angle, _, _, torque = motion_of(joints, time)[joint.name]
         columns |= {joint.column("angle"): angle, joint.column("torque"): torque}
     told = {"run": "with_human", "purpose": "validate", "sample_rate_hz": rate_hz, "joints": named(joints)} | metadata
-    RECORDING.write(folder / "recordings" / RUN, pd.DataFrame(columns), told | describe())
-    return folder / "recordings" / RUN
+    RECORDING.write(folder / "recordings" / name, pd.DataFrame(columns), told | describe())
+    return folder / "recordings" / name
 
 
 def write_parameters(folder, joints=LEG, extended=False, shift=0.0, inputs=()):

@@ -11,7 +11,15 @@ from pipelines.contracts.provenance import provenance_of, sha256
 from pipelines.errors import InputError
 from pipelines.report.report import report
 from pipelines.report.session import find
-from tests.report.sessions import AXIS, write_parameters, write_recording, write_session, write_verdict
+from tests.report.sessions import (
+    AXIS,
+    write_parameters,
+    write_recording,
+    write_replay,
+    write_residuals,
+    write_session,
+    write_verdict,
+)
 
 TOLD = re.compile(r'<data value="([^"]*)" data-key="([^"]*)">([^<]*)</data>')
 
@@ -48,6 +56,18 @@ def test_the_page_has_its_six_parts_and_stays_under_five_megabytes(page_file):
     ]
     assert "Not here yet" not in page
     assert len(page.encode()) < 5_000_000
+
+
+def test_a_session_of_many_long_runs_stays_under_five_megabytes(tmp_path):
+    write_verdict(tmp_path)
+    models = [write_parameters(tmp_path, extended=which) for which in (False, True)]
+    write_residuals(tmp_path, seconds=2000.0)
+    for number in range(8):
+        recording = write_recording(tmp_path, name=f"run{number}.parquet", seconds=10.0 + number)
+        for model in models:
+            write_replay(tmp_path, model, recording, seconds=40.0)
+    page = report(find([tmp_path]))
+    assert 2_000_000 < len(page.encode()) < 5_000_000
 
 
 def test_the_page_tells_what_it_was_made_of_as_every_result_does(session_folder, page_file):
