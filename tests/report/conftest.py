@@ -24,7 +24,8 @@ def page_file(session_folder, tmp_path_factory):
     return path
 
 
-@pytest.fixture(scope="session")
+# Not for the whole session: while it is there, an event loop runs in this thread, and nobody else's would start.
+@pytest.fixture(scope="module")
 def chromium():
     if CHROMIUM is None:
         pytest.skip("there is no chromium here; `apt-get install chromium` brings it")
