@@ -35,4 +35,4 @@ def test_a_run_that_never_began_tells_nothing():
 def test_a_recording_tells_how_long_its_answers_took(record):
     told = record().metadata["latency"]
     assert told["cycles"] > 100
-    assert 0.0 < told["median_ms"] <= told["p99_ms"] <= told["longest_ms"] < 1e3
+    assert 0.0 < told["median_ms"] <= told["p99_ms"] <= told["longest_ms"]
