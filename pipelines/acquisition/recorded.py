@@ -60,7 +60,8 @@ def account_of(journal: JournalFile) -> Account:
         found, samples = _gaps(np.concatenate([[reached - 1], index]), rate_hz), samples + len(index)
         gaps, reached = gaps + found, int(index[-1]) + 1
     if last_words is None:
-        why = f"killed {reached / rate_hz:.3f} s into {seconds:g} s"
+        # A full disk takes the last words with it: nobody can tell the two apart.
+        why = f"ended {reached / rate_hz:.3f} s into {seconds:g} s without a word: killed, or its disk was full"
         return Account(samples, planned, rate_hz, gaps, why, damaged=journal.damaged > 0)
     abort = last_words[ABORT].decode() or None
     if not abort:

@@ -51,7 +51,7 @@ def test_a_killed_run_is_a_recording_that_tells_what_is_missing(killed, tmp_path
     assert (made.account.samples, made.account.missed, made.account.cut_off) == (147, 3, 50)
     assert table.frame["sequence"].tolist() == [7000 + k for k in (*range(40), *range(43, 150))]
     assert table.metadata["gaps"] == [[0.2, 3]]
-    assert table.metadata["abort"] == "killed 0.750 s into 1 s"
+    assert table.metadata["abort"] == "ended 0.750 s into 1 s without a word: killed, or its disk was full"
     assert table.metadata["recovered"] is True
     assert not killed.exists()
 
