@@ -10,7 +10,7 @@ from pipelines.errors import DeviceError
 from pipelines.settings import datasets
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import load_rig
-from tests.acquisition.simulated import Event, simulate
+from tests.acquisition.simulated import RATE, Event, simulate
 from tests.acquisition.test_invariants import (
     FINE_RAD,
     REST_RAD,
@@ -65,3 +65,12 @@ def test_a_drive_that_went_on_through_a_silence_is_stopped_from_where_it_is(tmp_
     run = run_with(tmp_path, Event(at, "dead", 30))
     assert run.supervisor.why
     no_drive_leaps(run)
+
+
+@pytest.mark.parametrize("at", range(125, 240, 5))
+def test_a_healthy_drive_on_its_own_line_is_left_alone_no_longer_than_docs_safety_says(tmp_path, at):
+    run = run_with(tmp_path, Event(at, "dead", 30))
+    safety, answers_s = run.rig.rig.safety, 0.01
+    silent = "drive knee" in run.supervisor.why
+    told = [told.time for told in run.rig.told if told.joint != silent and told.control]
+    assert max(np.diff(told)) <= safety.watchdog_s + safety.longest_reply_s + 2 / RATE + answers_s
