@@ -26,6 +26,7 @@ from pipelines.acquisition.resolution import refuse_coarse_set_points
 from pipelines.acquisition.sampling import sampling_of
 from pipelines.acquisition.states import State, Supervisor
 from pipelines.contracts import RECORDING
+from pipelines.contracts.atomic import open_folder
 from pipelines.contracts.provenance import describe
 from pipelines.errors import DeviceError, ExoidError, about
 from pipelines.mechanics.trajectory import Trajectory, read_trajectory
@@ -93,6 +94,7 @@ def acquire(
     RECORDING.refuse_place(output)
     journal = journal_of(output)
     refuse_leftover(journal)
+    open_folder(output.parent)
     with about(rig_path):
         recorded_hz = sample_rate_hz * rig.samples_per_cycle(sample_rate_hz)
     metadata = _metadata(rig, run, trajectory, recorded_hz, mechanism or MechanismSettings())

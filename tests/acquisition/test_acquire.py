@@ -1,14 +1,18 @@
 """Recording on a virtual rig, over real Modbus TCP."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from pipelines.acquisition.acquire import acquire
 from pipelines.mechanics.leg import cuff_torque
 from pipelines.mechanics.motion import geometry_of
 from pipelines.mechanics.trajectory import read_trajectory
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record as record_by_arrays
+from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import load_rig
 
 
@@ -88,3 +92,11 @@ def test_real_time_samples_come_on_the_devices_clock(record):
     is_force = frame.columns.str.contains("_force_")
     assert frame.loc[:, ~is_force].notna().all(axis=None)
     assert frame.loc[:, is_force].isna().any(axis=1).sum() <= 10
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs a folder in which nobody can write")
+def test_a_folder_that_takes_no_recording_is_refused_before_anything_is_connected(rig_file, excitation):
+    run = RunSettings(name="test", run="exo_alone", purpose="train", duration_s=1.0)
+    with pytest.raises(OSError) as refused:
+        acquire(rig_file(port=1), run, excitation, Path("/proc/one.parquet"))
+    assert refused.value.filename == "/proc"
