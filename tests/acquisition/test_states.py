@@ -1,5 +1,6 @@
 """The safety state machine itself: as it is drawn, and what may not be skipped."""
 
+import itertools
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -15,19 +16,24 @@ from pipelines.settings import datasets
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import load_rig
 from tests.acquisition.simulated import Event, simulate
-from tests.acquisition.test_invariants import REST_RAD, RIGS, TRAJECTORY
+from tests.acquisition.test_invariants import FINE_RAD, REST_RAD, RIGS, TRAJECTORY
 
 DRAWING = Path(__file__).parents[2] / "docs" / "safety.md"
 RATE = 200.0
 
 
 def test_the_drawing_has_the_transitions_of_the_code_and_no_others():
-    arrows = re.findall(r"^    (\S+) --> (\S+)$", DRAWING.read_text(), flags=re.MULTILINE)
-    drawn = {tuple(name.replace("_", " ") for name in arrow) for arrow in arrows}
-    assert drawn == {(str(a), str(b)) for a, following in TRANSITIONS.items() for b in following} | {
-        ("[*]", "idle"),
-        ("disabled", "[*]"),
-    }
+    chain, branches, bottom = re.search(r"```text\n(.+)\n(.+)\n(.+)\n```", DRAWING.read_text()).groups()
+    names = [(match[0].strip(), match.span()) for match in re.finditer(r"[a-z]+( [a-z]+)*", chain)]
+
+    def above(place):
+        return next(name for name, (begin, end) in names if begin <= place < end)
+
+    drawn = {(one, other) for (one, _), (other, _) in itertools.pairwise(names)}
+    drawn |= {(above(match.start()), "abort") for match in re.finditer("│", branches)}
+    drawn |= {("abort", above(match.start())) for match in re.finditer("▲", branches)}
+    assert re.fullmatch(r" *└─+(┴─+)+► abort ──┘", bottom)
+    assert drawn == {(str(a), str(b)) for a, following in TRANSITIONS.items() for b in following}
 
 
 def test_the_page_on_safety_names_the_setting_that_bounds_each_control_word_that_is_read_back():
@@ -198,6 +204,7 @@ def test_of_two_counters_that_part_the_one_that_did_it_is_named(tmp_path, kind, 
     run = RunSettings(name="x", run="exo_alone", purpose="train", duration_s=0.5)
     at = 100 + joint
     events = [Event(at, kind, what)]
-    why = simulate(RIGS["lockstep", True], run, TRAJECTORY, tmp_path / "x.parquet", events, REST_RAD).supervisor.why
+    simulated = simulate(RIGS["lockstep", True, FINE_RAD], run, TRAJECTORY, tmp_path / "x.parquet", events, REST_RAD)
+    why = simulated.supervisor.why
     assert why.startswith(f"drive {('hip', 'knee')[joint]} (127.0.0.1:502, unit {joint + 1}): ")
     assert words in why
