@@ -127,7 +127,7 @@ def test_the_command_writes_verdict_and_tables(tmp_path, capsys):
     assert run(["diagnose", *map(str, files), "--out", str(tmp_path / "d")]) == 0
     out = " ".join(capsys.readouterr().out.split())
     assert "parallel spring at the knee" in out
-    assert "under adaptive control, without -> with the causes: hip error" in out
+    assert "tracking error and peak torque under adaptive control, without and with the causes" in out
     for name in ("verdict.json", "parameters.parquet", "residuals.parquet", "candidates.parquet", "detectability.json"):
         assert (tmp_path / "d" / name).is_file()
     assert (PARAMETERS.read(tmp_path / "d" / "parameters.parquet").frame["step"] == "extension").any()
