@@ -229,7 +229,7 @@ class Client:
 
 
 def hostile_rigs() -> list[RigSettings]:
-    """Return the plain rig, with floats in place of its integers, and all on one RTU line; all of little patience."""
+    """Return the plain rig, with floats where it does not count, and all on one RTU line; all of little patience."""
     text = (datasets() / "rigs" / "plain.toml").read_text()
     patience = "".join(f"{key} = {TIMEOUT_S}\n" for key in ("watchdog_s", "connect_s", "control_s"))
     text = re.sub(r"^watchdog_s = [^#\n]*\n", patience, text, flags=re.MULTILINE)
@@ -237,7 +237,10 @@ def hostile_rigs() -> list[RigSettings]:
     with TemporaryDirectory() as folder:
         return [
             _load(text, Path(folder)),
-            _load(re.sub('"u?int32"', '"float32"', text), Path(folder)),
+            _load(
+                re.sub(r'^(?!sequence)(.*)"u?int32"', r'\1"float32"', text, flags=re.MULTILINE),
+                Path(folder),
+            ),
             _load(f'{shared}\n[line.leg]\ntransport = "rtu_over_tcp"\n', Path(folder)),
         ]
 
