@@ -18,9 +18,15 @@ def told_s(why):
 EVERY_CASE = pytest.mark.parametrize(
     ("frames", "case"),
     [
-        pytest.param(frames, case, id=f"{name}: {case.name}")
+        # What serial lines alone have, and each third of the others; all of them in `make faults` and `make test-slow`.
+        pytest.param(
+            frames,
+            case,
+            id=f"{name}: {case.name}",
+            marks=pytest.mark.slow if frames is RtuFrame and case.frames is not RtuFrame and k % 3 else (),
+        )
         for frames, name in ((TcpFrame, "TCP"), (RtuFrame, "RTU"))
-        for case in cases(frames)
+        for k, case in enumerate(cases(frames))
     ],
 )
 
