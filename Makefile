@@ -19,6 +19,7 @@ help: ## this list
 
 all: $(INSTALLED) ## the default experiment from its design to its report, into build/default
 	+@$(EXPERIMENT) all
+	@echo "what is done, stale or missing: $(BIN)/exoid status --config datasets/experiments/default.toml --out build/default"
 
 test: $(INSTALLED) ## the tests
 	$(BIN)/pytest -n 2 -m "not slow"

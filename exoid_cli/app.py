@@ -98,8 +98,8 @@ def options(
     console.heed(quiet=quiet, json=json)
 
 
-INTERRUPTED, TERMINATED = 128 + signal.SIGINT, 128 + signal.SIGTERM
-"""Exit codes of a stop by a signal, as shells have them."""
+INTERRUPTED, TERMINATED, UNHEARD = 128 + signal.SIGINT, 128 + signal.SIGTERM, 128 + 13
+"""Exit codes of a stop by a signal, as shells have them; the last one's is SIGPIPE, which Windows does not know."""
 
 
 def main() -> NoReturn:
@@ -123,7 +123,11 @@ def run(arguments: Sequence[str]) -> int:
     """Run one command line and return its exit code."""
     console.configure()
     try:
-        return _command_line(arguments)
+        code = _command_line(arguments)
+        sys.stdout.flush()  # not at the interpreter's end, where it would fail with a traceback
+        return code
+    except BrokenPipeError:
+        return _unheard()
     except ExoidError as error:
         console.fail(str(error))
         return error.exit_code
@@ -134,6 +138,8 @@ def run(arguments: Sequence[str]) -> int:
         console.fail("stopped by Ctrl-C")
         return INTERRUPTED
     except SystemExit as stop:
+        if isinstance(stop.__context__, BrokenPipeError):  # which click and rich make a failure of ours
+            return _unheard()
         if stop.code == TERMINATED:
             console.fail("stopped by SIGTERM")
         raise
@@ -143,6 +149,13 @@ def run(arguments: Sequence[str]) -> int:
     except Exception as error:
         console.fail(f"exoid itself failed: {type(error).__name__}: {error}; please report it, {_keep_traceback()}")
         return 1
+
+
+def _unheard() -> int:
+    """Let nothing more be written to an output that nobody reads any longer, as of ``exoid effects | head -1``."""
+    with open(os.devnull, "w") as nowhere:
+        os.dup2(nowhere.fileno(), sys.stdout.fileno())
+    return UNHEARD
 
 
 def _command_line(arguments: Sequence[str]) -> int:

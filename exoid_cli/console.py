@@ -36,6 +36,7 @@ class Console:
         self.quiet = quiet
         self.json = json
         self._gathered: list[Any] | None = None
+        self._warned = set[str]()
         self.out = RichConsole(highlight=False)
         self.err = RichConsole(stderr=True, highlight=False)
 
@@ -113,7 +114,10 @@ class Console:
                 self.note(why)
 
     def warn(self, text: str) -> None:
-        """Print a warning, in every mode."""
+        """Print a warning, in every mode; once, where several steps have the same to say."""
+        if text in self._warned:
+            return
+        self._warned.add(text)
         self.err.print(Text(f"warning: {text}", style="yellow"), soft_wrap=True)
 
     def fail(self, text: str) -> None:

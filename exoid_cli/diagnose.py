@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.place import ConfigOption, place_of, settings_in_force
+from exoid_cli.place import ConfigOption, inputs_and_folder, place_of, settings_in_force
 from exoid_cli.steps import AgainOption, only
 from exoid_cli.verdict_view import show_verdict
 
@@ -51,10 +51,7 @@ def diagnose(
     if not files and output is None and figures:
         only(context, place_of(config, lacking="no recording is given"), "diagnose", again=again)
         return
-    if not files:
-        files = list(place_of(config, lacking="no recording is given").step("diagnose").inputs)
-    if output is None:
-        output = place_of(config, lacking="-o: missing").step("diagnose").target.parent
+    files, output = inputs_and_folder("diagnose", files, output, config, "no recording is given")
     settings = settings_in_force(config)
     tables = {"parameters": PARAMETERS, "residuals": RESIDUALS, "candidates": CANDIDATES}
     for name, contract in tables.items():

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from exoid_cli.console import console
-from exoid_cli.report import FoldersArgument
+from exoid_cli.report import FoldersArgument, warn_of_unreadable
 
 
 def figures(
@@ -31,6 +31,7 @@ def figures(
     from pipelines.validation import suggestion
 
     session = find(folders or [Path()])
+    warn_of_unreadable(session)
     drawn = figures_of(session)
     if not drawn:
         raise InputError(f"{session.folders[0]}: holds nothing to draw; `exoid diagnose` and `exoid simulate` make it")

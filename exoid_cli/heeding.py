@@ -29,12 +29,20 @@ def heeding(function: Callable[..., Any]) -> Callable[..., Any]:
         for name, option in (("quiet", QuietOption), ("json", JsonOption))
     ]
     kept = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in own]
+    # What typer asks of a function and no type of Python's knows: its signature, told by itself.
     command.__signature__ = inspect.Signature([*kept, *ours])  # type: ignore[attr-defined]
     command.__annotations__ = {parameter.name: parameter.annotation for parameter in (*kept, *ours)}
     return command
 
 
-IN_WORDS = {"list[Path]": "path", "str": "name", "float range": "number", "int range": "number", "int": "number"}
+IN_WORDS = {
+    "list[Path]": "path",
+    "str": "name",
+    "list[str]": "name",
+    "float range": "number",
+    "int range": "number",
+    "int": "number",
+}
 """What help calls the kinds of values that Python has other names for."""
 
 
@@ -44,6 +52,7 @@ class Command(TyperCommand):
     def __init__(self, *arguments: Any, **named: Any) -> None:
         super().__init__(*arguments, **named)
         for parameter in self.params:
+            # Typer's parameters have it, the click base that they are declared as has not.
             parameter.display_type = partial(_in_words, parameter.display_type)  # type: ignore[attr-defined]
 
 

@@ -8,7 +8,7 @@ import typer
 from exoid_cli import completion
 from exoid_cli.console import console
 from exoid_cli.parameters_view import said, show_parameters
-from exoid_cli.place import ConfigOption, place_of, settings_in_force
+from exoid_cli.place import ConfigOption, inputs_and_folder, place_of, settings_in_force
 from exoid_cli.steps import AgainOption, only
 
 if TYPE_CHECKING:
@@ -58,10 +58,7 @@ def identify(
     if not files and output is None and method is None:
         only(context, place_of(config, lacking="no motion is given"), "identify", again=again)
         return
-    if not files:
-        files = list(place_of(config, lacking="no motion is given").step("identify").inputs)
-    if output is None:
-        output = place_of(config, lacking="-o: missing").step("identify").target.parent
+    files, output = inputs_and_folder("identify", files, output, config, "no motion is given")
     settings = settings_in_force(config)
     estimator = estimator_named(method or settings.identify.method)
     runs = read_runs(files, settings.filter, geometry_from(settings.mechanism))

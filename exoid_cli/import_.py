@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from exoid_cli.console import console
+from exoid_cli.place import NAME
 from pipelines.errors import InputError
 
 if TYPE_CHECKING:
@@ -85,6 +86,9 @@ def _import(files: list[Path], map_: Path, output: Path) -> None:
     for one in told:
         _say(one)
     console.emit(told)
+    settings_file = output.parent / NAME
+    if not settings_file.exists():
+        console.say(f"with an empty {settings_file.as_posix()} beside them, `exoid run` does the rest")
 
 
 def _say(told: dict[str, Any]) -> None:

@@ -52,14 +52,17 @@ class Place:
         for step in self.of_stage(stage):
             if step.run == run:
                 return step
-        raise InputError(f"{self.out / NAME}: {_why_absent(stage, run)}; say what to read and, with -o, what to write")
+        raise InputError(f"{self.out / NAME}: {why_absent(stage, run)}; say what to read and, with -o, what to write")
 
 
-def _why_absent(stage: str, run: str | None) -> str:
+def why_absent(stage: str, run: str | None = None) -> str:
+    """Say why an experiment has no step of a stage, or none for a run."""
     if run:
         return f"the recording of run {run} was imported, and no command makes it"
     if stage in ("design", "acquire"):
         return f"the recordings of all runs were imported, and `exoid {stage}` has nothing to do here"
+    if stage == "simulate":
+        return "`exoid simulate` follows a leg's gait, and the recordings are of another machine"
     return f"no [[run]] has purpose validate, without which `exoid {stage}` has nothing to do here"
 
 
@@ -72,10 +75,28 @@ def place_of(config: Path | None, out: Path | None = None, lacking: str = "") ->
     file = config or Path(NAME)
     if not config and not is_experiment():
         begin = f"{lacking}, and " if lacking else ""
-        raise InputError(
-            f"{begin}there is no {NAME} in {Path.cwd()}; {'name it, ' if lacking else ''}go to an experiment's folder, "
-            "name its settings with --config, or start one with `exoid init DIR`"
-        )
+        raise InputError(f"{begin}there is no {NAME} in {Path.cwd()}; {_how_to_begin(named=not lacking)}")
     folder = out or file.parent
     experiment, imported = with_imported(Experiment.load(file), folder)
     return Place(experiment, graph(experiment, file, folder, imported), folder)
+
+
+def _how_to_begin(named: bool) -> str:
+    from pipelines.workflow.imported import has_imported
+
+    if has_imported(Path("recordings")):
+        return f"with an empty {NAME} beside recordings/, `exoid run` does all with what was imported"
+    return (
+        f"{'' if named else 'name it, '}go to an experiment's folder, name its settings with --config, or start one "
+        f"with `exoid init DIR`; beside recordings that `exoid import` made, an empty {NAME} is enough"
+    )
+
+
+def inputs_and_folder(
+    stage: str, files: list[Path] | None, output: Path | None, config: Path | None, lacking: str
+) -> tuple[list[Path], Path]:
+    """Return what a stage reads and the folder that it writes into; what is not given, as the experiment has it."""
+    return (
+        files or list(place_of(config, lacking=lacking).step(stage).inputs),
+        output or place_of(config, lacking="-o: missing").step(stage).target.parent,
+    )

@@ -34,8 +34,11 @@ def recover(
     from pipelines.acquisition.recover import journals_in
     from pipelines.acquisition.recover import recover as make_recording
 
-    places = journals or [place_of(None, lacking="no journal is given").out / "recordings"]
+    recordings = [] if journals else [place_of(None, lacking="no journal is given").out / "recordings"]
+    places = journals or [folder for folder in recordings if folder.exists()]
     found = [journal for place in places for journal in journals_in(place)]
+    if not found:
+        console.say("no killed run left a journal; nothing to recover")
     if output and len(found) > 1:
         raise InputError(f"-o: names one recording, but there are {len(found)} journals; leave it out")
     made, refused = [], list[InputError]()

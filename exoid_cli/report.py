@@ -1,11 +1,14 @@
 """``exoid report``: everything that was found, on one page that opens offline."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from exoid_cli.console import console
+
+if TYPE_CHECKING:
+    from pipelines.report.session import Session
 
 FoldersArgument = Annotated[
     list[Path] | None, typer.Argument(metavar="DIR", help="Folders that the stages wrote to.", show_default="this one")
@@ -49,13 +52,18 @@ def report(
     with console.working("writing the page"):
         page = page_of(session, title)
     write_text(output, page)
-    for trouble in session.unreadable:
-        console.warn(trouble)
+    warn_of_unreadable(session)
     summary = session.verdict["summary"] if session.verdict else None
     console.emit({"path": str(output), "bytes": len(page.encode()), "summary": summary})
     if summary:
         console.say(summary)
     console.say(f"{output}: {len(page.encode()) / 1e6:.1f} MB, opens in any browser")
+
+
+def warn_of_unreadable(session: "Session") -> None:
+    """Name each file that looks like exoid's and cannot be read."""
+    for trouble in session.unreadable.values():
+        console.warn(trouble)
 
 
 def _compare(folders: tuple[Path, Path], output: Path) -> None:
@@ -64,6 +72,8 @@ def _compare(folders: tuple[Path, Path], output: Path) -> None:
     from pipelines.report.session import find
 
     first, second = (find([folder]) for folder in folders)
+    for session in (first, second):
+        warn_of_unreadable(session)
     page = compare(first, second, titles_of(first, second))
     write_text(output, page.text)
     console.emit({"path": str(output), "changed": page.changed, "judged": page.judged})

@@ -8,7 +8,7 @@ import typer
 from exoid_cli import completion
 from exoid_cli.confirm import YesOption, ask_before
 from exoid_cli.console import console
-from exoid_cli.place import ConfigOption, OutOption, Place, place_of
+from exoid_cli.place import ConfigOption, OutOption, Place, place_of, why_absent
 from exoid_cli.steps import bring_up_to_date
 
 
@@ -58,9 +58,13 @@ def run(
 def _known(stages: list[str], place: Place) -> list[str]:
     from pipelines.errors import InputError
     from pipelines.validation import suggestion
+    from pipelines.workflow.graph import STAGES
 
     known = list(dict.fromkeys(step.stage for step in place.steps))
     for stage in stages:
-        if stage not in known:
-            raise InputError(f"{stage}: there is no such stage in this experiment; {suggestion(stage, known)}")
+        if stage in known:
+            continue
+        if stage in STAGES:
+            raise InputError(f"{stage}: {why_absent(stage)}; leave it out")
+        raise InputError(f"{stage}: there is no such stage in this experiment; {suggestion(stage, known)}")
     return stages

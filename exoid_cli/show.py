@@ -92,6 +92,8 @@ def _folded(origin: dict[str, Any]) -> dict[str, Any]:
     folded = dict(origin)
     if "config" in origin:
         folded["config"] = f"{len(_lines({'config': origin['config']}))} settings; --json shows them"
+    if "software" in origin:
+        folded["software"] = ", ".join(f"{name} {version}" for name, version in origin["software"].items())
     if "inputs" in origin:
         folded["inputs"] = {entry["name"]: f"sha256 {entry['sha256'][:HASH]}…" for entry in origin["inputs"]} or "none"
     return folded

@@ -64,9 +64,9 @@ def simulate(
         only(context, place_of(config, lacking="no parameters are given"), "simulate", "replay", again=again)
         return
     if parameters is None:
-        (parameters,) = place_of(config, lacking="no parameters are given").step("simulate").inputs
+        parameters = place_of(config, lacking="no parameters are given").step("identify").target
     if output is None:
-        folder = place_of(config, lacking="-o: missing").step("simulate").target.parent
+        folder = place_of(config, lacking="-o: missing").out / "simulated"
         output = folder / f"replay-{replay.stem}.parquet" if replay else folder
     settings = settings_in_force(config)
     table = PARAMETERS.read(parameters)
@@ -148,8 +148,9 @@ def _track(table: "Table", run: str, reference: Path | None, settings: "Experime
         [(name, f"{e:.4f}", f"{t:.1f}") for name, e, t in zip(names, worst, peak, strict=True)],
         numbers=f"{settled}, {strongest}",
     )
-    drawn = ["tracking.png", "error.png", "torque.png", *["kv-sweep.png"][: len(gains)]] if chosen.figures else []
-    console.wrote(output, "rbf.parquet", *["kv-sweep.csv"][: len(gains)], *drawn)
+    tables = ["rbf.parquet", *(["kv-sweep.csv"] if len(gains) else [])]
+    drawn = ["tracking.png", "error.png", "torque.png", *(["kv-sweep.png"] if len(gains) else [])]
+    console.wrote(output, *tables, *(drawn if chosen.figures else []))
 
 
 def _replay(table: "Table", recording: Path, settings: "Experiment", output: Path) -> None:

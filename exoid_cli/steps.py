@@ -109,6 +109,7 @@ def _perform(context: typer.Context, judged: "Judged", told: Sequence[str]) -> D
     console.say_command(["exoid", name, *arguments], "; ".join(judged.why[:1]))
     began = time.monotonic()
     root = context.find_root()
+    # The root is a group of commands, which click declares as any command.
     command = root.command.get_command(root, name)  # type: ignore[attr-defined]
     with console.gathering() as results, command.make_context(name, list(arguments), parent=root) as inner:
         inner.command.invoke(inner)

@@ -7,6 +7,14 @@ from pipelines.model import effect_named
 NAMES = ("Coulomb", "Stribeck")
 """Of people, whose capital stays."""
 
+SHARES = {
+    "noise_floor": "noise floor",
+    "repeatable_unexplained": "unexplained, repeats every period",
+    "not_repeatable": "unexplained, does not repeat",
+    "unexplained": "unexplained",
+}
+"""Shares of the verdict's ``error_budget`` that are no cause, in words."""
+
 
 def effect_labelled(label: str) -> Effect:
     """Return the effect that ``cogging@knee`` is the label of."""

@@ -13,7 +13,7 @@ from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
 from pipelines.mechanics.machine import THE_LEG, Machine
 from pipelines.mechanics.motion import Motion
-from pipelines.validation import suggestion
+from pipelines.validation import closest, suggestion
 
 BY_NAME = {effect.name: effect for effect in EFFECTS}
 
@@ -190,8 +190,10 @@ def term_from(effect: Effect, values: Mapping[str, float]) -> Term:
     known = {parameter.name: parameter for parameter in effect.parameters}
     missing = [name for name, parameter in known.items() if name not in values and parameter.default is None]
     if missing or not set(values) <= set(known):
+        meant = [near for name in values if name not in known and (near := closest(name, list(known)))]
         raise InputError(
-            f"{effect.label} has values {', '.join(values) or 'none'}, expected {', '.join(known)}; correct them"
+            f"{effect.label} has values {', '.join(values) or 'none'}, expected {', '.join(known)}; "
+            + (f"did you mean {', '.join(meant)}?" if meant else "correct them")
         )
     physical = np.array([values.get(name, parameter.default) for name, parameter in known.items()], dtype=float)
     return Term(effect, effect.values_from(physical))

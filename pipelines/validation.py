@@ -3,6 +3,7 @@
 import difflib
 from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
@@ -55,6 +56,13 @@ def suggestion(word: str, known: list[str]) -> str:
 def closest(word: str, known: Sequence[str]) -> str | None:
     """Return what a mistyped or shortened word was most likely meant to be, or None if nothing is near enough."""
     return max((name for name in known if _likeness(word, name) > LIKE), key=partial(_likeness, word), default=None)
+
+
+def similar_file(path: Path) -> str:
+    """Return ``did you mean ...?`` where a file of nearly that name stands in the place of one that does not exist."""
+    names = [file.name for file in path.parent.iterdir()] if path.parent.is_dir() else []
+    near = difflib.get_close_matches(path.name, names, 1, cutoff=0.85)  # runs of one kind are no slips of each other
+    return f"did you mean {path.parent / near[0]}?" if near else ""
 
 
 LIKE = 0.6

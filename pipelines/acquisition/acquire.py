@@ -14,7 +14,7 @@ import numpy as np
 from pipelines.acquisition.alone import alone
 from pipelines.acquisition.columns import columns_of
 from pipelines.acquisition.embedded import embedded
-from pipelines.acquisition.journal import Journal, JournalFile, journal_of, refuse_leftover
+from pipelines.acquisition.journal import Journal, JournalFile, refuse_leftover
 from pipelines.acquisition.line_rate import refuse_slow_lines
 from pipelines.acquisition.lock import Lock, locked
 from pipelines.acquisition.loop import Loop, Progress, Report, run_to_its_end
@@ -27,6 +27,7 @@ from pipelines.acquisition.sampling import sampling_of
 from pipelines.acquisition.states import State, Supervisor
 from pipelines.contracts import RECORDING
 from pipelines.contracts.atomic import open_folder
+from pipelines.contracts.beside import journal_of
 from pipelines.contracts.provenance import describe
 from pipelines.errors import DeviceError, ExoidError, about
 from pipelines.mechanics.trajectory import Trajectory, read_trajectory

@@ -18,9 +18,17 @@ MEANING: dict[int, str] = {
     ExcCodes.ILLEGAL_ADDRESS: "it has no such register",
     ExcCodes.ILLEGAL_VALUE: "it does not take this value",
     ExcCodes.DEVICE_FAILURE: "it failed",
-    ExcCodes.DEVICE_BUSY: "it is busy",
+    ExcCodes.DEVICE_BUSY: "it is busy (server device busy)",
     ExcCodes.GATEWAY_PATH_UNAVIABLE: "the gateway has no path to it",
     ExcCodes.GATEWAY_NO_RESPONSE: "the gateway got no answer from it",
+}
+
+_GATEWAY = "check the cable behind the gateway, and the unit id in the rig file"
+REMEDY: dict[int, str] = {
+    ExcCodes.DEVICE_FAILURE: "see the device's manual and its own display",
+    ExcCodes.DEVICE_BUSY: "end what else asks it, wait until it is ready, or lower acquire.sample_rate_hz",
+    ExcCodes.GATEWAY_PATH_UNAVIABLE: _GATEWAY,
+    ExcCodes.GATEWAY_NO_RESPONSE: _GATEWAY,
 }
 
 
@@ -43,6 +51,11 @@ class Device:
         self._at_rest = Wait(safety.connect_s, "connect_s")
         self._in_motion = Wait(safety.longest_reply_s, "reply_s or watchdog_s")
         self._to_tell = Wait(safety.watchdog_s, "watchdog_s")
+
+    @property
+    def awaited_s(self) -> float:
+        """For how long it has not answered what it was asked, s; 0 where it has."""
+        return self.line.awaited_s(self._unit)
 
     async def check_identity(self, identity: Iterable[Identity]) -> None:
         """Refuse a device that is not the one that the rig file describes."""
@@ -79,11 +92,12 @@ class Device:
             )
         return found
 
-    async def write(self, block: Block, words: Sequence[int]) -> None:
+    async def write(self, block: Block, words: Sequence[int], *, in_motion: bool = False) -> None:
         """Write a block by FC16."""
         what = f"writing registers {_range(block)}"
+        wait = self._in_motion if in_motion else self._to_tell
         request = self._client.write_registers
-        await self._ask(what, None, self._to_tell, request, address=block.address, values=list(words))
+        await self._ask(what, None, wait, request, address=block.address, values=list(words))
 
     async def exchange(self, write: Block, words: Sequence[int], read: Block) -> list[int]:
         """Write one block and read another in one FC23 exchange."""
@@ -121,7 +135,7 @@ class Device:
     ) -> ModbusPDU:
         """Send a request and return its answer; raise DeviceError where there is none, or a refusal."""
         try:
-            response = await self.line.ask(wait.seconds, request, **arguments, device_id=self._unit)
+            response = await self.line.ask(self._unit, wait.seconds, request, **arguments)
         except (ModbusException, OSError) as error:
             silent = Unanswered if self._client.connected else DeviceError
             raise silent(
@@ -136,10 +150,8 @@ class Device:
         if response.isError():
             code = int(getattr(response, "exception_code", 0))
             meaning = f": {MEANING[code]}" if code in MEANING else ""
-            raise Refused(
-                f"{self.label}: answered {what} with Modbus exception {code}{meaning}; "
-                "compare the register map in the rig file with the device's manual"
-            )
+            remedy = REMEDY.get(code, "compare the register map in the rig file with the device's manual")
+            raise Refused(f"{self.label}: answered {what} with Modbus exception {code}{meaning}; {remedy}")
         return response
 
 

@@ -27,6 +27,8 @@ class Told:
 
     def tell(self, count: int, reference: float) -> None:
         """Note the set-point (rad) that was sent while a sample was the newest."""
+        if self._sent and count < self._sent[-1][0]:
+            return  # heard of late: the drive has been told more since
         last = self._sent[-1][1] if self._sent else SetPoint(reference, 0.0)
         self._sent.append((count, SetPoint(reference, last.travel + abs(reference - last.reference))))
 

@@ -16,14 +16,15 @@ from typing import Any, BinaryIO, Self
 import pyarrow as pa
 
 from pipelines.acquisition.lock import locked, take
-from pipelines.contracts.parquet import KEY, MAGIC, to_json
+from pipelines.contracts.beside import JOURNAL
+from pipelines.contracts.parquet import to_json
+from pipelines.contracts.sameness import KEY, MAGIC
 from pipelines.errors import ContractError, InputError
 
 FLUSH_S = 0.2
 """Longest a sample waits before it is written, s; a crash loses no more."""
 MOST_WAITING = 20_000
 """Samples that wait for a disk that takes none; then the run stops. 20 s at 1 kHz."""
-ENDING = ".journal"
 ABORT = b"abort"
 """Key under which a journal's last words say why the run was stopped early; empty where it was not."""
 FOUND = b"found"
@@ -34,11 +35,6 @@ MARK = b"\xff\xff\xff\xff"
 """With this every part of an Arrow stream begins, at a multiple of eight bytes."""
 SCANNED = 65536
 """Bytes that are looked through at once for the next one, a multiple of eight."""
-
-
-def journal_of(output: Path) -> Path:
-    """Return where the journal of a recording lies while it is being made."""
-    return output.with_name(output.name + ENDING)
 
 
 class Journal:
@@ -219,9 +215,9 @@ def _why_no_journal(path: Path) -> str:
         if file.read(len(MAGIC)) == MAGIC:
             return "is no journal of a run but a Parquet file, of which nothing is to be recovered; see `exoid show`"
     # Only what bears a journal's name can be what is left of one.
-    if path.name.endswith(ENDING):
+    if path.name.endswith(JOURNAL):
         return "is no journal of a run, or not even its head was written and so no sample; delete it"
-    return f"is no journal of a run, nothing was changed; name the *{ENDING} that a killed run left"
+    return f"is no journal of a run, nothing was changed; name the *{JOURNAL} that a killed run left"
 
 
 def _between(file: BinaryIO, begin: int, end: int) -> bytes:

@@ -2,6 +2,7 @@
 
 import asyncio
 import errno
+import socket
 import ssl
 import sys
 from collections.abc import Awaitable, Callable, Mapping
@@ -19,7 +20,7 @@ from serial.tools import list_ports
 
 from pipelines.acquisition.reply import check_replies
 from pipelines.errors import DeviceError, SettingsError
-from pipelines.settings.line import LineSettings, RtuLine, RtuOverTcpLine, TlsLine
+from pipelines.settings.line import LineSettings, NetworkLine, RtuLine, RtuOverTcpLine, TlsLine
 from pipelines.settings.rig import DeviceSettings, RigSettings
 
 BAD_SETTINGS: tuple[type[Exception], ...] = (ValueError,)
@@ -30,6 +31,20 @@ with suppress(ImportError):  # Windows has another way with ports
     BAD_SETTINGS += (termios.error,)
 
 
+class Owed:
+    """An answer that did not come in time, and may still come."""
+
+    def __init__(self, within_s: float) -> None:
+        self._until = asyncio.get_running_loop().time() + within_s
+        self.came = asyncio.Event()
+
+    async def pass_by(self) -> None:
+        """Wait until it has come, or comes no more."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout_at(self._until):
+                await self.came.wait()
+
+
 class Line:
     """A connection and whoever is on it."""
 
@@ -37,14 +52,17 @@ class Line:
         self.place = settings.place
         self.client = _client(settings, timeout_s, self._told)
         self.client.set_max_no_responses(sys.maxsize)  # the watchdog decides for how long silence is borne
-        self._conversation = check_replies(self.client)
+        check_replies(self.client, self._hear)
         self.devices: list[str] = []
         """Who is on it."""
         self._settings, self._timeout_s, self._name = settings, timeout_s, name
         self._turn = asyncio.Lock()
-        self._asking = False
-        self._unanswered_s: float | None = None
-        """How long the last request was awaited in vain; None where it was answered."""
+        self._asking = self._failed = self._has_answered = False
+        """Whether a request is under way, whether the last one was not answered, and whether any ever was."""
+        self._asked: dict[int, float] = {}
+        """Units that have not answered yet, or are waiting for their turn, and since when; the event loop's time, s."""
+        self._owed: dict[int, Owed] = {}
+        """What units may still answer that were not waited for any longer."""
         self._quiet_since = 0.0
 
     @property
@@ -90,14 +108,19 @@ class Line:
         Nobody's turn comes in between: whoever else is on the line is asked on the old connection or the new one.
         """
         async with self._turn:
-            if self._unanswered_s is None:
+            if not self._failed:
                 return
             self.close()
             await self._open()
-            self._unanswered_s = None
+            self._failed = False
+            for owed in self._owed.values():
+                owed.came.set()
+            self._owed.clear()
 
-    async def ask(self, within_s: float, request: Callable[..., Awaitable[ModbusPDU]], **arguments: Any) -> ModbusPDU:
-        """Send a request of the client's when it is its turn, and return the answer, awaited for ``within_s``.
+    async def ask(
+        self, unit: int, within_s: float, request: Callable[..., Awaitable[ModbusPDU]], **arguments: Any
+    ) -> ModbusPDU:
+        """Send a unit a request of the client's when it is its turn, and return the answer, awaited for ``within_s``.
 
         Raises
         ------
@@ -106,35 +129,59 @@ class Line:
         ModbusException, OSError
             The device did not answer; the line stands.
         """
-        async with self._turn:
-            if self._unanswered_s is not None and not self.tells_replies_apart and self.client.connected:
-                await self._let_pass(self._unanswered_s)
+        self._asked.setdefault(unit, asyncio.get_running_loop().time())
+        await self._take_turn(unit)
+        try:
             await self._quiet()
             # The one place where pymodbus looks for how long to wait, be it for a connection or for an answer.
             self.client.ctx.comm_params.timeout_connect = within_s
-            self._asking, self._unanswered_s = True, within_s
-            try:
-                answer = await request(**arguments)
-                self._unanswered_s = None
-                return answer
-            except (ModbusException, OSError) as error:
-                if self.client.connected:
-                    raise
-                others = f", and with it {', '.join(self.devices)}" if self._name else ""
-                raise DeviceError(f"{self._label}: the line is lost{others}; check cable and power") from error
-            finally:
-                self._asking = False
-                self._quiet_since = asyncio.get_running_loop().time()
+            self._asking = self._failed = True
+            answer = await request(**arguments, device_id=unit)
+            self._failed, self._has_answered = False, True
+            self._asked.pop(unit, None)
+            return answer
+        except (ModbusException, OSError) as error:
+            if self.client.connected:
+                raise
+            raise DeviceError(f"{self._label}: {self._loss()}") from error
+        finally:
+            self._asking = False
+            self._quiet_since = asyncio.get_running_loop().time()
+            if self._failed and (len(self.devices) > 1 or not self.tells_replies_apart):
+                self._owed[unit] = Owed(within_s)
+            self._turn.release()
+
+    def awaited_s(self, unit: int) -> float:
+        """Return for how long a unit has not answered what it is to be asked, s; 0 where it has."""
+        now = asyncio.get_running_loop().time()
+        return now - self._asked.get(unit, now)
+
+    async def _take_turn(self, unit: int) -> None:
+        """Wait until a unit may be asked.
+
+        After one that did not answer come the others on the line, for as long as it was waited for: one that is dead
+        must not keep them from being told where to go. A serial line does not say which request a reply answers: a
+        late one has come by then.
+        """
+        while True:
+            if owed := self._owed.get(unit):
+                await owed.pass_by()
+                if self._owed.get(unit) is owed:
+                    del self._owed[unit]
+            await self._turn.acquire()
+            if unit not in self._owed:
+                return
+            self._turn.release()
+
+    def _hear(self, unit: int) -> None:
+        """Note that a unit has replied, in time or not."""
+        self._quiet_since = asyncio.get_running_loop().time()
+        if owed := self._owed.get(unit):
+            owed.came.set()
 
     @property
     def _label(self) -> str:
         return f"line {self._name} ({self.place})" if self._name else self.devices[0]
-
-    async def _let_pass(self, within_s: float) -> None:
-        """Wait for the reply that did not come in time, lest it be taken for the next one's."""
-        with suppress(TimeoutError):
-            await asyncio.wait_for(self._conversation.replied.wait(), within_s)
-            self._quiet_since = asyncio.get_running_loop().time()
 
     async def _quiet(self) -> None:
         """Wait until nothing has been on the line for as long as its devices need to tell frames apart."""
@@ -148,9 +195,19 @@ class Line:
         if self._asking and not connected and not answer.done():
             answer.set_exception(ConnectionException("lost"))
 
+    def _loss(self) -> str:
+        """Return what became of the connection, and for whom."""
+        others = f", and with it {', '.join(self.devices)}" if self._name else ""
+        # Under TLS 1.3 a client is turned away only once it takes the connection for made.
+        turned_away = isinstance(self._settings, TlsLine) and not self._has_answered
+        maybe = ", or the other end does not trust what certificate and key in the rig file show" if turned_away else ""
+        return f"the line is lost{others}; check cable and power{maybe}"
+
     async def _refusal(self) -> str:
         """Return why there is no connection; the client tells its log alone."""
         try:
+            if isinstance(self._settings, NetworkLine):
+                await asyncio.get_running_loop().getaddrinfo(self._settings.host, self._settings.port)
             if isinstance(self._settings, RtuLine):
                 serial.Serial(self.place, exclusive=True).close()
             elif isinstance(self._settings, TlsLine):
@@ -207,6 +264,8 @@ def _tls_context(settings: TlsLine) -> ssl.SSLContext:
 
 def _explained(error: OSError) -> str:
     """Return a failure to connect in words, with what to do."""
+    if isinstance(error, socket.gaierror):
+        return f"no such host ({error.strerror}); correct host in the rig file, or give its address"
     if isinstance(error, ssl.SSLCertVerificationError):
         return (
             f"its certificate is not to be trusted ({error.verify_message.rstrip('.')}); name in ca whoever signed it, "

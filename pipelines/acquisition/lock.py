@@ -27,7 +27,7 @@ def take(file: IO[bytes], *, wait: bool) -> bool:
 
 
 def _take_a_byte(file: IO[bytes], *, wait: bool) -> bool:
-    import msvcrt
+    import msvcrt  # mypy knows its contents on Windows only
 
     place = file.tell()
     file.seek(FAR)

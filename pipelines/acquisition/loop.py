@@ -3,7 +3,9 @@
 import asyncio
 import time
 from collections.abc import Callable, Coroutine, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from numpy.typing import NDArray
@@ -15,12 +17,14 @@ from pipelines.acquisition.machine import Answers, Machine, Row, all_answers
 from pipelines.acquisition.pace import Lockstep, PhaseLock
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.sampling import Sampling
-from pipelines.acquisition.states import State, Supervisor
+from pipelines.acquisition.states import SLACK_SAMPLES, State, Supervisor
 from pipelines.errors import DeviceError, Unanswered
 
 REPORT_S = 0.1
 DISABLE_TRIES = 3
 """How often a drive is told to disable, each time but the first on a new connection."""
+LOOK_PAUSE = 0.25
+"""Share of a sample after which it is looked again whether a drive is told nothing."""
 
 
 @dataclass(frozen=True)
@@ -73,11 +77,17 @@ class Loop:
         self._cycle = 0
         self._row: Row | None = None
         self._enabled_at = self._reported = 0.0
+        self._followed = asyncio.Event()
+        """Set once the plan is followed no longer."""
+        self._tending: list[asyncio.Future] = []
+        self._moving = set[int]()
+        """Drives that are being slowed down in the stop."""
 
     async def run(self) -> None:
         """Follow the plan to its end, then disable the drives; the supervisor knows why that came early."""
         try:
-            await self._follow()
+            self.supervisor.check_rest(await self.machine.look())
+            await self._tended(self._follow(await self._enable()))
         except BaseException as error:  # whatever it is: the drives come first, it is told after them
             self.supervisor.abort(error)
         await self._stop()
@@ -93,11 +103,25 @@ class Loop:
             return Lockstep(self.machine.count)
         return PhaseLock(self._rate, self.machine.count, rig.safety.watchdog_s)
 
-    async def _follow(self) -> None:
+    async def _tended(self, following: Coroutine) -> None:
+        """Follow the plan, and tend every drive meanwhile, until one of these ends; the supervisor is told why."""
+        follow = asyncio.ensure_future(following)
+        if self.machine.rig.clock == "real_time":  # in lockstep no time passes while somebody is waited for
+            self._tending = [asyncio.ensure_future(self._tend(joint)) for joint in range(len(self.machine.drives))]
+        ended = set[asyncio.Future]()
+        try:
+            ended, _ = await asyncio.wait([follow, *self._tending], return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            self._followed.set()
+            follow.cancel()
+            await _outlive([follow], self.supervisor.abort)
+            for task in ended:
+                if error := asyncio.CancelledError() if task.cancelled() else task.exception():
+                    self.supervisor.abort(error)
+
+    async def _follow(self, last: Row) -> None:
         """Send set-point after set-point; raise as soon as something is wrong."""
         pace = self._pace()
-        self.supervisor.check_rest(await self.machine.look())
-        last = await self._enable()
         while not self.supervisor.has_followed(last):
             found = await pace.wait(last.sequence)
             self._heed_signals()
@@ -116,12 +140,60 @@ class Loop:
     async def _resume(self) -> bool:
         """Ask the drives what they made of a silence; tell whether they answered."""
         try:
-            readings = await all_answers(drive.look(in_motion=True) for drive in self.machine.drives)
+            await all_answers(self._find(joint) for joint in range(len(self.machine.drives)))
         except Unanswered:
             return False
-        for joint, reading in enumerate(readings):
-            self.supervisor.resume(joint, reading, time.monotonic() - self.supervisor.sent_at)
         return True
+
+    async def _find(self, joint: int) -> None:
+        """Ask a drive where it is, to go on from there."""
+        told = self.supervisor.sent_at[joint]
+        reading = await self.machine.drives[joint].look(in_motion=True)
+        if self.supervisor.sent_at[joint] == told:
+            self.supervisor.resume(joint, reading, time.monotonic())
+        else:  # it was told something else meanwhile
+            self.supervisor.heed(joint, reading)
+
+    async def _tend(self, joint: int) -> None:
+        """Tell a drive where to go for as long as others are awaited, rather than nothing.
+
+        Raise as soon as something is wrong, for whoever awaits does not hear of it.
+        """
+        drive, period = self.machine.drives[joint], 1.0 / self._rate
+        patience, look_at = SLACK_SAMPLES * period, 0.0
+        while True:
+            told = self._told_at(joint)
+            with suppress(TimeoutError):
+                async with asyncio.timeout(max(told + patience, look_at) - time.monotonic()):
+                    await self._followed.wait()
+                    return
+            self._heed_signals()
+            self.supervisor.refuse_after_abort()
+            if self._told_at(joint) != told:  # nobody is awaited for long
+                patience = SLACK_SAMPLES * period
+            elif drive.device.awaited_s > period:  # it is the one who is awaited
+                look_at = time.monotonic() + LOOK_PAUSE * period
+            else:
+                await self._tell_alone(joint)
+                patience = period
+
+    def _told_at(self, joint: int) -> float:
+        """Return when a drive was told something last, or that was decided."""
+        return max(self.machine.drives[joint].told_at, float(self.supervisor.sent_at[joint]))
+
+    async def _tell_alone(self, joint: int) -> None:
+        """Tell one drive where to go, from where it is."""
+        drive, told = self.machine.drives[joint], self.supervisor.sent_at[joint]
+        try:
+            if drive.latest is not None:  # it came beside what is awaited, perhaps, and nobody has judged it
+                self.supervisor.heed(joint, drive.latest)
+            if self.supervisor.is_stale(joint, time.monotonic()):
+                await self._find(joint)
+            if self.supervisor.sent_at[joint] == told:
+                reading = await drive.exchange(self.supervisor.tend(joint, time.monotonic()))
+                self.supervisor.judge_tended(joint, reading)
+        except Unanswered:  # whoever follows the plan finds out for how long
+            pass
 
     async def _enable(self) -> Row:
         """Enable the drives where the leg stands; return the first sample at which they say that they are."""
@@ -189,12 +261,15 @@ class Loop:
     async def _stop(self) -> None:
         """Bring every drive to rest and take its torque away, whatever happens meanwhile."""
         touched = [j for j, drive in enumerate(self.machine.drives) if drive.told_reference is not None]
+        self._moving = set(touched)
         stops = [asyncio.ensure_future(self._stop_drive(j)) for j in touched]
+        for j, stop in zip(touched, stops, strict=True):
+            stop.add_done_callback(partial(self._at_rest, j))
         feeling = asyncio.ensure_future(self._feel())
         self._tell_stop()
         await _outlive(stops, self.supervisor.abort)
         feeling.cancel()
-        await _outlive([feeling], self.supervisor.abort)
+        await _outlive([feeling, *self._tending], self.supervisor.abort)
         # One that was cancelled before it began has told its drive nothing.
         complaints = [
             await self._disable(j) if stop.cancelled() else stop.result()
@@ -213,24 +288,25 @@ class Loop:
     async def _stop_drive(self, joint: int) -> str | None:
         """Slow one drive down and disable it, whatever happens to the others; return why it could not be disabled."""
         drive, period = self.machine.drives[joint], 1.0 / self._rate
-        told, answered = self.supervisor.sent_at, time.monotonic()
-        if drive.told_reference is not None:  # what was decided last may not have been sent
-            self.supervisor.begin_stop(joint, drive.told_reference)
-        stopping = self.supervisor.stopping(joint)
+        answered = time.monotonic()
         try:
+            for tending in self._tending[joint : joint + 1]:  # may be waiting for an answer still
+                await tending
+            if drive.told_reference is not None:  # what was decided last may not have been sent
+                self.supervisor.begin_stop(joint, drive.told_reference)
             if drive.latest is not None:  # it came beside what ended the run, perhaps, and nobody has judged it
                 self.supervisor.heed(joint, drive.latest)
             while True:
                 # On the host's clock: the device's counter may be what has failed. What is late is not caught up
                 # with, so that set-points never come faster than samples.
-                await asyncio.sleep(0.0 if drive.in_lockstep else max(0.0, told + period - time.monotonic()))
+                due_at = self._told_at(joint) + period
+                await asyncio.sleep(0.0 if drive.in_lockstep else max(0.0, due_at - time.monotonic()))
                 try:
-                    if self.supervisor.is_stale(told, time.monotonic()):
-                        reading = await drive.look(in_motion=True)
-                        self.supervisor.resume(joint, reading, time.monotonic() - told)
-                    if not (due := next(stopping, ())):
+                    if self.supervisor.is_stale(joint, time.monotonic()):
+                        await self._find(joint)
+                    if not (due := self.supervisor.stop(joint, time.monotonic())):
                         break
-                    (reference, halt), told = due, time.monotonic()
+                    reference, halt = due
                     self.supervisor.feel(joint, await drive.exchange(reference, halt=halt))
                     answered = time.monotonic()
                 except Unanswered:  # a lost reply alone is no reason to take a moving leg's torque away
@@ -238,22 +314,38 @@ class Loop:
                         raise
         except BaseException as error:  # whatever it is, the drive may still hear that it shall disable
             self.supervisor.abort(error)
+        self._at_rest(joint)
         return await self._disable(joint)
+
+    def _at_rest(self, joint: int, _: asyncio.Future | None = None) -> None:
+        """Note that a drive is slowed down no longer."""
+        self._moving.discard(joint)
 
     async def _disable(self, joint: int) -> str | None:
         """Take a drive's torque away; return why that could not be done."""
-        drive, complaint = self.machine.drives[joint], ""
-        for attempt in range(DISABLE_TRIES):
+        drive, complaint, left = self.machine.drives[joint], "", DISABLE_TRIES
+        while left:
             try:
-                if attempt:
+                if left < DISABLE_TRIES:
+                    await self._until_others_rest(joint)
                     await drive.device.line.renew()
-                await drive.disable(float(self.supervisor.sent[joint]))
+                await drive.disable(float(self.supervisor.sent[joint]), in_motion=left == DISABLE_TRIES)
                 return None
+            except asyncio.CancelledError as error:  # it may have waited for its turn: that was no try
+                complaint = f"{drive.device.label}: {error!r}"
+                continue
             except DeviceError as error:
                 complaint = str(error)
             except BaseException as error:  # one drive's failure must not hide another's
                 complaint = f"{drive.device.label}: {error!r}"
+            left -= 1
         return complaint
+
+    async def _until_others_rest(self, joint: int) -> None:
+        """Wait until nobody else on a drive's line is being slowed down: a new connection takes long."""
+        drives = self.machine.drives
+        while any(drives[j].device.line is drives[joint].device.line for j in self._moving):
+            await asyncio.sleep(1.0 / self._rate)
 
     async def _feel(self) -> None:
         """Watch the cuffs while the drives slow down: whoever is still pressed is not to be held there."""

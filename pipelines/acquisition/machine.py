@@ -90,6 +90,8 @@ class Drive:
         self._counted = 0
         self.told_reference: float | None = None
         """The last set-point on its way to it, rad; None while it has been told nothing, and need not be disabled."""
+        self.told_at = 0.0
+        """When it answered the last one, host's clock, s: where others are on its line, that may be late."""
         self.latest: Reading | None = None
         """What it told last, though whoever asked may not have come to hear it."""
 
@@ -142,14 +144,14 @@ class Drive:
         before, self._sent = self._sent, np.nan
         sent = time.perf_counter()
         answer = await self.device.exchange(self.tell, words, self.told)
-        self._sent = before
+        self._sent, self.told_at = before, time.monotonic()
         reading = self._reading(answer, sent)
         self._sent = reference
         return reading
 
-    async def disable(self, angle: float) -> None:
+    async def disable(self, angle: float, *, in_motion: bool = False) -> None:
         """Take the torque away, and make sure of it; ``angle`` (rad) is where the leg stands or was sent."""
-        await self._tell_idle(self.map.disable, angle)
+        await self._tell_idle(self.map.disable, angle, in_motion=in_motion)
         if self.map.enabled_mask:
             await self._until(lambda status: not self._is_enabled(status), "to disable", "see its manual")
 
@@ -158,7 +160,7 @@ class Drive:
 
         Nothing is written: a torque that is taken away comes back with the other's next set-point.
         """
-        told = self._decoded(self.told, await self.device.read(self.told.address, self.told.count))
+        told = await self._asked()
         if self.map.enabled_mask and not self._is_enabled(int(told["status"])):
             return False
         until, first = time.monotonic() + WATCH_S, await self._all_told()
@@ -169,9 +171,13 @@ class Drive:
                 return True
         return False
 
+    async def _asked(self) -> Mapping[str, float]:
+        """Read what the drive tells, outside any exchange."""
+        return self._decoded(self.told, await self.device.read(self.told.address, self.told.count))
+
     async def _all_told(self) -> tuple[object, float]:
         """Return what the drive has been told, as far as it tells, and its angle (rad)."""
-        told = self._decoded(self.told, await self.device.read(self.told.address, self.told.count))
+        told = await self._asked()
         try:
             written: object = await self.device.read(self.tell.address, self.tell.count)
         except Refused:  # not every drive lets what is written be read; then its angle must tell
@@ -180,7 +186,7 @@ class Drive:
 
     async def make_idle(self) -> bool:
         """Disable the drive before a run, whatever it does; tell whether it said that it was enabled."""
-        told = self._decoded(self.told, await self.device.read(self.told.address, self.told.count))
+        told = await self._asked()
         was_enabled = bool(self.map.enabled_mask) and self._is_enabled(int(told["status"]))
         await self.disable(told["angle"])
         return was_enabled
@@ -195,7 +201,7 @@ class Drive:
         DeviceError
             Where the drive keeps its fault.
         """
-        told = self._decoded(self.told, await self.device.read(self.told.address, self.told.count))
+        told = await self._asked()
         if not int(told.get("status", 0)) & self.map.fault_mask:
             return
         if self.map.fault_reset is None:
@@ -241,8 +247,8 @@ class Drive:
         held = self.tell.decode(await self.device.read(self.tell.address, self.tell.count))
         return self._encoded(control, held["reference"])
 
-    async def _tell_idle(self, control: int, angle: float) -> None:
-        await self.device.write(self.tell, await self.idle_words(control, angle))
+    async def _tell_idle(self, control: int, angle: float, *, in_motion: bool = False) -> None:
+        await self.device.write(self.tell, await self.idle_words(control, angle), in_motion=in_motion)
 
     def _encoded(self, control: int, reference: float) -> list[int]:
         self._beats = (self._beats + 1) % self._beats_span
@@ -255,7 +261,8 @@ class Drive:
         """Read the status word until it shows that a control word was taken."""
         until = time.monotonic() + self._control_s
         while True:
-            words = await self.device.read(self._status.address, self._status.count)
+            # Never for long: others on the line may still be moving.
+            words = await self.device.read(self._status.address, self._status.count, in_motion=True)
             status = int(self._decoded(self._status, words)["status"])
             if has_taken(status):
                 return

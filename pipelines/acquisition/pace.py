@@ -63,18 +63,24 @@ class PhaseLock:
         self._counter = counter
         self._patience_s = patience_s
         self._due = time.perf_counter()
+        self._found: int | None = None
 
     async def wait(self, last: int) -> int:
-        """Wait until the sample after ``last`` is latched; return the one that is (``last`` if none comes)."""
+        """Wait until a sample after ``last`` is latched that was not waited for yet; return it, or ``last`` if none is.
+
+        What was waited for and not brought by an exchange has had its time all the same.
+        """
         began = time.perf_counter()
+        before = last if self._found is None else self._found
         while True:
             await asyncio.sleep(max(0.0, self._due - time.perf_counter()))
             asked = time.perf_counter()
             found, now = await self._counter(), time.perf_counter()
             if now - asked > SLOW * self._period and now - began < self._patience_s:
                 continue  # by now another sample may be latched
-            if found != last:
-                self._due += (found - last - LEAN) * self._period
+            if found != before:
+                self._due += (found - before - LEAN) * self._period
+                self._found = found
                 return found
             if now - began > self._patience_s:
                 return last

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from pipelines.acquisition.journal import ABORT, FOUND, ROWS, JournalFile, in_pieces
 from pipelines.acquisition.sound import sound_batches
 from pipelines.contracts import RECORDING
+from pipelines.contracts.beside import aborted_of
 
 PIECE_ROWS = 32768
 """Samples that are held in memory at once."""
@@ -91,8 +93,4 @@ def place_for(output: Path, abort: str | None) -> Path:
     """
     if not abort:
         return output
-    path, number = output.with_name(f"{output.stem}.aborted{output.suffix}"), 1
-    while path.exists():
-        number += 1
-        path = output.with_name(f"{output.stem}.aborted-{number}{output.suffix}")
-    return path
+    return next(path for number in count(1) if not (path := aborted_of(output, number)).exists())

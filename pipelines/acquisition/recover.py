@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipelines.acquisition.journal import ENDING, JournalFile
+from pipelines.acquisition.journal import JournalFile
 from pipelines.acquisition.lock import locked
 from pipelines.acquisition.recorded import Account, account_of, place_for, write_recording
+from pipelines.contracts.beside import JOURNAL
 from pipelines.errors import InputError
 
 
@@ -18,19 +19,8 @@ class Recovered:
 
 
 def journals_in(place: Path) -> list[Path]:
-    """Return the journals below a folder; a file stands for itself.
-
-    Raises
-    ------
-    InputError
-        Where there is none.
-    """
-    if not place.is_dir():
-        return [place]
-    found = sorted(place.rglob(f"*{ENDING}"))
-    if not found:
-        raise InputError(f"{place}: holds no journal (*{ENDING}) of a run; there is nothing to recover")
-    return found
+    """Return the journals below a folder, if there are any; a file stands for itself."""
+    return sorted(place.rglob(f"*{JOURNAL}")) if place.is_dir() else [place]
 
 
 def recover(path: Path, output: Path | None = None) -> Recovered:
@@ -60,7 +50,7 @@ def recover(path: Path, output: Path | None = None) -> Recovered:
         account = account_of(journal)
         if not account.samples:
             raise InputError(f"{path}: holds no sample, the run ended before its recording began; delete it")
-        output = output or place_for(path.with_name(path.name.removesuffix(ENDING)), account.abort)
+        output = output or place_for(path.with_name(path.name.removesuffix(JOURNAL)), account.abort)
         if output.exists():
             raise InputError(f"{output}: is there already and is not overwritten; name another file with -o")
         write_recording(journal, output, account, recovered=True)

@@ -4,7 +4,7 @@ pymodbus is lenient: it takes transaction id 0 for any, a reply to another funct
 frame; and what it cannot decode it raises within asyncio, where nobody waits for it. Numbers move a leg here.
 """
 
-import asyncio
+from collections.abc import Callable
 
 from pymodbus.client.base import ModbusBaseClient
 from pymodbus.pdu import DecodePDU, ExceptionResponse, ModbusPDU
@@ -74,18 +74,16 @@ def _is_whole(function: int, frame: bytes) -> bool:
 class Conversation:
     """Requests and replies of one connection, one after the other."""
 
-    def __init__(self) -> None:
+    def __init__(self, heard: Callable[[int], None]) -> None:
         self._asked = ModbusPDU()
-        self.replied = asyncio.Event()
-        """Set once anything has come since the last request."""
+        self._heard = heard
 
     def __call__(self, sending: bool, pdu: ModbusPDU) -> ModbusPDU:
         """Remember a request; return a reply, or what is wrong with it."""
         if sending:
             self._asked = pdu
-            self.replied.clear()
             return pdu
-        self.replied.set()
+        self._heard(pdu.dev_id)
         wrong = None if isinstance(pdu, NoReply) else self._wrong(pdu)
         return pdu if wrong is None else _instead(pdu, wrong)
 
@@ -108,8 +106,10 @@ def _instead(reply: ModbusPDU, wrong: str) -> NoReply:
     return none
 
 
-def check_replies(client: ModbusBaseClient) -> Conversation:
-    """Have a client hand out nothing but replies, and a NoReply for what came instead of one."""
+def check_replies(client: ModbusBaseClient, heard: Callable[[int], None]) -> None:
+    """Have a client hand out nothing but replies, and a NoReply for what came instead of one.
+
+    ``heard`` is told the unit of each that comes, wanted or not.
+    """
     client.ctx.framer.decoder = ReplyDecoder()
-    client.ctx.trace_pdu = conversation = Conversation()
-    return conversation
+    client.ctx.trace_pdu = Conversation(heard)

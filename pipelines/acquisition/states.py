@@ -5,7 +5,7 @@ docs/safety.md draws it.
 """
 
 from asyncio import CancelledError
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from enum import StrEnum
 
 import numpy as np
@@ -19,6 +19,7 @@ from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.safety import HOLD_SAMPLES, Limits, refuse_leap, slowed
 from pipelines.acquisition.stream import Stream
 from pipelines.errors import DeviceError, Unanswered
+from pipelines.mechanics.motion import CUFFS
 from pipelines.settings.rig import RigSettings, SensorSettings
 
 REST_RAD = 0.02
@@ -75,8 +76,8 @@ class Supervisor:
         """(J,) last set-points, rad; to begin with, where the leg stands."""
         self.base = np.zeros_like(self.sent)
         """(J,) set-points, rad, from which the next ones step: the last ones, or what drives made of a silence."""
-        self.sent_at = 0.0
-        """When they were sent, host's clock, s."""
+        self.sent_at = np.zeros_like(self.sent)
+        """(J,) when they were sent, host's clock, s."""
         self.pressing = False
         """Whether slowing down would go on pressing: the drives are then disabled without it."""
         self._limits = Limits(rig, sample_rate_hz, sensors)
@@ -85,6 +86,8 @@ class Supervisor:
         self._streams = [Stream(rig, j, sample_rate_hz, told) for j, told in enumerate(self._told)]
         self._records = [Stream(rig, j, sample_rate_hz, told) for j, told in enumerate(self._told)]
         self._speed = np.zeros_like(self.sent)
+        self._held = [0 for _ in rig.drive]
+        """For how many samples each drive has been held at rest in the stop."""
         self._sample_s = np.full(len(rig.drive), 1.0 / sample_rate_hz)
         self._step = np.array([drive.speed_rad_s for drive in rig.drive]) * self._sample_s
         """(J,) how far each speed limit leads in a sample, rad."""
@@ -96,6 +99,8 @@ class Supervisor:
         """What each drive said last of being enabled."""
         self._start = self.sent
         self._first = self._found = 0
+        self._found_at = 0.0
+        """When the sample was found at which the plan was followed last, host's clock, s."""
 
     def check(self) -> None:
         """Begin to look at the devices."""
@@ -121,9 +126,9 @@ class Supervisor:
 
     def rest(self, now: float) -> NDArray:
         """Return the set-points (J,) rad with which the drives are enabled: where the leg stands."""
-        self._refuse_after_abort()
+        self.refuse_after_abort()
         self._send(self._start, np.zeros_like(self.sent), now)
-        return self.sent
+        return self.sent.copy()
 
     def enabled(self, answers: Answers, waited_s: float) -> Row | None:
         """Return the sample at which every drive says that it is enabled, as far as it tells; None until then.
@@ -148,8 +153,9 @@ class Supervisor:
 
     def begin(self, row: Row, now: float) -> None:
         """Follow the plan from the first sample on at which the drives are enabled."""
-        self._refuse_after_abort()
+        self.refuse_after_abort()
         self._first = self._found = row.sequence
+        self._found_at = now
         for j, found in enumerate(row.drives):
             self._streams[j].begin(found, now)
             self._told[j].tell(found.sequence, float(self.sent[j]))
@@ -157,7 +163,7 @@ class Supervisor:
 
     def missed(self, found: int, now: float) -> bool:
         """Tell whether drives were told nothing for longer than a sample, now that sample ``found`` is latched."""
-        self._refuse_after_abort()
+        self.refuse_after_abort()
         self._look(found, now)
         return found - self._found > 1
 
@@ -168,11 +174,13 @@ class Supervisor:
         cycle = self.rig.samples_per_cycle(self.rate)
         self._streams[0].refuse_count((found + 1) * cycle - 1)
 
-    def is_stale(self, told: float, now: float) -> bool:
-        """Tell whether a set-point that was told then is so old that nobody knows what its drive has made of it."""
-        return self.rig.clock == "real_time" and now - told > SLACK_SAMPLES / self.rate
+    def is_stale(self, joint: int, now: float) -> bool:
+        """Tell whether a drive's set-point is so old that nobody knows what it has made of it."""
+        if self.rig.clock == "lockstep" or self._speed[joint] == 0.0:  # one that is held has nowhere to go on to
+            return False
+        return bool(now - self.sent_at[joint] > SLACK_SAMPLES / self.rate)
 
-    def resume(self, joint: int, reading: Reading, silent_s: float) -> None:
+    def resume(self, joint: int, reading: Reading, now: float) -> None:
         """Go on from where a drive is that was told nothing for a while: some hold meanwhile, others go on.
 
         Raises
@@ -181,7 +189,7 @@ class Supervisor:
             The drive is no longer enabled.
         """
         self.heed(joint, reading)
-        drive, sent = self.rig.drive[joint], self.sent[joint]
+        drive, sent, silent_s = self.rig.drive[joint], self.sent[joint], now - self.sent_at[joint]
         if self.rig.map.drive[drive.map].read.reference is not None:
             reach = drive.speed_rad_s * silent_s
             place = np.clip(reading.reference, sent - reach, sent + reach)
@@ -190,6 +198,41 @@ class Supervisor:
         speed = (place - sent) / silent_s if np.isnan(reading.velocity) else reading.velocity
         self.base[joint] = place
         self._speed[joint] = np.clip(speed, *sorted((0.0, self._speed[joint])))
+
+    def tend(self, joint: int, now: float) -> float:
+        """Return the set-point (rad) of a drive that would else be told nothing, since another one is awaited.
+
+        It is the plan's, by the host's clock, for as long as one answer may take; then the drive slows down.
+
+        Raises
+        ------
+        DeviceError
+            Where nothing more may be sent.
+        """
+        self.refuse_after_abort()
+        awaited_s = now - self._found_at
+        if awaited_s > self.rig.safety.longest_reply_s + SLACK_SAMPLES / self.rate:
+            return self._slow(joint, now)
+        due, planned = self._planned(self._found + int(awaited_s * self.rate))
+        base, step = self.base[joint], self._step[joint]
+        reference = float(np.clip(due[joint], base - step, base + step))
+        self._speed[joint] = np.clip(reference - base, *sorted((0.0, planned[joint]))) * self.rate
+        return self._pass(joint, reference, now)
+
+    def judge_tended(self, joint: int, reading: Reading) -> None:
+        """Raise DeviceError where what a drive tells that is tended is reason to stop."""
+        if self.why is not None:
+            self.feel(joint, reading, late=1)
+            return
+        silent = Unanswered("others are awaited")
+        told = tuple(reading if j == joint else silent for j in range(len(self.rig.drive)))
+        answers = Answers(told, np.full((len(CUFFS), 3), np.nan), None)
+        if why := self._dropped(answers) or self._limits.violation(answers):
+            raise DeviceError(why)
+        # The sample was latched before the set-point that was sent with the question takes effect.
+        if why := self._limits.straying(answers, self.base, late=1):
+            raise DeviceError(why)
+        self._told[joint].tell(reading.sequence, float(self.sent[joint]))
 
     def next(self, found: int, now: float) -> NDArray:
         """Return the set-points (J,) rad to be sent now that sample ``found`` is latched.
@@ -201,19 +244,20 @@ class Supervisor:
         DeviceError
             Where nothing more may be sent.
         """
-        self._refuse_after_abort()
+        self.refuse_after_abort()
         self._look(found, now)
-        index = min(found - self._first, len(self._plan.reference))
-        while self.state is not self._due(index):
+        while self.state is not self._due(self._index(found)):
             self._go(FOLLOWING[FOLLOWING.index(self.state) + 1])
-        due = self._path(index)
-        refuse_leap(self.rig.drive, self._path(max(index - 1, 0)), due, self._sample_s)
+        due, planned = self._planned(found)
         step = self._step if found > self._found else 0.0  # one step a sample
         reference = np.clip(due, self.base - step, self.base + step)
         self._refuse_to_lag(due, reference)
-        self._send(reference, (reference - self.base) * self.rate, now)
+        # A step back to the plan is no motion to be slowed down from: it may be far faster than the plan.
+        speed = np.clip(reference - self.base, np.minimum(planned, 0.0), np.maximum(planned, 0.0)) * self.rate
+        self._send(reference, speed, now)
+        self._found_at = now
         self._found = found
-        return self.sent
+        return self.sent.copy()
 
     def judge(self, answers: Answers, now: float) -> Row | None:
         """Return the sample that a cycle brought, where it is whole and a new one.
@@ -223,7 +267,7 @@ class Supervisor:
         DeviceError
             Where anything that came, whole or not, is reason to stop.
         """
-        self._refuse_after_abort()
+        self.refuse_after_abort()
         if why := self._dropped(answers):
             raise DeviceError(why)
         new = [self._is_new(j, found, now) for j, found in enumerate(answers.drives)]
@@ -271,7 +315,7 @@ class Supervisor:
         DeviceError
             Where one is reason to stop, or they do not come any more.
         """
-        self._refuse_after_abort()
+        self.refuse_after_abort()
         heeded = [self._heed_enabled(joint, found) for joint, samples in enumerate(records) for found in samples]
         if why := next(filter(None, heeded), None):
             raise DeviceError(why)
@@ -321,34 +365,50 @@ class Supervisor:
         if reference != self.sent[joint]:
             self.sent[joint] = self.base[joint] = reference
 
-    def stopping(self, joint: int) -> Iterator[tuple[float, bool]]:
-        """Yield the set-points, rad, that bring one drive to rest and hold it there, and whether it is to halt there.
+    def stop(self, joint: int, now: float) -> tuple[float, bool] | None:
+        """Return the set-point, rad, that brings one drive to rest or holds it there, and whether it is to halt there.
 
-        One a sample; no more as soon as holding on would go on pressing, or the drive says that it is not enabled: it
-        must not be told to enable with its leg anywhere.
+        One a sample; None as soon as it has been held for long enough, as holding on would go on pressing, or as the
+        drive says that it is not enabled: it must not be told to enable with its leg anywhere.
         """
-        drive, one, held = self.rig.drive[joint], slice(joint, joint + 1), 0
+        if self._held[joint] >= HOLD_SAMPLES or self.pressing or self._enabled[joint] is False:
+            return None
+        base = self.base[joint]
+        reference = self._slow(joint, now)
+        halt = reference == base
+        self._held[joint] += halt
+        return reference, halt
+
+    def _slow(self, joint: int, now: float) -> float:
+        """Return the set-point (rad) of a drive that slows down, a sample after its last one."""
         deceleration = self.rig.safety.deceleration_rad_s2
-        while held < HOLD_SAMPLES and not self.pressing and self._enabled[joint] is not False:
-            base = float(self.base[joint])
-            path, self._speed[joint] = slowed(base, self._speed[joint], deceleration, 1.0 / self.rate)
-            reference = float(np.clip(path, *drive.angle_rad))
-            refuse_leap([drive], self.base[one], np.array([reference]), self._sample_s[one])
-            halt = reference == base
-            held += halt
-            self.sent[joint] = self.base[joint] = reference
-            yield reference, halt
+        path, self._speed[joint] = slowed(float(self.base[joint]), self._speed[joint], deceleration, 1.0 / self.rate)
+        return self._pass(joint, path, now)
+
+    def _pass(self, joint: int, path: float, now: float) -> float:
+        """Let one drive's set-point (rad) pass, as near to ``path`` as its limits allow by now."""
+        drive, one = self.rig.drive[joint], slice(joint, joint + 1)
+        reach = drive.speed_rad_s * self._allowed_s(now)[joint]
+        nearest = np.clip(path, self.sent[joint] - reach, self.sent[joint] + reach)
+        reference = float(np.clip(nearest, *drive.angle_rad))
+        refuse_leap([drive], self.base[one], np.array([reference]), self._sample_s[one])
+        self._note(one, np.array([reference]), now)
+        return reference
 
     def heed(self, joint: int, reading: Reading) -> None:
         """Note what a drive says of being enabled; raise DeviceError where it no longer is."""
         if why := self._heed_enabled(joint, reading):
             raise DeviceError(why)
 
-    def feel(self, joint: int, reading: Reading) -> None:
-        """Heed what a drive tells that is being stopped; raise DeviceError where it is no longer enabled."""
+    def feel(self, joint: int, reading: Reading, late: int = 0) -> None:
+        """Heed what a drive tells that is being stopped; raise DeviceError where it is no longer enabled.
+
+        Its set-point is so many samples ``late``.
+        """
         drive, error = self.rig.drive[joint], reading.angle - self.base[joint]
+        allowed = self.rig.safety.following_error_rad + drive.speed_rad_s * late / self.rate
         self.pressing |= not abs(reading.torque) <= drive.torque_nm
-        self.pressing |= not abs(error) <= self.rig.safety.following_error_rad
+        self.pressing |= not abs(error) <= allowed
         self.heed(joint, reading)
 
     def feel_cuffs(self, forces: NDArray) -> None:
@@ -379,6 +439,17 @@ class Supervisor:
         if index - 1 < self._plan.first:
             return State.RAMP
         return State.RUN if index - 1 < self._plan.stop else State.RAMP_DOWN
+
+    def _index(self, found: int) -> int:
+        """Return which set-point of the path is due at a sample."""
+        return min(found - self._first, len(self._plan.reference))
+
+    def _planned(self, found: int) -> tuple[NDArray, NDArray]:
+        """Return the set-points (J,) rad that are due at a sample, and their steps; refuse a plan that leaps there."""
+        index = self._index(found)
+        before, due = self._path(max(index - 1, 0)), self._path(index)
+        refuse_leap(self.rig.drive, before, due, self._sample_s)
+        return due, due - before
 
     def _path(self, index: int) -> NDArray:
         """Return the set-points (J,) rad of the path, whose first is where the leg stood."""
@@ -415,23 +486,38 @@ class Supervisor:
                     "computer is too busy"
                 )
 
-    def _refuse_after_abort(self) -> None:
+    def refuse_after_abort(self) -> None:
+        """Refuse to go on where the run is being stopped."""
         if self.why is not None:
             raise DeviceError(self.why)
 
     def _send(self, reference: NDArray, speed: NDArray, now: float) -> None:
         """Let set-points pass, and remember how they move, in case they must be slowed down."""
         refuse_leap(self.rig.drive, self.base, reference, self._sample_s)
-        # By the host's clock, or by cycles in lockstep: a counter that runs too fast does not make time go by.
-        elapsed = (now - self.sent_at) * (1.0 + RATE_TOLERANCE)
+        refuse_leap(self.rig.drive, self.sent, reference, self._allowed_s(now))
+        self._in_force, self._speed = self.base.copy(), speed
+        self._note(slice(None), reference, now)
+
+    def _elapsed_s(self, now: float) -> NDArray:
+        """Return the time since each drive's last set-point, (J,) s.
+
+        By the host's clock, or by cycles in lockstep: a counter that runs too fast does not make time go by.
+        """
         if self.rig.clock == "lockstep":
-            elapsed = 1.0 / self.rate
-        slack = SLACK_SAMPLES / self.rate
-        refuse_leap(self.rig.drive, self.sent, reference, elapsed + slack - self._lead)
-        taken = np.abs(reference - self.sent) / [drive.speed_rad_s for drive in self.rig.drive]
-        self._lead = np.clip(self._lead + taken - elapsed, 0.0, slack)
-        self._in_force, self.sent, self.base = self.base, reference.copy(), reference.copy()
-        self._speed, self.sent_at = speed, now
+            return self._sample_s
+        return (now - self.sent_at) * (1.0 + RATE_TOLERANCE)
+
+    def _allowed_s(self, now: float) -> NDArray:
+        """Return for how long each joint's speed limit may have led it from its last set-point to its next, (J,) s."""
+        return self._elapsed_s(now) + SLACK_SAMPLES / self.rate - self._lead
+
+    def _note(self, which: slice, reference: NDArray, now: float) -> None:
+        """Note set-points, rad, of ``which`` joints that are sent now."""
+        taken = np.abs(reference - self.sent[which]) / [drive.speed_rad_s for drive in self.rig.drive[which]]
+        ahead = self._lead[which] + taken - self._elapsed_s(now)[which]
+        self._lead[which] = np.clip(ahead, 0.0, SLACK_SAMPLES / self.rate)
+        self.sent[which] = self.base[which] = reference
+        self.sent_at[which] = now
 
 
 def _reason(error: BaseException) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from pipelines.contracts.sameness import same_but_for_the_time
 from pipelines.errors import ExoidError, InputError
 
 
@@ -15,7 +16,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     """Yield a temporary path beside ``path``; what was written there becomes ``path`` once the block ends well.
 
     The folder is made if need be. On any failure, Ctrl-C included, the temporary file goes and ``path``
-    stays as it was.
+    stays as it was; so it does, with a new time, where nothing but ``created_at`` would be another.
     """
     refuse_what_is_no_file(path)
     path = Path(os.path.realpath(path))  # a link keeps pointing at the file it names
@@ -25,7 +26,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     try:
         yield temporary
         _sync(temporary, os.O_RDWR)  # Windows brings to disk only what could be written to
-        os.replace(temporary, path)
+        _put(temporary, path)
     except BaseException as error:
         temporary.unlink(missing_ok=True)
         if isinstance(error, OSError) and str(error.filename) == str(temporary):
@@ -57,7 +58,16 @@ def all_or_none(folder: Path) -> Iterator[Path]:
         for path in made.values():
             refuse_what_is_no_file(path)
         for file, path in made.items():
-            os.replace(file, path)
+            _put(file, path)
+
+
+def _put(made: Path, path: Path) -> None:
+    """Put a file in its place, unless it says what the one there says, of which others may know the hash."""
+    if same_but_for_the_time(path, made):
+        os.utime(path)  # make goes by times
+        made.unlink()
+    else:
+        os.replace(made, path)
 
 
 def open_folder(path: Path) -> None:

@@ -9,10 +9,10 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from pipelines.contracts import checks, contract_of, parquet
+from pipelines.contracts import checks, contract_of, parquet, verdict
 from pipelines.errors import ContractError
 
-ORIGIN = ("created_by", "created_at", "inputs", "config")
+ORIGIN = ("created_by", "created_at", "software", "inputs", "config")
 
 
 @dataclass(frozen=True)
@@ -93,12 +93,22 @@ DOCUMENTS = {
 
 
 def _document(path: Path) -> Inspection | None:
-    content = _parsed(path, json.loads)
-    if content.get("contract") not in DOCUMENTS:
+    content = verdict.parsed(path) if path.suffix == ".json" and path.is_file() else _parsed(path, json.loads)
+    if not isinstance(content, dict) or content.get("contract") not in DOCUMENTS:
         return None
+    fault = _fault_of(content, path)
     contract, provenance = content.pop("contract"), content.pop("provenance", {})
     origin = {key: provenance.pop(key) for key in ORIGIN if key in provenance}
-    return Inspection(str(path), contract, DOCUMENTS[contract], origin, content | provenance)
+    return Inspection(str(path), contract, DOCUMENTS[contract], origin, content | provenance, fault=fault)
+
+
+def _fault_of(content: dict[str, Any], path: Path) -> ContractError | None:
+    try:
+        if content["contract"] == "verdict/1":
+            verdict.check(content, str(path))
+    except ContractError as error:
+        return error
+    return None
 
 
 def _trajectory_toml(path: Path) -> Inspection | None:

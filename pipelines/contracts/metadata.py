@@ -38,6 +38,7 @@ class TableKeys(Keys):
     joints: Annotated[list[JointKeys], Field(min_length=1)] | None = None
     created_by: str | None = None
     created_at: str | None = None
+    software: dict[str, str] | None = None
     inputs: list[InputKeys] | None = None
     config: dict[str, Any] | None = None
 

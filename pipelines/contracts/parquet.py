@@ -11,10 +11,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from pipelines.contracts.atomic import refuse_what_is_no_file, whole_file
+from pipelines.contracts.sameness import KEY, MAGIC
 from pipelines.errors import ContractError
+from pipelines.validation import similar_file
 
-KEY = b"exoid"
-MAGIC = b"PAR1"
 STREAM = b"\xff\xff\xff\xff"
 """How an Arrow stream starts, and so the journal of a run."""
 
@@ -115,7 +115,7 @@ def _plain(value: Any) -> Any:
 
 def _refuse_what_is_no_file(path: Path) -> None:
     if not path.exists():
-        raise ContractError(f"{path}: no such file; check the name, or make it first")
+        raise ContractError(f"{path}: no such file; {similar_file(path) or 'check the name, or make it first'}")
     if path.is_dir():
         raise ContractError(f"{path}: is a folder, expected a Parquet file; name a file in it")
     if path.stat().st_size == 0:
@@ -150,8 +150,8 @@ def _metadata(schema: pa.Schema, path: Path) -> dict[str, Any]:
     text = (schema.metadata or {}).get(KEY)
     if text is None:
         raise ContractError(
-            f"{path}: has no `exoid` entry in its schema metadata; add one with at least "
-            '{"contract": "<name>/<version>"}, see docs/contracts.md'
+            f"{path}: has no `exoid` entry in its schema metadata, so exoid did not write it; `exoid import` makes a "
+            'recording of a log; for a table of your own add {"contract": "<name>/<version>"}, see docs/contracts.md'
         )
     try:
         metadata = json.loads(text)

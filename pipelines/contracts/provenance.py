@@ -2,15 +2,22 @@
 
 import hashlib
 import json
+import platform
 import re
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from datetime import UTC, datetime
+from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from pipelines import __version__
 from pipelines.contracts import parquet
 from pipelines.errors import ContractError
+
+LIBRARIES = ("numpy", "scipy", "numba", "pandas", "pyarrow")
+"""What computes and what writes."""
 
 
 def describe(inputs: Iterable[Path] = (), config: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -27,14 +34,21 @@ def describe(inputs: Iterable[Path] = (), config: Mapping[str, Any] | None = Non
     Returns
     -------
     dict
-        ``created_by``, ``created_at``, ``inputs`` and ``config``, to be merged into a table's metadata.
+        ``created_by``, ``created_at``, ``software``, ``inputs`` and ``config``, to be merged into a table's metadata.
     """
     return {
         "created_by": f"exoid {__version__}",
         "created_at": datetime.now(UTC).isoformat(timespec="seconds"),
+        "software": dict(software()),
         "inputs": [{"name": Path(path).name, "sha256": sha256(path)} for path in inputs],
         "config": dict(config or {}),
     }
+
+
+@cache
+def software() -> dict[str, str]:
+    """Return the versions that a number may depend on: of Python and of the libraries that compute."""
+    return {"python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
 
 
 def sha256(path: Path) -> str:
@@ -58,3 +72,14 @@ def provenance_of(path: Path) -> dict[str, Any]:
         return dict(json.loads(text)["provenance"])
     except (ValueError, KeyError, TypeError, IndexError) as error:
         raise ContractError(f"{path}: does not say where it came from; make it again") from error
+
+
+def told_by(path: Path) -> dict[str, Any]:
+    """Return what a file tells of where it came from; nothing where there is none, or one that does not tell.
+
+    For who only asks whose a file is: whoever reads it says what is wrong with it.
+    """
+    if path.is_file() and path.stat().st_size:
+        with suppress(ContractError):
+            return provenance_of(path)
+    return {}

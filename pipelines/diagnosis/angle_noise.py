@@ -9,27 +9,25 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipelines.diagnosis.observations import baseline_of, observe
+from pipelines.diagnosis.observations import Run, baseline_of
 from pipelines.diagnosis.second_look import CUTOFF_HZ, below
-from pipelines.mechanics.motion import Motion
 
 REAL = 0.5
 """Share of the foretold torque that must be measured: 1 where the fast part is motion, 0 where it is noise."""
-LOUD = 2.0
-"""Times by which noise must outdo, rms, all that the slow motion's fit leaves: with less it biases little."""
+LOUD = 1.0
+"""Times by which noise must outdo, rms, all that the slow motion's fit leaves: being less than half of the error's
+power, it biases little."""
 
 
-def is_loud(motions: Sequence[Motion]) -> bool:
+def is_loud(runs: Sequence[Run]) -> bool:
     """Tell whether noise of the angles outdoes, at any joint of the runs to train, all else that a fit leaves."""
-    motions = [m for m in motions if m.purpose == "train"]
-    if not motions or any(m.cutoff_hz is not None and m.cutoff_hz <= CUTOFF_HZ for m in motions):
+    if any(run.motion.cutoff_hz is not None and run.motion.cutoff_hz <= CUTOFF_HZ for run in runs):
         return False
-    runs = [observe(m) for m in motions]
     baseline = baseline_of(runs)
     J, bodies = len(baseline.joints), baseline.body * len(baseline.bodies)
     fast, slow, torque, usable = [], [], [], []
-    for motion, run in zip(motions, runs, strict=True):
-        calm = below(motion, CUTOFF_HZ)
+    for run in runs:
+        motion, calm = run.motion, below(run.motion, CUTOFF_HZ)
         fast.append(run.average(baseline.columns(motion, motion))[:, :J])
         slow.append(run.average(baseline.columns(calm, calm))[:, :J])
         torque.append(run.measured[:, :J])

@@ -1,7 +1,7 @@
 """The whole diagnosis: recordings in, verdict and tables out."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -73,7 +73,7 @@ class Diagnosis:
     faults: tuple[Fault, ...]
     strayed: dict[str, NDArray | None]
     """(J,) rad: the 1 s simulation error of the baseline and of the extended model."""
-    noisy_angles: bool = False
+    noisy_angles: bool
     """Whether only what the angles hold below 5 Hz was looked at, for above it is noise."""
 
     @property
@@ -120,14 +120,17 @@ def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = s
     refuse_unfit(motions)
     faults = tuple(find_faults(motions))
     sound = [thinned(motion) for motion in excluding(motions, faults)]
-    if noisy := is_loud(sound):
+    train, validate = _dealt(sound)
+    if noisy := is_loud(train):
         sound = [below(motion, CUTOFF_HZ) for motion in sound]
+        train, validate = _dealt(sound)
     if not any(fault.spoils for fault in faults):
-        _refuse_without_floor([observe(motion) for motion in sound if motion.purpose == "validate"])
-    first = replace(_look(sound, faults, report), noisy_angles=noisy)
+        _refuse_without_floor(validate)
+    look = partial(_look, faults=faults, noisy_angles=noisy, report=report)
+    first = look(train, validate)
     if first.spoilt or not (first.status == "unknown_cause" or (first.unsteady and _rings(first))):
         return first
-    second = replace(_look([slower(m) for m in sound], faults, report), noisy_angles=noisy)
+    second = look(*_dealt([slower(m) for m in sound]))
     # Slow motion shows a transmission that rang too loud, and what was only hidden in noise; what failed as anything
     # else may not come back.
     hidden = bool(second.causes) and not first.choice.named.labels and not first.choice.refuted
@@ -139,9 +142,14 @@ def _rings(found: Diagnosis) -> bool:
     return any(effect_labelled(label).rings for label in found.causes)
 
 
-def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable[[float, str], None]) -> Diagnosis:
-    """Diagnose at the bandwidth that the motions have."""
-    train, validate = _dealt(motions)
+def _look(
+    train: Sequence[Run],
+    validate: Sequence[Run],
+    faults: tuple[Fault, ...],
+    noisy_angles: bool,
+    report: Callable[[float, str], None],
+) -> Diagnosis:
+    """Diagnose at the bandwidth that the runs have."""
     baseline = baseline_of(train)
     bank = fill(train, baseline, lambda share, what: report(SEARCH_SHARE * share, what))
     empty = fit((), bank.runs, baseline, bank.weights)
@@ -175,7 +183,7 @@ def _look(motions: Sequence[Motion], faults: tuple[Fault, ...], report: Callable
         standing=standing, floor=floor, unsteady=examined.unsteady,
         perceived=examined.sure, sure=sure, parameters=frame, covariance=covariance,
         residuals=tables.residual_table(validate, {"baseline": before.residuals, "extended": after.residuals}),
-        train=bank.runs, validate=validate, faults=faults,
+        train=bank.runs, validate=validate, faults=faults, noisy_angles=noisy_angles,
         strayed={"baseline": _strayed(empty, validate, baseline),
                  "extended": _strayed(choice.named.fit, validate, baseline)},
     )  # fmt: skip

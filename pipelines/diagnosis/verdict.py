@@ -178,11 +178,11 @@ def _times(likely: float, other: float) -> str:
 
 def _summary(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -> str:
     if d.spoilt:
-        return f"Acquisition, not physics: {_first_of(d.spoilt)}."
+        return f"Acquisition, not physics: {_in_short(d.spoilt[0], d)}."
     said = _finding(d, causes, left)
     if not d.floor.from_periods:
         said += " No motion here repeats, so the noise floor is a guess from the band above the motion."
-    return f"{said} Left out as faults of acquisition: {_first_of(d.faults)}." if d.faults else said
+    return f"{said} Beside it, faults of acquisition: {_in_short(d.faults[0], d)}." if d.faults else said
 
 
 def _caveats(d: Diagnosis) -> list[str]:
@@ -215,9 +215,9 @@ def _of_one_kind(d: Diagnosis) -> list[str]:
     return []
 
 
-def _first_of(faults: Sequence[Fault]) -> str:
-    more = f" (and {len(faults) - 1} more in data_faults)" if len(faults) > 1 else ""
-    return f"{faults[0].file}, {faults[0].channel}: {faults[0].what}{more}"
+def _in_short(fault: Fault, d: Diagnosis) -> str:
+    more = f" (and {len(d.faults) - 1} more in data_faults)" if len(d.faults) > 1 else ""
+    return f"{fault.file}, {fault.channel}: {fault.what}{more}"
 
 
 def _finding(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -> str:

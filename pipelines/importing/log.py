@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipelines.errors import InputError, SettingsError
 from pipelines.importing import clock
 from pipelines.importing.clock import Run
-from pipelines.importing.finding import Finding
+from pipelines.importing.finding import Finding, counted
 from pipelines.importing.numbers import numbers
 from pipelines.importing.reading import columns_of, quantity
 from pipelines.importing.sources.source import Columns, Source
@@ -29,6 +29,8 @@ class Channel:
     reading: ReadingSettings
     gain: float
     required: bool
+    enabled: str | None = None
+    """Column that is 0 where the reading says nothing."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,27 @@ class Log:
 
     def quantities(self, run: Run, findings: list[Finding]) -> Columns:
         """Return every channel in SI at the instants of a run, each (n,), NaN where the log has no value."""
-        return {channel.target: self._quantity(channel, run, findings) for channel in self.channels}
+        return {channel.target: self._where_enabled(channel, run, findings) for channel in self.channels}
+
+    def _where_enabled(self, channel: Channel, run: Run, findings: list[Finding]) -> NDArray:
+        values = self._quantity(channel, run, findings)
+        if channel.enabled is None:
+            return values
+        told = self.columns[channel.enabled]
+        if len(told) != self.rows:
+            raise InputError(
+                f"{channel.enabled!r} has {len(told)} rows where the clock has {self.rows}, expected as many"
+            )
+        # What is no number says of no row that the drive was on.
+        off = ~(np.abs(told[run.rows]) > 0.0)
+        if off.all():
+            raise InputError(
+                f"{channel.enabled!r} says of every row that the drive was off; correct joint.enabled in the map"
+            )
+        if off.any():
+            seen = f"{channel.enabled} is 0 in {counted(int(off.sum()), 'row')}: the drive was off"
+            findings.append(Finding(channel.target, seen, "taken for missing"))
+        return np.where(off, np.nan, values)
 
     def _quantity(self, channel: Channel, run: Run, findings: list[Finding]) -> NDArray:
         names = columns_of(channel.reading, channel.where)
@@ -136,8 +158,8 @@ def _channels(settings: ImportMap) -> Iterator[Channel]:
     for i, joint in enumerate(settings.joint):
         for name, reading in joint.readings():
             gain = reading.gain(transmission.TARGETS[name][joint.kind])
-            required = name in ("angle", "torque")
-            yield Channel(joint.joint.column(name), f"joint[{i}].{name}", reading, gain, required)
+            required, enabled = name in ("angle", "torque"), joint.enabled if name == "torque" else None
+            yield Channel(joint.joint.column(name), f"joint[{i}].{name}", reading, gain, required, enabled)
     for i, force in enumerate(settings.force):
         yield Channel(force.target, f"force[{i}]", force, 1.0, required=False)
 
@@ -150,6 +172,8 @@ def _needed(channels: tuple[Channel, ...], time: TimeSettings) -> dict[str, str]
             needed.setdefault(name, channel.where)
         if channel.reading.time is not None:
             needed.setdefault(channel.reading.time, f"{channel.where}.time")
+        if channel.enabled is not None:
+            needed.setdefault(channel.enabled, f"{channel.where.rpartition('.')[0]}.enabled")
     return needed
 
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from pipelines.importing.consistency import integral_agreement, mean_power
 from pipelines.importing.finding import Finding
+from pipelines.mechanics.machine import MECHANISMS
 from pipelines.settings.import_map import ImportMap, JointSettings
 
 ALIKE = 0.5
@@ -26,6 +27,10 @@ def look_at(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Fin
     if len(settings.joint) > 1 and settings.geometry.thigh_length_m is None:
         why = "later stages take that of exoid.toml, or of the paper's leg"
         yield Finding("geometry", "no thigh_length_m, from the first joint's axis to the second's", why)
+    kinds = tuple(joint.kind for joint in settings.joint)
+    if not any(mechanism.kinds == kinds for mechanism in MECHANISMS):
+        seen = f"{', '.join(kinds)}: two revolute ones in series or a single one make a mechanism that exoid knows"
+        yield Finding("joints", seen, "kept; exoid filter takes them, exoid identify and exoid diagnose do not")
 
 
 def _still(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pipelines.contracts import RECORDING, describe, parquet
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
-from pipelines.contracts.provenance import sha256
+from pipelines.contracts.provenance import sha256, told_by
 from pipelines.errors import ContractError, InputError, SettingsError, about
 from pipelines.importing.clock import FASTEST_HZ, SLOWEST_HZ, Run, Sampling
 from pipelines.importing.finding import Finding, counted
@@ -70,10 +70,11 @@ def recordings(path: Path, settings: ImportMap, map_path: Path) -> Iterator[Impo
         provenance = describe(
             inputs=[*_files(path), map_path], config=settings.model_dump(mode="json", exclude_none=True)
         )
+        given = {"source": path.as_posix(), "map": map_path.as_posix()}
         runs = _chosen(log.runs, settings.time.restarts, log.findings)
         for number, run in enumerate(runs, 1):
             suffix = f"_run{number}" if len(runs) > 1 else ""
-            yield from _recordings_of(run, log, settings, wanted, (path, suffix, provenance))
+            yield from _recordings_of(run, log, settings, wanted, (path, suffix, provenance, given))
 
 
 def _files(path: Path) -> list[Path]:
@@ -96,9 +97,9 @@ def _chosen(runs: Sequence[Run], restarts: str, findings: list[Finding]) -> list
 
 
 def _recordings_of(
-    run: Run, log: Log, settings: ImportMap, wanted: Sequence[RecordingSettings], origin: tuple[Path, str, dict]
+    run: Run, log: Log, settings: ImportMap, wanted: Sequence[RecordingSettings], origin: tuple[Path, str, dict, dict]
 ) -> Iterator[Imported]:
-    path, suffix, provenance = origin
+    path, suffix, provenance, given = origin
     findings = [*log.findings, *run.findings]
     columns = log.quantities(run, findings)
     whole = _whole_rows(columns, log.required, findings)
@@ -117,7 +118,8 @@ def _recordings_of(
         metadata = _metadata(settings, recording, cut) | provenance
         in_source = run.rows[whole][rows]
         metadata["imported"] = _account(path, log, run, sampling, findings) | {
-            "rows": [int(in_source[0]), int(in_source[-1])]
+            "given": given,
+            "rows": [int(in_source[0]), int(in_source[-1])],
         }
         name = recording.name.replace("{file}", path.stem).replace("{purpose}", recording.purpose) + suffix
         yield Imported(name, own, metadata, cut, tuple(findings))
@@ -238,11 +240,6 @@ def _metadata(settings: ImportMap, recording: RecordingSettings, sampling: Sampl
 def refuse_to_overwrite(path: Path) -> None:
     """Refuse to put a recording where something else stands: another file, or a recording that was not imported."""
     RECORDING.refuse_place(path)
-    if not path.is_file():
-        return
-    try:
-        _, metadata = parquet.header(path)
-    except ContractError:
-        return
-    if metadata["contract"] == RECORDING.label and "imported" not in metadata:
+    told = told_by(path)
+    if told.get("contract") == RECORDING.label and "imported" not in told:
         raise ContractError(f"{path}: holds a recording that was not imported, not overwritten; choose another folder")

@@ -7,15 +7,10 @@ from typing import Any
 import numpy as np
 
 from pipelines.errors import InputError
-from pipelines.label import effect_labelled, in_words
+from pipelines.label import SHARES, effect_labelled, in_words
 
-SHARES = {
-    "noise_floor": ("noise floor", "noise"),
-    "repeatable_unexplained": ("unexplained, repeats every period", "left"),
-    "not_repeatable": ("unexplained, does not repeat", "wanders"),
-    "unexplained": ("unexplained", "left"),
-}
-"""Keys of the verdict's ``error_budget`` that are no cause: in words, and their colour's name."""
+TONES = {"noise_floor": "noise", "repeatable_unexplained": "left", "not_repeatable": "wanders", "unexplained": "left"}
+"""Names of the colours of what is no cause."""
 CAUSES = 3
 """Colours that there are for causes."""
 
@@ -96,10 +91,11 @@ def budget(verdict: dict[str, Any]) -> list[Bar]:
         causes = [key for key in shares if key not in SHARES]
         for key, share in shares.items():
             start = right if share >= 0 else left
-            tone = SHARES[key][1] if key in SHARES else f"cause{1 + causes.index(key) % CAUSES}"
-            segments.append(
-                Segment(key, share_in_words(key), tone, min(start, start + share), max(start, start + share), share)
-            )
+            tone = TONES[key] if key in TONES else f"cause{1 + causes.index(key) % CAUSES}"
+            words = share_in_words(key)
+            if key == "noise_floor" and share < 0.999 * verdict["noise_floor_nm"][joint] ** 2:
+                words = "noise, all of it below the floor"
+            segments.append(Segment(key, words, tone, min(start, start + share), max(start, start + share), share))
             right, left = (right + share, left) if share >= 0 else (right, left + share)
         found.append(Bar(joint, torque_unit(verdict, joint), tuple(segments)))
     return found
@@ -128,7 +124,7 @@ def torque_unit(verdict: dict[str, Any], joint: str) -> str:
 
 def share_in_words(key: str) -> str:
     """Say what a share of the error is."""
-    return SHARES[key][0] if key in SHARES else label_in_words(key)
+    return SHARES[key] if key in SHARES else label_in_words(key)
 
 
 def label_in_words(label: str) -> str:

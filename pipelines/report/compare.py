@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Any
 
+from pipelines.errors import InputError
+from pipelines.report.acquisition import runs
 from pipelines.report.bars import Fall, cause_label, label_in_words, torque_unit
 from pipelines.report.page import render
 from pipelines.report.parameters import Estimate, estimates
@@ -91,15 +93,24 @@ def titles_of(first: Session, second: Session) -> tuple[str, str]:
 
 
 def compare(first: Session, second: Session, titles: tuple[str, str]) -> Compared:
-    """Lay two sessions side by side."""
+    """Lay two sessions side by side.
+
+    Raises
+    ------
+    InputError
+        Where they are of different machines, whose numbers have nothing to do with each other.
+    """
     pair = (first, second)
+    refuse_different_machines(pair, titles)
     models = list(_models(pair))
+    refuse_different_units(models)
     told: dict[str, Any] = {
         "titles": titles,
-        "machines": [machine(session) for session in pair],
+        "machines": [machine(session, runs(session)) for session in pair],
         "verdicts": [session.verdict for session in pair],
+        "unreadable": [trouble for session in pair for trouble in session.unreadable.values()],
         "statuses": [status(session.verdict) for session in pair],
-        "headlines": [headline(session.verdict) for session in pair],
+        "headlines": [headline(session) for session in pair],
         "models": models,
         # A parameter that both models have is counted once, in the one that is told last and knows most.
         "beyond": models[-1].beyond if models else 0,
@@ -109,6 +120,38 @@ def compare(first: Session, second: Session, titles: tuple[str, str]) -> Compare
     }
     text = render("compare.html", (), (), told, (*first.artifacts, *second.artifacts))
     return Compared(text, told["beyond"], told["judged"])
+
+
+def refuse_different_machines(pair: tuple[Session, Session], titles: tuple[str, str]) -> None:
+    """Refuse sessions whose machines differ in their joints' names or kinds, or in how these are put together."""
+    for what, told in (("", _joints_in_words), ("mechanism ", _mechanism)):
+        one, other = (told(session) for session in pair)
+        if one and other and one != other:
+            raise InputError(
+                f"{titles[0]} is of another machine than {titles[1]} ({what}{one}, and {what}{other}), expected two "
+                "sessions of one machine; compare those"
+            )
+
+
+def _joints_in_words(session: Session) -> str:
+    return ", ".join(f"{joint.name} ({joint.kind})" for joint in session.joints)
+
+
+def _mechanism(session: Session) -> str | None:
+    """Return the name of the mechanism that a session's first model says; None where none does."""
+    told = (one.metadata.get("mechanism") for one in session.of_kind("parameters"))
+    return next((name for name in told if isinstance(name, str)), None)
+
+
+def refuse_different_units(models: Iterable[ModelChanges]) -> None:
+    """Refuse a parameter that has one unit here and another there: a difference would mean nothing."""
+    for model in models:
+        for change in model.changes:
+            if change.first.unit != change.second.unit:
+                raise InputError(
+                    f"{model.files[0]} and {model.files[1]}: {change.words} is in {change.first.unit} and in "
+                    f"{change.second.unit}, expected one unit; compare sessions of one machine"
+                )
 
 
 def _models(pair: tuple[Session, Session]) -> Iterable[ModelChanges]:
@@ -167,9 +210,10 @@ def _errors(pair: tuple[Session, Session]) -> list[tuple[str, list[Fall]]]:
     first, second = (session.verdict for session in pair)
     if not first or not second:
         return []
-    joints = [joint for joint in first["baseline_rmse_nm"] if joint in second["baseline_rmse_nm"]]
-    kinds = (("Rigid body and friction", "baseline_rmse_nm"), ("With the named causes", "extended_rmse_nm"),
-             ("Noise floor", "noise_floor_nm"))  # fmt: skip
+    joints = list(first["baseline_rmse_nm"])
+    kinds = [("Rigid body and friction", "baseline_rmse_nm"), ("Noise floor", "noise_floor_nm")]
+    if first["causes"] or second["causes"]:
+        kinds.insert(1, ("With the named causes", "extended_rmse_nm"))
     return [
         (title, [_fall(joint, first, second, key) for joint in joints])
         for title, key in kinds

@@ -8,9 +8,9 @@ import pandas as pd
 
 from pipelines.contracts import Joint
 from pipelines.report.chart import Chart, Mark, Panel, Role, Series
+from pipelines.report.measured import MODELS, models_of
 from pipelines.report.session import Artifact, Session
 
-WORDS = {"baseline": (Role.BEFORE, "without the causes"), "extended": (Role.AFTER, "with the causes")}
 GAIN = "feedback_gain_nm_s_rad"
 LIMIT = 4.0
 """How many times the largest settled error a panel shows: the start, from rest, would flatten the rest."""
@@ -21,7 +21,7 @@ def loops(session: Session) -> dict[str, Artifact]:
     found = {}
     for model, made in session.simulations_by_model("loop").items():
         ranked = sorted(made, key=lambda one: one.metadata.get("plant", {}).get("run") != "with_human")
-        if ranked:
+        if ranked and model in models_of(session):
             found[model] = ranked[0]
     return found
 
@@ -46,7 +46,7 @@ def _loop_chart(joint: Joint, tables: dict[str, pd.DataFrame], settled: float) -
     for model, frame in tables.items():
         if len(frame) != len(first):
             continue
-        role, words = WORDS[model]
+        role, words = MODELS[model]
         error = 1e3 * frame[joint.column("error")].to_numpy()
         worst = max(worst, float(np.abs(error[frame["time_s"] >= settled]).max(initial=0.0)))
         angles.append(Series(words, frame[joint.column("angle")].to_numpy(), role))
@@ -80,7 +80,7 @@ def _sweep_chart(session: Session, files: dict[str, Path]) -> Chart | None:
     for joint in session.joints:
         curves = tuple(
             Series(
-                WORDS[model][1], 1e3 * table[joint.column("error")].to_numpy(dtype=float), WORDS[model][0], Mark.MEAN
+                MODELS[model][1], 1e3 * table[joint.column("error")].to_numpy(dtype=float), MODELS[model][0], Mark.MEAN
             )
             for model, table in tables.items()
             if table[GAIN].equals(first[GAIN])

@@ -6,11 +6,12 @@ from typing import Any
 
 from pipelines.report.numbers import digits
 from pipelines.report.session import Artifact, Session
+from pipelines.report.symbols import unit
 
 NUMBERS = {
     "condition": "condition number",
-    "scaled_condition": "of unit columns",
-    "log_det": "log det",
+    "scaled_condition": "condition number of its columns scaled to one length",
+    "log_det": "log determinant of the regressor's Gram matrix",
 }
 
 
@@ -22,8 +23,8 @@ class Excitation:
     about: str
     margins: tuple[dict[str, Any], ...]
     """Each with joint, quantity, unit, low, high, lowest, highest and margin."""
-    errors: tuple[tuple[str, float], ...]
-    """Standard error foreseen of each parameter."""
+    errors: tuple[tuple[str, float | None, str], ...]
+    """Each parameter's standard error foreseen, and its unit."""
 
 
 def excitations(session: Session) -> list[Excitation]:
@@ -41,5 +42,5 @@ def _excitation(session: Session, artifact: Artifact) -> Excitation:
         session.shown(artifact.path),
         ", ".join(told),
         tuple(about.get("margins") or ()),
-        tuple((about.get("standard_errors") or {}).items()),
+        tuple((name, error, unit(session, name)) for name, error in (about.get("standard_errors") or {}).items()),
     )

@@ -13,6 +13,9 @@ from pipelines.report.paper import budget_figure, chart_figure, falls_figure
 from pipelines.report.report import charts
 from pipelines.report.session import Session
 
+DPI = 200
+"""Of PNG: what is printed is seen from nearer than a screen."""
+
 Drawings = dict[str, Callable[[], Figure]]
 """What draws each figure, by the name of its file."""
 
@@ -28,7 +31,7 @@ def figures(session: Session) -> Drawings:
 
 def draw(drawn: Drawings, names: Sequence[str], folder: Path, report: Callable[[float], None]) -> None:
     """Write figures as PDF and PNG into a folder; ``report`` hears how many are done."""
-    with plt.rc_context(STYLE):
+    with plt.rc_context(STYLE | {"savefig.dpi": DPI}):
         for number, name in enumerate(names):
             figure = drawn[name]()
             figure.draw_without_rendering()  # its layout is known only then, and `save` measures it

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pipelines.contracts import Joint
 from pipelines.report.chart import Chart, Panel, Role, Series
 from pipelines.report.session import Artifact, Session
+from pipelines.report.standstill import moving
 
 MODELS = {"baseline": (Role.BEFORE, "rigid body and friction"), "extended": (Role.AFTER, "with the causes")}
 """The models of ``residuals/1``, and how charts call them."""
@@ -41,7 +42,7 @@ def torque_charts(session: Session) -> Iterator[Chart]:
 
 
 def _torque_chart(session: Session, run: str, joint: Joint, frame: pd.DataFrame, floor: float | None) -> Chart:
-    quantity, unit = names_of(joint)["torque"], joint.unit("torque")
+    quantity, unit = joint.effort, joint.unit("torque")
     first = frame[frame["model"] == frame["model"].iloc[0]]
     torques, errors = [], []
     for model, (role, words) in models_of(session).items():
@@ -76,10 +77,10 @@ def angle_charts(session: Session) -> Iterator[Chart]:
 
 
 def replayed(session: Session, what: str = "windows") -> dict[str, dict[str, Artifact]]:
-    """Return the replays of a kind (see ``session.simulated``), by run and model."""
+    """Return the replays of a kind (see ``session.simulated``), by run and model that is to be drawn."""
     found: dict[str, dict[str, Artifact]] = {}
     for model, replays in session.simulations_by_model(what).items():
-        for one in replays:
+        for one in replays if model in models_of(session) else ():
             source = session.recorded(one)
             run = source.path.name if source else one.inputs[-1]["name"]
             found.setdefault(run, {}).setdefault(model, one)
@@ -106,29 +107,53 @@ SCORES = {
 
 
 def scores(session: Session, run: str) -> list[Score]:
-    """Return what the replays' files say of their errors, joint by joint."""
-    found = []
+    """Return how far off each model is in a run: its torque, and what the replays' files say, joint by joint."""
+    found = [score for joint in session.joints for score in _torque_scores(session, run, joint)]
     for what, rows in SCORES.items():
         replays = replayed(session, what).get(run, {})
         for key, quantity, words, times, prefix in rows if replays else ():
             for joint in session.joints:
                 told = [replays[model].metadata.get(key, {}).get(joint.name) if model in replays else None
                         for model in models_of(session)]  # fmt: skip
-                name, drive = names_of(joint)[quantity], names_of(joint)["torque"]
-                where = f"{joint.name} {name}, {words.format(drive=drive)}, {prefix}{joint.unit(quantity)}"
+                name = joint.place if quantity == "angle" else joint.effort
+                where = f"{joint.name} {name}, {words.format(drive=joint.effort)}, {prefix}{joint.unit(quantity)}"
                 found.append(Score(where, tuple(None if value is None else times * value for value in told)))
+                if what == "windows":
+                    found += _while_moving(session, replays, joint, where)
     return [score for score in found if any(value is not None for value in score.values)]
 
 
-def names_of(joint: Joint) -> dict[str, str]:
-    """Return what a joint's angle and torque are called: position and force where it slides."""
-    slides = joint.kind == "prismatic"
-    return {"angle": "position" if slides else "angle", "torque": "force" if slides else "torque"}
+def _torque_scores(session: Session, run: str, joint: Joint) -> Iterator[Score]:
+    """Yield a run's rms torque error away from reversals, and in all blocks that were fitted."""
+    if session.residuals is None:
+        return
+    rows = session.residuals.frame
+    rows = rows[rows["file"] == run]
+    for words, chosen in (("away from reversals", rows[rows["scored"]]), ("reversals included", rows)):
+        left = [chosen.loc[chosen["model"] == model, joint.column("residual")] for model in models_of(session)]
+        values = tuple(float(np.sqrt(np.mean(e**2))) if len(e) else None for e in left)
+        yield Score(f"{joint.name} {joint.effort}, computed, {words}, {joint.unit('torque')}", values)
+
+
+def _while_moving(session: Session, replays: dict[str, Artifact], joint: Joint, where: str) -> Iterator[Score]:
+    """Yield the error in those seconds in which the joint never stands, where there are such and others."""
+    values: list[float | None] = []
+    kept = of = 0
+    for model in models_of(session):
+        frame = session.table(replays[model]).frame if model in replays else None
+        chosen = frame[moving(frame, joint)] if frame is not None else None
+        if frame is None or chosen is None or not len(chosen):
+            values.append(None)
+            continue
+        values.append(1e3 * float(np.sqrt(np.mean(chosen[joint.column("error")] ** 2))))
+        kept, of = chosen["window"].nunique(), frame["window"].nunique()
+    if 0 < kept < of:
+        yield Score(f"{where}: of these the {kept} of {of} in which it never stands", tuple(values))
 
 
 def _angle_chart(run: str, joint: Joint, tables: dict[str, pd.DataFrame]) -> Chart:
     first = next(iter(tables.values()))
-    where, drive = names_of(joint)["angle"], names_of(joint)["torque"]
+    where, drive = joint.place, joint.effort
     angles, errors = [], []
     for model, frame in tables.items():
         if len(frame) != len(first):

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pipelines.plots import BLUE, GREY, ORANGE
+from pipelines.plots import BLUE, CAUSES, GREY, NOISE, WANDERS
 from pipelines.report.bars import Bar, Fall
 from pipelines.report.chart import Chart, Mark, Panel, Role, Series
 from pipelines.report.numbers import digits
@@ -19,9 +19,7 @@ ROWS = 6000
 """Of a chart, at most: more no printer resolves, and a PDF of them opens slowly."""
 COLOURS = {Role.MEASURED: "black", Role.WANTED: "black", Role.BEFORE: GREY, Role.AFTER: BLUE}
 WIDTHS = {Role.MEASURED: 0.7, Role.WANTED: 0.7, Role.BEFORE: 1.6, Role.AFTER: 0.9}
-TONES = {
-    "noise": "#d5dae1", "left": BLUE, "wanders": "#93b4f5", "cause1": ORANGE, "cause2": "#f59e0b", "cause3": "#7c2d12",
-}  # fmt: skip
+TONES = {"noise": NOISE, "left": BLUE, "wanders": WANDERS} | {f"cause{n}": c for n, c in enumerate(CAUSES, 1)}
 WIDE, NARROW = 7.2, 3.6
 """Inches: of two columns of a paper, and of one."""
 

@@ -1,11 +1,12 @@
 """The identified parameters with their intervals, model by model."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pipelines.contracts import Table
 from pipelines.report.session import Artifact, Session
+from pipelines.report.symbols import meaning
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,8 @@ class Estimate:
     high: float | None
     """Ends of the 95 % interval; None where there is none."""
     std_error: float | None = None
+    meaning: str = ""
+    """What it is, in words; nothing where nobody here knows."""
 
     @property
     def key(self) -> tuple[str, str, str, str]:
@@ -105,7 +108,7 @@ def _model(session: Session, artifact: Artifact, title: str) -> Model:
         file=session.shown(artifact.path),
         title=title,
         method=_method(about.get("method")),
-        estimates=tuple(estimates(table)),
+        estimates=tuple(replace(e, meaning=meaning(session, e.effect, e.joint, e.name)) for e in estimates(table)),
         collinear=tuple(map(str, about.get("collinear") or ())),
         unrealizable=None if unrealizable is None else tuple(map(str, unrealizable)),
         validation=about.get("validation") or {},
@@ -118,10 +121,12 @@ def estimates(table: Table) -> list[Estimate]:
 
 
 def _estimate(row: Mapping[str, Any]) -> Estimate:
-    numbers = [None if row[key] is None or row[key] != row[key] else float(row[key])
-               for key in ("ci95_low", "ci95_high", "std_error")]  # fmt: skip
+    low, high, error = (None if row[key] is None or row[key] != row[key] else float(row[key])
+               for key in ("ci95_low", "ci95_high", "std_error"))  # fmt: skip
     joint, run = (row[key] if isinstance(row[key], str) else "" for key in ("joint", "run"))
-    return Estimate(row["effect"], row["name"], row["symbol"], joint, run, row["unit"], float(row["value"]), *numbers)
+    return Estimate(
+        row["effect"], row["name"], row["symbol"], joint, run, row["unit"], float(row["value"]), low, high, error
+    )
 
 
 def _method(method: Any) -> str:

@@ -1,6 +1,7 @@
 """Where everything on the page comes from: files, hashes, settings, and the command lines that make them again."""
 
 import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,11 @@ from pipelines.settings import Experiment
 
 SECTIONS = ("mechanism", "design", "filter", "identify", "simulate")
 """Sections of exoid.toml that a stage's file repeats; runs and rigs stand in the recordings."""
+
+
+FEW = 3
+"""Files that a warning names."""
+AGAIN = "`exoid run` or `make` makes again what depends on it"
 
 
 @dataclass(frozen=True)
@@ -56,7 +62,7 @@ def origins(session: Session) -> list[Origin]:
 
 
 def _input(session: Session, told: dict[str, str]) -> Input:
-    if any(one.sha256 == told["sha256"] for one in session.artifacts):
+    if session.found(told["name"], told["sha256"]):
         state = "found"
     else:
         state = "changed" if any(one.path.name == told["name"] for one in session.artifacts) else "elsewhere"
@@ -64,13 +70,34 @@ def _input(session: Session, told: dict[str, str]) -> Input:
 
 
 def stale(session: Session) -> list[str]:
-    """Return a sentence for each file that was made of another version of what the session holds."""
+    """Return a sentence for each file of which other files were made when it was not yet as it is here."""
+    made: dict[str, list[str]] = {}
+    for origin in origins(session):
+        for one in origin.inputs:
+            if one.state == "changed":
+                made.setdefault(one.name, []).append(origin.file)
     return [
-        f"{origin.file} was made of another version of {one.name} than the one here"
-        for origin in origins(session)
-        for one in origin.inputs
-        if one.state == "changed"
+        f"{name} has changed since {_few(files)} {'was' if len(files) == 1 else 'were'} made of it; {AGAIN}"
+        for name, files in made.items()
     ]
+
+
+def _few(files: Sequence[str]) -> str:
+    """Return files in words: some by name, the others by number."""
+    more = [f"{len(files) - FEW} more files"] if len(files) > FEW else []
+    *most, last = [*files[:FEW], *more]
+    return f"{', '.join(most)} and {last}" if most else last
+
+
+def software(session: Session) -> list[tuple[str, list[str]]]:
+    """Return each set of versions that files were made with, in words, and these files; nothing where none tells."""
+    found: dict[str, list[str]] = {}
+    for one in session.artifacts:
+        told = one.metadata.get("software")
+        if isinstance(told, dict) and told:
+            words = ", ".join(f"{'Python' if name == 'python' else name} {version}" for name, version in told.items())
+            found.setdefault(words, []).append(session.shown(one.path))
+    return list(found.items())
 
 
 def settings(session: Session) -> dict[str, dict[str, Any]]:
@@ -88,15 +115,20 @@ def resolved(artifact: Artifact) -> dict[str, dict[str, Any]]:
 
 
 def changed_settings(session: Session) -> list[str]:
-    """Return a sentence for each file whose settings are no longer those of the session's exoid.toml."""
+    """Return a sentence for each section of exoid.toml that files were made with when it was another."""
     if session.config is None:
         return []
     now = Experiment.load(session.config)
+    made: dict[str, list[str]] = {}
+    for one in session.artifacts:
+        for name, told in resolved(one).items():
+            is_now = getattr(now, name).model_dump(mode="json")
+            if any(told[key] != value for key, value in is_now.items() if key in told):
+                made.setdefault(name, []).append(session.shown(one.path))
     return [
-        f"{session.shown(one.path)} was made with another [{name}] than {session.config.name} has now"
-        for one in session.artifacts
-        for name, told in resolved(one).items()
-        if any(told[key] != value for key, value in getattr(now, name).model_dump(mode="json").items() if key in told)
+        f"{_few(files)} {'was' if len(files) == 1 else 'were'} made with another [{name}] than {session.config.name} "
+        f"has now; {AGAIN}"
+        for name, files in made.items()
     ]
 
 
@@ -111,7 +143,9 @@ class Command:
 
 def commands(session: Session) -> list[Command]:
     """Return the command lines that make the session's files again, in their order."""
+    named = session.config and session.config.parent not in session.folders
     found = [made for kind in _MADE_BY for one in session.of_kind(kind) if (made := _MADE_BY[kind](session, one))]
+    found.append((["report", *map(str, session.folders), *(["--config", str(session.config)] if named else [])], False))
     lines = dict.fromkeys((shlex.join(["exoid", *words]), needs) for words, needs in found)
     return [Command(line, needs) for line, needs in lines]
 
@@ -129,8 +163,7 @@ def _config(session: Session, artifact: Artifact, *, always: bool = False) -> Wo
 
 
 def _path_of(session: Session, told: dict[str, str]) -> str:
-    same = [one for one in session.artifacts if one.sha256 == told["sha256"]]
-    return str(same[0].path) if same else told["name"]
+    return str(session.found(told["name"], told["sha256"]) or told["name"])
 
 
 def _inputs(session: Session, artifact: Artifact) -> list[str]:
@@ -149,14 +182,25 @@ def _design(session: Session, artifact: Artifact) -> Words | None:
 def _record(session: Session, artifact: Artifact) -> Words | None:
     inputs = _inputs(session, artifact)
     if "imported" in artifact.metadata:
-        maps = [name for name in inputs if name.endswith(".toml")]
-        sources = [name for name in inputs if name not in maps]
-        return ["import", *sources, *(["--map", maps[0]] if maps else []), "-o", _folder(artifact.path)], False
+        return _import(session, artifact, inputs), False
     run = (artifact.metadata.get("config") or {}).get("run") or {}
     if not run or not inputs:
         return None
     config, needs = _config(session, artifact, always=True)
     return ["acquire", *config, "--run", run["name"], "--trajectory", inputs[0], "-o", str(artifact.path)], needs
+
+
+def _import(session: Session, artifact: Artifact, inputs: list[str]) -> list[str]:
+    """Return the words that import a log: where it lies in these folders, else where the command had it."""
+    told, given = artifact.inputs, artifact.metadata["imported"].get("given") or {}
+    names = [name for name, one in zip(inputs, told, strict=True) if name == one["name"]]  # not in these folders
+    maps = [name for name in inputs if name.endswith(".toml")]
+    sources = [name for name in inputs if name not in maps]
+    if any(name in names for name in sources) and given:
+        sources = [given["source"]]
+    if maps and maps[0] in names and given:
+        maps = [given["map"]]
+    return ["import", *sources, *(["--map", maps[0]] if maps else []), "-o", _folder(artifact.path)]
 
 
 def _filter(session: Session, artifact: Artifact) -> Words | None:

@@ -8,9 +8,10 @@ import numpy as np
 
 from pipelines.contracts import Joint
 from pipelines.report import provenance
+from pipelines.report.acquisition import Run
 from pipelines.report.acquisition import runs as recordings
 from pipelines.report.animation import animations
-from pipelines.report.bars import budget, cause_label, causes_in_words, falls, label_in_words, torque_unit
+from pipelines.report.bars import budget, cause_label, causes_in_words, falls, label_in_words
 from pipelines.report.chart import Chart, thinned_alike
 from pipelines.report.control import control_charts, loops
 from pipelines.report.excitation import excitations
@@ -18,7 +19,6 @@ from pipelines.report.measured import (
     Score,
     angle_charts,
     models_of,
-    names_of,
     replayed,
     run_names,
     scores,
@@ -29,6 +29,9 @@ from pipelines.report.page import LARGEST_BYTES, VALUES, indented, render
 from pipelines.report.parameters import models, side_by_side
 from pipelines.report.residual import against, residual_charts, telling
 from pipelines.report.session import Session
+from pipelines.report.standstill import worse
+from pipelines.report.symbols import terms
+from pipelines.report.tiles import tiles, worst_joint
 
 MOST_CANDIDATES = 12
 """In sight; the others unfold."""
@@ -76,22 +79,11 @@ def charts(session: Session, values: int | None = VALUES) -> Charts:
 
 
 def _hero(session: Session, residuals: Sequence[Chart]) -> Chart | None:
-    joint = _worst(session)
+    joint = worst_joint(session)
     if joint is None:
         return None
     key = f"residual-{joint.name}-{telling(session, joint).replace('_', '-')}"
     return next((replace(chart, key="verdict") for chart in residuals if chart.key == key), None)
-
-
-def _worst(session: Session) -> Joint | None:
-    """Return the joint that the first cause gains most at, or that is furthest above its floor."""
-    verdict = session.verdict
-    if not verdict:
-        return None
-    before, floor = verdict["baseline_rmse_nm"], verdict["noise_floor_nm"]
-    name = verdict["causes"][0]["gain"].get("joint") if verdict["causes"] else None
-    name = name or max(before, key=lambda joint: before[joint] / floor[joint])
-    return next((joint for joint in session.joints if joint.name == name), None)
 
 
 def report(session: Session, title: str | None = None) -> str:
@@ -104,16 +96,21 @@ def report(session: Session, title: str | None = None) -> str:
 
 def _page(session: Session, title: str | None, values: int) -> str:
     drawn, verdict, shown = charts(session, values), session.verdict, animations(session)
+    made, taken = models(session), recordings(session)
     quantity = _quantity(session)
     told = {
         "title": title or session.name,
-        "machine": machine(session),
+        "machine": machine(session, taken),
         "status": status(verdict),
-        "headline": headline(verdict),
+        "headline": headline(session),
         "verdict": verdict,
         "quantity": quantity,
+        "torque_unit": session.joints[0].unit("torque") if session.joints else "N·m",
+        "terms": terms(session),
+        "mask": (verdict or {}).get("scoring", {}).get("mask") or "slow motion",
         "warnings": [*provenance.stale(session), *provenance.changed_settings(session)],
-        "tiles": _tiles(session, verdict) if verdict else [],
+        "tiles": tiles(session),
+        "worse": worse(session),
         "falls": falls(verdict) if verdict else [],
         "budget": budget(verdict) if verdict else [],
         "hero": drawn.hero,
@@ -123,31 +120,33 @@ def _page(session: Session, title: str | None, values: int) -> str:
         "candidates": _candidates(session),
         "most_candidates": MOST_CANDIDATES,
         "has_baseline": bool(session.baselines),
-        "models": models(session),
-        "parameters": side_by_side(models(session)),
+        "models": made,
+        "parameters": side_by_side(made),
         "excitations": excitations(session),
-        "recordings": recordings(session),
+        "recordings": taken,
         "control": _control(verdict) if verdict else None,
         "control_is_compared": "extended" in loops(session),
         "loops": drawn.control,
         "is_leg": len(session.joints) == 2,
         "animations": shown,
-        "unreadable": session.unreadable,
+        "damaged_verdict": session.has_damaged_verdict,
+        "unreadable": list(session.unreadable.values()),
         "commands": provenance.commands(session),
         "settings": indented(provenance.settings(session)),
+        "software": provenance.software(session),
         "origins": provenance.origins(session),
     }
     return render("report.html", drawn.all, shown, told, session.artifacts)
 
 
 def _quantity(session: Session) -> str:
-    return names_of(session.joints[0])["torque"] if session.joints else "torque"
+    return session.joints[0].effort if session.joints else "torque"
 
 
-def machine(session: Session) -> str:
-    """Return joints, rig, subject and session in words."""
+def machine(session: Session, taken: Sequence[Run]) -> str:
+    """Return joints, and rig, subject and session of the recordings, in words."""
     joints = " and ".join(joint.name for joint in session.joints)
-    about = list(dict.fromkeys(one.about for one in recordings(session) if one.about))
+    about = list(dict.fromkeys(one.about for one in taken if one.about))
     return " · ".join(filter(None, (joints, "; ".join(about[:3]))))
 
 
@@ -166,88 +165,17 @@ def is_spoilt(verdict: dict[str, Any]) -> bool:
     return verdict["summary"].startswith("Acquisition, not physics")
 
 
-def headline(verdict: dict[str, Any] | None) -> str:
+def headline(session: Session) -> str:
     """Return what was found, as short as can be."""
+    verdict = session.verdict
     if not verdict:
-        return "Not diagnosed yet"
+        return "The verdict cannot be read" if session.has_damaged_verdict else "Not diagnosed yet"
     if is_spoilt(verdict):
         return "The recordings are at fault, not the model"
     if verdict["causes"]:
         words = causes_in_words(verdict["causes"])
         return f"The simulation misses {words}"
     return HEADLINES.get(verdict["status"], verdict["status"].replace("_", " "))
-
-
-@dataclass(frozen=True)
-class Tile:
-    """One number of the first screen."""
-
-    title: str
-    big: str
-    unit: str
-    small: str
-
-
-def _tiles(session: Session, verdict: dict[str, Any]) -> list[Tile]:
-    """Return what a hurried reader wants: how sure, how much, how much is left, and what simulations make of it."""
-    tiles = [tile for cause in verdict["causes"][:2] for tile in _cause_tiles(verdict, cause)]
-    for fall in falls(verdict):
-        if fall.unexplained is not None:
-            after = "" if fall.after is None else f" → {digits(fall.after / fall.floor)}"
-            big = f"{digits(fall.before / fall.floor)}{after}"
-            tiles.append(Tile(f"{fall.joint} error", big, "× floor", "1 would be noise alone"))
-    return [*tiles, *_simulation_tiles(session, verdict), *_loop_tiles(session)]
-
-
-def _cause_tiles(verdict: dict[str, Any], cause: dict[str, Any]) -> list[Tile]:
-    gain, (low, high) = cause["gain"]["rmse_reduction_nm"], cause["gain"]["ci95"]
-    joint = cause["gain"].get("joint") or cause["joint"]
-    unit, ties = torque_unit(verdict, joint), len(cause["indistinguishable_from"])
-    words = label_in_words(cause_label(cause))
-    return [
-        Tile(
-            "probability" + (", with its ties" if ties else ""),
-            f"{100 * cause['probability']:.0f}",
-            "%",
-            words + (f", or one of {ties} that these data cannot tell from it" if ties else ""),
-        ),
-        Tile(
-            f"gain at the {joint}",
-            digits(-gain),
-            unit,
-            f"of {digits(verdict['baseline_rmse_nm'][joint])} {unit}; 95 %: {digits(-high)} … {digits(-low)}",
-        ),
-    ]
-
-
-def _simulation_tiles(session: Session, verdict: dict[str, Any]) -> list[Tile]:
-    """Return how far simulations of a second stray, at the joint that matters most."""
-    joint = _worst(session)
-    before = verdict["baseline_simulation_rmse_rad"].get(joint.name) if joint else None
-    if not joint or before is None:
-        return []
-    after = verdict["extended_simulation_rmse_rad"][joint.name] if verdict["causes"] else None
-    big = digits(1e3 * before) + ("" if after is None else f" → {digits(1e3 * after)}")
-    return [
-        Tile(f"{joint.name}, simulated for 1 s", big, f"m{joint.unit('angle')}", "rms, driven by what was recorded")
-    ]
-
-
-def _loop_tiles(session: Session) -> list[Tile]:
-    """Return how far the drives' simulated torque is off, of the run where naming the causes gains most."""
-    joint, key = _worst(session), "closed_loop_rmse_nm"
-    pairs = [
-        [one[model].metadata[key][joint.name] for model in ("baseline", "extended")]
-        for one in replayed(session, "drives").values()
-        if joint and len(one) == 2 and all(joint.name in made.metadata.get(key, {}) for made in one.values())
-    ]
-    if not joint or not pairs:
-        return []
-    before, after = max(pairs, key=lambda pair: pair[0] - pair[1])
-    small = f"rms error of the simulated {names_of(joint)['torque']}"
-    return [
-        Tile(f"{joint.name}, in the drives' loop", f"{digits(before)} → {digits(after)}", joint.unit("torque"), small)
-    ]
 
 
 @dataclass(frozen=True)
@@ -362,15 +290,20 @@ def _candidates(session: Session) -> list[dict[str, Any]]:
                 for joint in session.joints
                 if np.isfinite(row[joint.column("rmse_after")])
             ],
-            "gain": (
-                f"{digits(row['gain_nm'])} ({digits(row['gain_low_nm'])} … {digits(row['gain_high_nm'])})"
-                if np.isfinite(row["gain_nm"])
-                else "–"
-            ),
+            "gain": _gain(row),
             "reason": row["reason"],
         }
         for row in rows
     ]
+
+
+def _gain(row: dict[Any, Any]) -> str:
+    """Return a gain with its interval, which one short run cannot have."""
+    if not np.isfinite(row["gain_nm"]):
+        return "–"
+    low, high = row["gain_low_nm"], row["gain_high_nm"]
+    interval = f" ({digits(low)} … {digits(high)})" if high > low else " (no interval)"
+    return digits(row["gain_nm"]) + interval
 
 
 def _control(verdict: dict[str, Any]) -> dict[str, Any] | None:
@@ -382,9 +315,10 @@ def _control(verdict: dict[str, Any]) -> dict[str, Any] | None:
             "error": {joint: 1e3 * value for joint, value in told[key]["tracking_rmse_rad"].items()},
             "torque": told[key]["peak_torque_nm"],
         }
-        for key, words in (("without", "without the causes"), ("with", "with the causes"))
-        if told.get(key)
+        for key, words in (("without", "rigid body and friction"), ("with", "with the causes"))
+        if told.get(key) and (key == "without" or verdict["causes"])
     ]
     if not rows:
         return None
-    return {"run": told["run"].replace("_", " "), "joints": list(rows[0]["torque"]), "rows": rows}
+    return {"run": told["run"].replace("_", " "), "joints": list(rows[0]["torque"]), "rows": rows,
+            "settled_s": (told.get("controller") or {}).get("settled_after_s")}  # fmt: skip

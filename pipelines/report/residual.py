@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
 from pipelines.report.chart import GAP, Chart, Mark, Panel, Series
-from pipelines.report.measured import MODELS, models_of, names_of
+from pipelines.report.measured import MODELS, models_of
 from pipelines.report.session import Session
+from pipelines.signals.binned_mean import FEWEST, binned_mean
 
-BINS, FEWEST = 40, 8
-"""Of a running mean, and the blocks that a bin needs to have one."""
 DOTS = 2500
 """At most, or a cloud hides its shape."""
 TALLEST = 99.5
@@ -45,7 +44,7 @@ def against(session: Session, joint: Joint) -> list[Against]:
 
 def _along(joint: Joint, quantity: str, variable: str) -> Against:
     words = variable.removeprefix("other_")
-    words = names_of(joint).get(words, words)
+    words = joint.place if words == "angle" else words
     title = f"{joint.name} {words}"
     return Against(variable, title, f"{title}, {joint.unit(quantity)}", joint.column(quantity))
 
@@ -73,7 +72,7 @@ def _chart(session: Session, frame: pd.DataFrame, joint: Joint, one: Against, re
     rows = {model: table for model, table in rows.items() if len(table)}
     x = next(iter(rows.values()))[one.column].to_numpy() if rows else np.zeros(0)
     step = max(1, len(x) // DOTS)
-    middles = _bins(x)[0] if len(x) else x
+    middles = _mean_along(x, x)[0] if len(x) else x
     places = np.concatenate([x[::step], middles])
     order = np.argsort(places, kind="stable")
     clouds, means = [], []
@@ -84,39 +83,30 @@ def _chart(session: Session, frame: pd.DataFrame, joint: Joint, one: Against, re
             continue
         dots, line = np.full((2, len(places)), np.nan)
         dots[: len(places) - len(middles)] = y[::step]
-        line[len(places) - len(middles) :] = binned_mean(x, y)[1]
+        line[len(places) - len(middles) :] = _mean_along(x, y)[1]
         clouds.append(Series("", dots[order], role, Mark.DOTS))
         means.append(Series(words, line[order], role, Mark.MEAN))
-    quantity = names_of(joint)["torque"]
+    quantity = joint.effort
     floor = (session.verdict or {}).get("noise_floor_nm", {}).get(joint.name)
     return Chart(
         key=f"residual-{joint.name}-{one.variable.replace('_', '-')}",
         title=f"{joint.name} error against {one.title}",
-        caption="Dots are blocks of validation runs away from reversals, lines their running means; the band is the "
-        "noise floor.",
+        caption="Dots are blocks of validation runs away from reversals, lines their running means, broken where "
+        f"blocks are fewer than {FEWEST}; the band is the noise floor.",
         x_label=one.label,
         x=places[order],
         panels=(Panel(f"{joint.name} {quantity} error, {joint.unit('torque')}", (*clouds, *means), floor, reach),),
     )
 
 
-def binned_mean(x: NDArray, y: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the middles of equally wide bins along ``x`` (n,) and the mean of ``y`` in each; infinite where few are.
+def _mean_along(x: NDArray, y: NDArray) -> tuple[NDArray, NDArray]:
+    """Return a running mean of y (n,) along x (n,), with a ``GAP`` where blocks are few.
 
     The bins span all but the outermost 0.5 % at either end, where a mean would be of hardly any.
     """
-    middles, number = _bins(x)
-    inside = (number >= 0) & (number < BINS)
-    count = np.bincount(number[inside], minlength=BINS)
-    total = np.bincount(number[inside], y[inside], BINS)
-    return middles, np.where(count >= FEWEST, total / np.maximum(count, 1), GAP)
-
-
-def _bins(x: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the middles of the bins, and the number of the bin of each x: below nought, or BINS and more, of none."""
     low, high = np.percentile(x, [0.5, 99.5])
-    edges = np.linspace(low, high + 1e-12, BINS + 1)
-    return 0.5 * (edges[1:] + edges[:-1]), np.searchsorted(edges, x, side="right") - 1
+    middles, means = binned_mean(x, y, low, high + 1e-12)
+    return middles, np.where(np.isnan(means), GAP, means)
 
 
 def telling(session: Session, joint: Joint) -> str:

@@ -1,6 +1,6 @@
 """A session as its folders hold it: every file of exoid's, known by its contract and not by its name."""
 
-import json
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -8,10 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.contracts import Joint, Table, contract_of, joints_of, parquet
+from pipelines.contracts import verdict as verdicts
 from pipelines.contracts.provenance import sha256
 from pipelines.errors import ContractError, InputError
 
 DOCUMENTS = ("verdict/1", "detectability/1")
+OURS = re.compile(r'"contract"\s*:\s*"(?:verdict|detectability)/')
+"""What a damaged document of exoid's still says of itself."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +49,8 @@ class Session:
 
     folders: tuple[Path, ...]
     artifacts: tuple[Artifact, ...]
-    unreadable: tuple[str, ...] = ()
-    """What is wrong with files that look like exoid's, a line each."""
+    unreadable: dict[Path, str] = field(default_factory=dict)
+    """What is wrong with each file that looks like exoid's."""
     config: Path | None = None
     _tables: dict[Path, Table] = field(default_factory=dict, repr=False, compare=False)
 
@@ -59,6 +62,17 @@ class Session:
     def of_kind(self, kind: str) -> list[Artifact]:
         """Return the files of one contract, in the order of their paths."""
         return [one for one in self.artifacts if one.kind == kind]
+
+    def found(self, name: str, digest: str) -> Path | None:
+        """Return the file of these bytes, whoever made it; None where the folders hold none of them under that name."""
+        ours = (one.path for one in self.artifacts if one.sha256 == digest)
+        return next(ours, None) or next((p for p in self._others if p.name == name and sha256(p) == digest), None)
+
+    @cached_property
+    def _others(self) -> list[Path]:
+        """Every file of the folders that no stage wrote: maps, logs, settings."""
+        known = {one.path for one in self.artifacts}
+        return [path for folder in self.folders for path in _below(folder) if path not in known]
 
     def shown(self, path: Path) -> str:
         """Return a path as the page writes it: below the session's folder, with slashes."""
@@ -98,7 +112,12 @@ class Session:
     @cached_property
     def verdict(self) -> dict[str, Any] | None:
         """What the diagnosis says; None where none was made."""
-        return json.loads(self.verdict_file.path.read_text(encoding="utf-8")) if self.verdict_file else None
+        return verdicts.read(self.verdict_file.path) if self.verdict_file else None
+
+    @property
+    def has_damaged_verdict(self) -> bool:
+        """Whether there is a verdict that cannot be read, and no other."""
+        return not self.verdict_file and any(path.name == "verdict.json" for path in self.unreadable)
 
     @cached_property
     def extended(self) -> Artifact | None:
@@ -163,7 +182,7 @@ def simulated(artifact: Artifact) -> str:
 def find(folders: Sequence[Path], config: Path | None = None) -> Session:
     """Return what some folders hold, or refuse folders that hold nothing of exoid's."""
     artifacts: dict[Path, Artifact] = {}
-    unreadable = []
+    unreadable: dict[Path, str] = {}
     for folder in folders:
         if not folder.is_dir():
             what = "is a file" if folder.exists() else "no such folder"
@@ -174,26 +193,30 @@ def find(folders: Sequence[Path], config: Path | None = None) -> Session:
             try:
                 found = _artifact(path)
             except ContractError as error:
-                unreadable.append(str(error))
+                unreadable[path] = str(error)
                 continue
             if found:
                 artifacts.setdefault(path.resolve(), found)
     if config is None:
         config = next((path for folder in folders if (path := folder / "exoid.toml").is_file()), None)
     if not artifacts:
-        told = f" ({unreadable[0]})" if unreadable else ""
+        told = f" ({next(iter(unreadable.values()))})" if unreadable else ""
         where = ", ".join(map(str, folders))
         raise InputError(
             f"{where}: no file of exoid's in it{told}, expected recordings, models or a verdict; "
             "name the folder that `make` or `exoid diagnose` wrote to"
         )
-    return Session(tuple(folders), tuple(artifacts.values()), tuple(unreadable), config)
+    return Session(tuple(folders), tuple(artifacts.values()), unreadable, config)
 
 
 def _files(folder: Path) -> Iterator[Path]:
+    return (path for path in _below(folder) if path.suffix in (".parquet", ".json"))
+
+
+def _below(folder: Path) -> Iterator[Path]:
     for path in sorted(folder.rglob("*")):
         hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
-        if path.suffix in (".parquet", ".json") and not hidden and path.is_file():
+        if not hidden and path.is_file():
             yield path
 
 
@@ -207,10 +230,14 @@ def _artifact(path: Path) -> Artifact | None:
 
 def _document(path: Path) -> Artifact | None:
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, UnicodeDecodeError):
+        content = verdicts.parsed(path)
+    except ContractError:
+        if path.name == "verdict.json" or OURS.search(path.read_text(encoding="utf-8", errors="replace")):
+            raise
         return None  # somebody else's
     contract = content.get("contract") if isinstance(content, dict) else None
     if contract not in DOCUMENTS:
         return None
+    if contract == "verdict/1":
+        verdicts.check(content, str(path))
     return Artifact(path, contract, content.get("provenance", {}), sha256(path))

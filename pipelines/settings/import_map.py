@@ -15,6 +15,7 @@ from pipelines.settings import transmission
 from pipelines.settings.base import Settings, load_toml
 from pipelines.settings.rig import GeometrySettings
 from pipelines.settings.units import unit_named, units_of
+from pipelines.validation import closest
 
 LARGEST_ZERO = 1e12
 
@@ -154,6 +155,10 @@ class JointSettings(Settings):
         description="Its name; a leg's are hip and knee, in this order."
     )
     kind: Kind = Field("revolute", description="revolute turns, prismatic slides.")
+    enabled: str | None = Field(
+        None,
+        description="Column that is 0 (false) while the drive is off; rows whose torque so says nothing are left out.",
+    )
     angle: JointReadingSettings = Field(description="Measured angle, or position of a prismatic joint.")
     torque: JointReadingSettings = Field(description="What the drive delivers at the joint: torque, or force.")
     reference: JointReadingSettings | None = Field(None, description="Commanded angle or position.")
@@ -289,4 +294,9 @@ def _refuse_other_units(name: str, dimensions: list[str]) -> None:
     unit = unit_named(name)
     if unit is None or unit.dimension not in dimensions:
         what = f", a unit of {unit.dimension}" if unit else ""
-        raise ValueError(f"found {name!r}{what}, expected one of {dimensions[0]}: {', '.join(units_of(*dimensions))}")
+        known = units_of(*dimensions)
+        near = closest(name, known)
+        raise ValueError(
+            f"found {name!r}{what}, expected one of {dimensions[0]}: {', '.join(known)}"
+            + (f"; did you mean {near}?" if near else "")
+        )

@@ -1,6 +1,6 @@
 """From what was measured at a motor to what it is at the joint: encoder, gear, screw, torque constant."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from math import pi, prod
 
@@ -89,6 +89,11 @@ def _what_is_wrong(ways: list[tuple[Step, ...]], given: set[str]) -> str:
     wanted = [{step.key for step in way} for way in ways]
     for keys in wanted:
         if keys >= given:
-            return f"needs {' and '.join(sorted(keys - given))}; add it from the data sheet"
-    spare = min((sorted(given - keys) for keys in wanted), key=len)
-    return f"has no use for {' and '.join(spare)}; remove it, or correct the unit"
+            instead = f", or {_both(wanted[0] - given)} in place of {_both(given)}" if given - wanted[0] else ""
+            return f"needs {_both(keys - given)}{instead}; add it from the data sheet"
+    spare = min((given - keys for keys in wanted), key=len)
+    return f"has no use for {_both(spare)}; remove it, or correct the unit"
+
+
+def _both(keys: Collection[str]) -> str:
+    return " and ".join(sorted(keys))

@@ -11,6 +11,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
+from pipelines.contracts.beside import aborted_of, journal_of
 from pipelines.contracts.provenance import provenance_of, sha256
 from pipelines.errors import ContractError
 from pipelines.workflow.graph import Step
@@ -93,10 +94,7 @@ class Judge:
 
     def _left_behind(self, target: Path) -> Iterator[str]:
         """Yield what the last try left in the place of a recording."""
-        journal, aborted = (
-            target.with_name(f"{target.name}.journal"),
-            target.with_name(f"{target.stem}.aborted.parquet"),
-        )
+        journal, aborted = journal_of(target), aborted_of(target)
         if journal.exists():
             yield f"a killed run left {self._name(journal)}; `exoid recover` makes a recording of it"
         if aborted.exists():

@@ -4,7 +4,7 @@ It is written here and nowhere else: ``exoid run``, ``exoid status``, a command 
 rules that ``split`` writes, all go by it.
 """
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,10 @@ from typing import Any
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.experiment import Experiment
 from pipelines.settings.rig import load_rig
+from pipelines.workflow.imported import ImportedRuns
+
+STAGES = ("design", "acquire", "filter", "identify", "diagnose", "simulate", "replay", "extended", "report")
+"""Those of an experiment; what it has nothing to do for has no step."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +54,7 @@ class Step:
         return tuple(f"run-{self.run}" if name == "run" else name for name in self.settings)
 
 
-def graph(experiment: Experiment, config: Path, out: Path, imported: Collection[str] = ()) -> tuple[Step, ...]:
+def graph(experiment: Experiment, config: Path, out: Path, imported: ImportedRuns = ImportedRuns()) -> tuple[Step, ...]:
     """Return an experiment's steps, each after those it needs.
 
     Parameters
@@ -60,8 +64,8 @@ def graph(experiment: Experiment, config: Path, out: Path, imported: Collection[
         Its file, as the commands are to be told.
     out : Path
         Folder of the results.
-    imported : collection of str
-        Names of runs whose recordings came from elsewhere: no step makes those, see ``with_imported``.
+    imported : ImportedRuns, optional
+        Runs whose recordings came from elsewhere: no step makes those, see ``with_imported``.
     """
     told, runs = ("--config", config.as_posix()), experiment.run
     validate = [run for run in runs if run.purpose == "validate"]
@@ -70,7 +74,7 @@ def graph(experiment: Experiment, config: Path, out: Path, imported: Collection[
     trajectory, parameters = out / "trajectory.parquet", out / "identified" / "parameters.parquet"
 
     recorded = [_recorded(experiment, run, recordings[run.name], trajectory, told) for run in runs
-                if run.name not in imported]  # fmt: skip
+                if run.name not in imported.names]  # fmt: skip
 
     def step(
         stage: str, target: Path, inputs: Iterable[Path], settings: Sequence[str], *command: str, run: str | None = None
@@ -95,14 +99,15 @@ def graph(experiment: Experiment, config: Path, out: Path, imported: Collection[
 
     def simulated(model: Path, folder: Path, loop: str, replay: str) -> Iterator[Step]:
         called: tuple[str, ...] = ("simulate", model.as_posix())
-        yield step(loop, folder / LOOP, [model], ("simulate", "mechanism"), *called)
+        if imported.of_a_leg:
+            yield step(loop, folder / LOOP, [model], ("simulate", "mechanism"), *called)
         for name in (run.name for run in validate):
             inputs, words = [model, recordings[name]], (*called, "--replay", recordings[name].as_posix())
             yield step(replay, folder / f"replay-{name}.parquet", inputs, ("filter", "mechanism"), *words, run=name)
 
-    # A machine from elsewhere need not be a leg, which the controller's gait is for.
+    # What somebody else recorded need not tell enough for a model that can move.
     loops = simulated(parameters, out / "simulated", "simulate", "replay")
-    steps += [replace(one, may_fail=bool(imported)) for one in loops]
+    steps += [replace(one, may_fail=bool(imported.names)) for one in loops]
     if validate:
         again = simulated(extended, out / "simulated" / "extended", "extended", "extended")
         steps += [replace(one, may_fail=True) for one in again]

@@ -1,18 +1,28 @@
 """Runs whose recordings came from elsewhere: no command of an experiment makes these, or could make them again."""
 
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pipelines.contracts.provenance import provenance_of
-from pipelines.errors import ContractError, InputError
+from pipelines.contracts.joints import HIP_AND_KNEE, joints_of
+from pipelines.contracts.provenance import told_by
+from pipelines.errors import InputError
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.experiment import Experiment
 
 
-def with_imported(experiment: Experiment, out: Path) -> tuple[Experiment, frozenset[str]]:
-    """Return the experiment with its runs, and the names of those whose recordings were imported.
+@dataclass(frozen=True)
+class ImportedRuns:
+    """What a graph must know of them."""
+
+    names: frozenset[str] = frozenset()
+    of_a_leg: bool = True
+    """Whether they are of hip and knee, whose gait the adaptive loop follows."""
+
+
+def with_imported(experiment: Experiment, out: Path) -> tuple[Experiment, ImportedRuns]:
+    """Return the experiment with its runs, and those whose recordings were imported.
 
     Where exoid.toml names no run, the imported recordings in the folder of the results are the runs: each says itself
     which kind of run it is, and for which purpose.
@@ -25,7 +35,13 @@ def with_imported(experiment: Experiment, out: Path) -> tuple[Experiment, frozen
             for name, told in found.items()
         ]
         experiment = experiment.model_copy(update={"run": tuple(runs)})
-    return experiment, frozenset(run.name for run in experiment.run if run.name in found)
+    names = frozenset(run.name for run in experiment.run if run.name in found)
+    return experiment, ImportedRuns(names, all(joints_of(found[name]) == HIP_AND_KNEE for name in names))
+
+
+def has_imported(folder: Path) -> bool:
+    """Return whether a folder of recordings holds imported ones."""
+    return any(_imported(sorted(folder.glob("*.parquet"))))
 
 
 def refuse_imported(path: Path) -> None:
@@ -36,7 +52,6 @@ def refuse_imported(path: Path) -> None:
 
 def _imported(paths: Iterable[Path]) -> Iterator[tuple[str, dict[str, Any]]]:
     for path in paths:
-        with suppress(ContractError):  # whoever reads it says what is wrong with it
-            told = provenance_of(path)
-            if "imported" in told:
-                yield path.stem, told
+        told = told_by(path)
+        if "imported" in told:
+            yield path.stem, told

@@ -5,8 +5,10 @@ import heapq
 import selectors
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
-from math import sin
+from math import inf, sin
 from unittest.mock import patch
+
+from pymodbus.client.base import ModbusBaseClient
 
 from pipelines.acquisition import journal, loop, machine, pace
 from pipelines.acquisition.acquire import _finish, _record
@@ -14,7 +16,7 @@ from pipelines.acquisition.device import Device
 from pipelines.acquisition.line import Line
 from pipelines.acquisition.lock import locked
 from pipelines.acquisition.loop import Loop, run_to_its_end
-from pipelines.acquisition.states import Supervisor
+from pipelines.acquisition.states import State, Supervisor
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.registers import Block
 from pipelines.settings.rig import registers_of
@@ -72,6 +74,18 @@ class Told:
 
 
 @dataclass
+class Asked:
+    """A request whose turn on its line has come, and when it was answered, if it was."""
+
+    label: str
+    time: float
+    answered: float = inf
+
+    def was_answered_by(self, time):
+        return self.answered <= time
+
+
+@dataclass
 class SimulatedDrive:
     """Registers of a drive that follows its set-point at once, and whose control word works by its level."""
 
@@ -100,6 +114,7 @@ class SimulatedDrive:
         self.seen = self.told = self.angle
         self.told_at, self.pace = self.rig.count(), 0.0
         self.largest_leap, self.was_enabled, self.said_idle = 0.0, False, False
+        self.was_without_torque = False
         self.read, self.write = Block(registers_of(self.map.read)), Block(registers_of(self.map.write))
 
     @property
@@ -113,6 +128,7 @@ class SimulatedDrive:
         samples = max(self.count - self.told_at, 1)
         self.pace = (told["reference"] - self.told) / samples if was and self.enabled else 0.0
         self.told, self.told_at = told["reference"], self.count
+        self.was_without_torque |= not self.enabled and self.control != self.map.disable
         if self.enabled:
             self.largest_leap = max(self.largest_leap, abs(self.told - self.angle))
             self.angle = self.told
@@ -163,6 +179,7 @@ class SimulatedRig:
         self.force = 0.0
         self.exchanged, self.dead = set(), {}
         self.told: list[Told] = []
+        self.asked: list[Asked] = []
         self.raised: list[tuple[float, BaseException]] = []
         self.failed_to_disable = [0, 0]
 
@@ -221,8 +238,15 @@ class SimulatedRig:
         self.raised.append((self.clock.now, KeyboardInterrupt()))
         raise self.raised[-1][1]
 
-    async def answer(self, device, write, read):
-        """Serve a request, or let what is due befall it."""
+    async def answer(self, device, write, read, within_s):
+        """Serve a request, or let what is due befall it; note how it went."""
+        asked = Asked(device.label, self.clock.now)
+        self.asked.append(asked)
+        words = await self._serve(device, write, read, within_s)
+        asked.answered = self.clock.now
+        return words
+
+    async def _serve(self, device, write, read, within_s):
         event = self.happen()
         drive = self.of(device.label)
         if event and event.kind in ("dead", "broken"):
@@ -247,7 +271,7 @@ class SimulatedRig:
         if write is not None and drive and arrived:
             drive.take(words)
         if kind in ("lost", "no answer", "dead"):
-            await asyncio.sleep(self.rig.safety.longest_reply_s)
+            await asyncio.sleep(within_s)
             raise Unanswered(f"{device.label}: did not answer")
         if kind == "broken":
             self.raised.append((self.clock.now, DeviceError("broken")))
@@ -287,6 +311,8 @@ class Run:
     aborted_at: float | None
     first_reason: str | None
     states: list
+    followed_since: float = inf
+    """When the plan was begun to be followed."""
 
 
 def simulate(rig, settings, trajectory, path, events, rest, *, plan=None, own=None, goes_on=False):
@@ -348,14 +374,22 @@ def _patched(simulated, time, run, plan, own):
     async def check_identity(device, identity):
         pass
 
-    async def read(device, address, count, *, in_motion=False):
-        return await simulated.answer(device, None, (address, count))
+    async def ask(device, write, read, within_s):
+        async def request(device_id):
+            return await simulated.answer(device, write, read, within_s)
 
-    async def write(device, block, words):
-        await simulated.answer(device, (block, words), None)
+        return await device.line.ask(device._unit, within_s, request)
+
+    safety = simulated.rig.safety
+
+    async def read(device, address, count, *, in_motion=False):
+        return await ask(device, None, (address, count), safety.longest_reply_s if in_motion else safety.connect_s)
+
+    async def write(device, block, words, *, in_motion=False):
+        await ask(device, (block, words), None, safety.longest_reply_s if in_motion else safety.watchdog_s)
 
     async def exchange(device, block, words, read):
-        return await simulated.answer(device, (block, words), (read.address, read.count))
+        return await ask(device, (block, words), (read.address, read.count), safety.longest_reply_s)
 
     abort, go = Supervisor.abort, Supervisor._go
 
@@ -367,15 +401,18 @@ def _patched(simulated, time, run, plan, own):
     def watched_go(supervisor, state):
         go(supervisor, state)
         run.states.append(state)
+        if state is State.RAMP:
+            run.followed_since = time.now
 
     with ExitStack() as stack:
         for module in (loop, machine, pace):
             stack.enter_context(patch.object(module, "time", time))
         stack.enter_context(patch("asyncio.events.new_event_loop", lambda: time))
-        # The line has no part in this: every way to ask a device goes to the simulated rig.
+        # A line gives everybody their turn; every request then goes to the simulated rig.
         for request in (check_identity, read, write, exchange):
             stack.enter_context(patch.object(Device, request.__name__, request))
         stack.enter_context(patch.object(Line, "connect", connect))
+        stack.enter_context(patch.object(ModbusBaseClient, "connected", True))
         stack.enter_context(patch.object(Supervisor, "abort", watched_abort))
         stack.enter_context(patch.object(Supervisor, "_go", watched_go))
         if plan:

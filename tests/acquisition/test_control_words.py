@@ -73,9 +73,9 @@ def test_a_drive_that_says_it_is_no_longer_enabled_ends_the_run(record):
 def test_a_drive_that_still_says_enabled_is_told_again_and_then_reported(record, monkeypatch):
     told, write = [], Device.write
 
-    async def count(device, block, words):
+    async def count(device, block, words, **how):
         told.append(device.label.split()[1])
-        await write(device, block, words)
+        await write(device, block, words, **how)
 
     monkeypatch.setattr(Device, "write", count)
     status, enabled = Servo.status.fget, set()

@@ -270,12 +270,23 @@ def test_a_rig_whose_certificate_nobody_vouches_for_is_not_trusted(serve, on_lin
         assert "its certificate is not to be trusted (self-signed certificate" in connecting(believed)
 
 
-def test_a_client_without_a_certificate_is_turned_away(serve, on_line, line_of):
+@pytest.mark.parametrize("shown", ["", r"\1 = '\2other.\3'\n"], ids=["none", "another's"])
+def test_a_client_whose_certificate_is_not_trusted_is_told_that_it_may_be_that(serve, on_line, line_of, shown):
     path = on_line(line_of("tls"))
     with serve(path, None):
         nobody = path.with_name("nobody.toml")
-        nobody.write_text(re.sub(r"^(certificate|key) = .*\n", "", path.read_text(), flags=re.MULTILINE))
-        assert re.match(r"line leg .*: (the line is lost|no )", connecting(nobody))
+        pattern = r"^(certificate|key) = '(.*)own\.(.*)'\n"
+        nobody.write_text(re.sub(pattern, shown, path.read_text(), flags=re.MULTILINE))
+        why = connecting(nobody)
+    assert re.match(r"line leg .*: (the line is lost|no )", why)
+    assert "certificate and key" in why
+
+
+@pytest.mark.parametrize("transport", ["tcp", "rtu_over_tcp", "tls"])
+def test_a_host_that_nobody_knows_is_told(on_line, transport):
+    why = connecting(on_line(f"transport = {transport!r}\nhost = 'no-such-host.invalid'\n"))
+    assert "no such host (" in why
+    assert why.endswith("correct host in the rig file, or give its address")
 
 
 def test_a_port_that_does_not_speak_tls_is_told(serve, on_line, line_of):

@@ -1,5 +1,6 @@
 import asyncio
 
+import numpy as np
 import pytest
 
 from pipelines.acquisition import pace
@@ -66,6 +67,24 @@ def test_after_a_busy_moment_it_is_known_which_sample_the_exchange_finds(clock):
     first, second = asyncio.run(run())
     assert second - first >= 3
     assert second == int((clock.now - 100.0) / PERIOD)
+
+
+def test_after_an_exchange_that_was_not_answered_no_sample_is_missed_but_its_own(clock):
+    async def counter():
+        clock.now += 0.0003
+        return int((clock.now - 100.0) / PERIOD)
+
+    async def run():
+        lock, last, found = PhaseLock(1 / PERIOD, counter, 1.0), 0, []
+        for cycle in range(100):
+            found.append(await lock.wait(last))
+            clock.now += 3.6 * PERIOD if cycle == 50 else 0.0006
+            last = last if cycle == 50 else found[-1]
+        return found
+
+    steps = np.diff(asyncio.run(run()))
+    assert steps[50] > 1
+    assert set(np.delete(steps, 50)) == {1}
 
 
 def test_a_counter_that_stands_still_is_not_waited_for_for_ever(clock):

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from pymodbus.client import ModbusTcpClient
 
-from pipelines.acquisition.journal import journal_of
 from pipelines.contracts import RECORDING
+from pipelines.contracts.beside import journal_of
 from pipelines.settings import datasets
 from tests.acquisition.conftest import free_port
 from tests.acquisition.journals import read_journal

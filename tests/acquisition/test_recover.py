@@ -7,10 +7,12 @@ import sys
 import numpy as np
 import pytest
 
-from pipelines.acquisition.journal import Journal, JournalFile, journal_of, refuse_leftover
+from pipelines.acquisition.journal import Journal, JournalFile, refuse_leftover
 from pipelines.acquisition.recover import journals_in, recover
 from pipelines.contracts import RECORDING
+from pipelines.contracts.beside import journal_of
 from pipelines.errors import InputError
+from tests.conftest import Outcome
 
 RATE = 200.0
 COLUMNS = ["time_s", *(f"{joint}_{q}" for joint in ("hip", "knee") for q in ("angle_rad", "torque_nm")), "sequence"]
@@ -130,8 +132,15 @@ def test_a_folder_stands_for_the_journals_below_it(killed, tmp_path):
     assert journals_in(tmp_path) == [killed]
     assert journals_in(killed) == [killed]
     recover(killed)
-    with pytest.raises(InputError, match="holds no journal"):
-        journals_in(tmp_path)
+    assert journals_in(tmp_path) == []
+
+
+def test_where_no_run_was_killed_there_is_nothing_to_recover_and_nothing_wrong(exoid, monkeypatch, tmp_path):
+    (tmp_path / "exoid.toml").touch()
+    monkeypatch.chdir(tmp_path)
+    for words in ([], ["."]):
+        assert exoid("recover", *words) == Outcome(0, "no killed run left a journal; nothing to recover\n", "")
+    assert exoid("recover", "no.journal").code == 2
 
 
 @pytest.mark.parametrize(
@@ -218,7 +227,8 @@ def test_the_values_survive_to_the_last_bit(killed, tmp_path):
 MEASURE = """\
 import re, sys
 from pathlib import Path
-from pipelines.acquisition.journal import Journal, journal_of
+from pipelines.acquisition.journal import Journal
+from pipelines.contracts.beside import journal_of
 from pipelines.acquisition.recover import recover
 from tests.acquisition.test_recover import COLUMNS, METADATA, row
 

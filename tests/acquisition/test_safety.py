@@ -9,11 +9,11 @@ import pytest
 from pymodbus.constants import ExcCodes
 
 from pipelines.acquisition.device import Device as Line
-from pipelines.acquisition.journal import journal_of
 from pipelines.acquisition.machine import Reading, Row
 from pipelines.acquisition.plan import make_plan
 from pipelines.acquisition.safety import HOLD_SAMPLES, Limits, refuse_leap, slowed
 from pipelines.contracts import RECORDING
+from pipelines.contracts.beside import journal_of
 from pipelines.errors import DeviceError, ExoidError, InputError
 from pipelines.rig.server import READ_WRITE, Drive, Sensor
 from pipelines.settings.rig import load_rig
@@ -124,7 +124,7 @@ def test_an_exception_reply_ends_the_run_with_device_and_registers(stopped, tmp_
     assert "drive knee (127.0.0.1:" in why
     assert (
         "unit 2): answered an exchange (writing registers 200 to 202, reading 100 to 113) with Modbus exception 4: "
-        "it failed; compare the register map in the rig file with the device's manual"
+        "it failed; see the device's manual and its own display"
     ) in why
     table = aborted(tmp_path)
     assert "Modbus exception 4" in table.metadata["abort"]
@@ -141,11 +141,11 @@ def test_a_drive_that_still_answers_is_disabled_when_the_other_is_lost(stopped):
 def test_a_drive_whose_line_breaks_is_disabled_on_a_new_one(stopped, monkeypatch):
     write, tried = Line.write, []
 
-    async def breaks(line, block, words):
+    async def breaks(line, block, words, **how):
         tried.append(line.label)
         if tried.count(line.label) == 2:  # the first one is that before the run
             line.line.close()
-        await write(line, block, words)
+        await write(line, block, words, **how)
 
     monkeypatch.setattr(Line, "write", breaks)
     assert "could not be disabled" not in stopped(fault=After(300, refuse_exchanges))
@@ -155,10 +155,10 @@ def test_a_drive_whose_line_breaks_is_disabled_on_a_new_one(stopped, monkeypatch
 def test_what_goes_wrong_with_one_drives_stop_neither_hides_nor_hinders_the_other(stopped, monkeypatch):
     encode, disable = Line.exchange, Line.write
 
-    async def fails(line, *arguments):
+    async def fails(line, *arguments, **how):
         if "hip" in line.label and broken:
             raise ValueError("no number")
-        await disable(line, *arguments)
+        await disable(line, *arguments, **how)
 
     async def exchange(line, *arguments):
         if "hip" in line.label and broken:

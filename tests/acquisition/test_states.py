@@ -141,7 +141,7 @@ def test_after_missed_samples_set_points_walk_back_to_the_plan_from_where_the_dr
     supervisor.begin(row(100), 10.0)
     before = follow(supervisor, 101)
     assert supervisor.missed(111, 10.0 + 11 / RATE)
-    supervisor.resume(0, told(before + gone_on), 10 / RATE)
+    supervisor.resume(0, told(before + gone_on), 10.0 + 11 / RATE)
     sent = [before + gone_on, *(follow(supervisor, k) for k in range(111, 180))]
     steps = np.diff(sent)
     assert steps[0] == pytest.approx(3.0 / RATE)  # the speed limit
@@ -165,8 +165,10 @@ def test_a_stop_after_a_silence_begins_where_the_drive_is_and_as_fast_as_it_is(s
     supervisor.begin(row(100), 10.0)
     supervisor.sent[:], supervisor.base[:], supervisor._speed = 0.2, 0.2, np.array([2.0, 0.0])
     supervisor.abort(DeviceError("silent"))
-    supervisor.resume(0, told(0.4, velocity), 0.25)
-    path = [reference for reference, _ in supervisor.stopping(0)]
+    supervisor.resume(0, told(0.4, velocity), 10.25)
+    path = []
+    while due := supervisor.stop(0, 10.25 + len(path) / RATE):
+        path.append(due[0])
     fastest = 0.8 if np.isnan(velocity) else velocity  # as fast as it went meanwhile
     assert path[0] - 0.4 == pytest.approx(max(fastest - 0.5 * 8.0 / RATE, 0.0) / RATE)
     assert path[-1] - 0.4 == pytest.approx(fastest**2 / 2 / 8.0)
@@ -186,12 +188,11 @@ def test_a_leg_that_does_not_follow_stops_the_run(supervisor):
 def test_a_drive_that_is_not_enabled_is_told_nothing_on_the_way_to_rest(supervisor):
     supervisor.rest(10.0)
     supervisor.begin(row(100), 10.0)
-    stopping = supervisor.stopping(0)
-    next(stopping)
+    assert supervisor.stop(0, 10.1)
     with pytest.raises(DeviceError, match="is no longer enabled"):
         supervisor._enabled = [True, True]
         supervisor.feel(0, told(0.0, 0.0, enabled=False))
-    assert list(stopping) == []
+    assert supervisor.stop(0, 10.2) is None
 
 
 @pytest.mark.parametrize(
@@ -204,7 +205,9 @@ def test_of_two_counters_that_part_the_one_that_did_it_is_named(tmp_path, kind, 
     run = RunSettings(name="x", run="exo_alone", purpose="train", duration_s=0.5)
     at = 100 + joint
     events = [Event(at, kind, what)]
-    simulated = simulate(RIGS["lockstep", True, FINE_RAD], run, TRAJECTORY, tmp_path / "x.parquet", events, REST_RAD)
+    simulated = simulate(
+        RIGS["lockstep", True, FINE_RAD, None], run, TRAJECTORY, tmp_path / "x.parquet", events, REST_RAD
+    )
     why = simulated.supervisor.why
     assert why.startswith(f"drive {('hip', 'knee')[joint]} (127.0.0.1:502, unit {joint + 1}): ")
     assert words in why

@@ -1,5 +1,6 @@
 """Errors become one line and an exit code; help is there and quick."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -20,6 +21,7 @@ def test_every_command_has_help(exoid, command):
     assert command in outcome.out
     assert "Example" in outcome.out or "Commands" in outcome.out
     assert max(map(len, outcome.out.splitlines())) <= 80
+    assert "list[" not in outcome.out  # a word of Python's
 
 
 def test_the_list_of_commands_tells_each_whole(exoid):
@@ -143,3 +145,12 @@ def test_exoid_alone_prints_its_help(exoid):
 
 def test_version(exoid):
     assert exoid("--version").out == "exoid 0.1.0\n"
+
+
+@pytest.mark.parametrize("words", [["effects"], ["effects", "--json"], ["--help"]], ids=" ".join)
+def test_a_command_whose_output_nobody_reads_any_longer_ends_without_a_word(words):
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run([sys.executable, "-m", "exoid_cli.app", *words], stdout=writer, stderr=subprocess.PIPE)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (128 + 13, b"")

@@ -62,9 +62,17 @@ def test_nothing_is_recorded_in_its_place(exoid, folder, words):
     assert (folder / "recordings" / "Monday-1.parquet").read_bytes() == before
 
 
-def test_what_cannot_be_simulated_does_not_keep_the_rest_from_being_done(exoid, folder):
-    (folder / "exoid.toml").write_text("[identify]\nfigures = false\n")
+def test_a_machine_that_is_no_leg_is_not_asked_to_follow_a_gait(exoid, folder):
+    assert "simulate" not in {one["stage"] for one in json.loads(exoid("status", "--json").out)}
     outcome = exoid("run", "simulate")
-    assert outcome.code == 0, outcome.err
-    assert "the gait is a leg's" in outcome.err
-    assert (folder / "identified" / "parameters.parquet").exists()
+    assert (outcome.code, outcome.err) == (
+        2, "exoid: simulate: `exoid simulate` follows a leg's gait, and the recordings are of another machine; "
+        "leave it out\n",
+    )  # fmt: skip
+
+
+def test_where_exoid_toml_is_lacking_it_is_said_that_an_empty_one_is_enough(exoid, folder):
+    (folder / "exoid.toml").unlink()
+    outcome = exoid("filter")
+    assert (outcome.code, outcome.err.count("\n")) == (2, 1)
+    assert "with an empty exoid.toml beside recordings/, `exoid run` does all with what was imported" in outcome.err

@@ -43,7 +43,7 @@ def test_figures_are_written_as_pdf_and_png_whole(exoid, folder, tmp_path):
     for name in names:
         assert (tmp_path / "figures" / f"{name}.pdf").read_bytes().startswith(b"%PDF")
         picture = imread(tmp_path / "figures" / f"{name}.png")[..., :3]
-        assert picture.shape[0] > 200 and picture.shape[1] > 350
+        assert picture.shape[0] > 300 and picture.shape[1] > 600  # 200 dpi
         # Nothing is cut off: what is drawn stands within a white edge.
         assert all((edge == 1).all() for edge in (picture[0], picture[-1], picture[:, 0], picture[:, -1]))
         assert (picture < 1).any()
@@ -81,3 +81,20 @@ def test_where_there_is_nothing_to_draw_that_is_said(exoid, tmp_path):
     outcome = exoid("figures", tmp_path)
     assert outcome.code == 2
     assert "holds nothing to draw; `exoid diagnose` and `exoid simulate` make it" in " ".join(outcome.err.split())
+
+
+@pytest.mark.parametrize("text", ['{"contract": "verdict/1", "sta', '{"contract": "verdict/1"}'])
+def test_a_damaged_verdict_is_told_on_the_terminal_and_on_the_page_and_the_rest_is_shown(exoid, folder, tmp_path, text):
+    (folder / "diagnosed" / "verdict.json").write_text(text)
+    outcome = exoid("report", folder, "-o", tmp_path / "page.html")
+    assert outcome.code == 0
+    assert f"warning: {folder / 'diagnosed' / 'verdict.json'}: " in outcome.err
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    top = page[page.index('<section id="verdict"') : page.index('<section id="measured"')]
+    assert "The verdict cannot be read" in top
+    assert "diagnosed/verdict.json: " in top
+    assert "Not diagnosed yet" not in page
+    assert "torque-with_human_validate-knee" in page
+    outcome = exoid("figures", folder, "-o", tmp_path / "figures", "--only", "kv-sweep")
+    assert outcome.code == 0
+    assert "verdict.json: " in outcome.err

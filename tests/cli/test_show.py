@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from pipelines.contracts import RECORDING, describe, parquet
+from tests.report.sessions import verdict_of
 
 
 @pytest.fixture
@@ -47,24 +48,32 @@ def test_json_may_be_asked_for_before_or_after_the_command(exoid, recording):
 
 
 def test_a_verdict_is_shown_by_its_words_and_numbers(exoid, tmp_path):
-    per_joint = {"hip": 0.5, "knee": 0.25}
-    cause = {
-        "effect": "cogging", "joint": "hip", "side": "drive", "probability": 0.9, "evidence": ["it repeats"],
-        "parameters": [{"name": "amplitude", "value": 0.3, "unit": "N·m", "ci95": [0.2, 0.4]}],
-        "indistinguishable_from": [],
-    }  # fmt: skip
-    said = {
-        "contract": "verdict/1", "status": "explained", "summary": "Missing from the simulation: cogging.",
-        "caveats": [], "noise_floor_nm": per_joint, "baseline_rmse_nm": per_joint, "extended_rmse_nm": per_joint,
-        "unexplained": {"hip": 0.1, "knee": None}, "causes": [cause], "control": {"reason": "no run with_human"},
-    }  # fmt: skip
+    said = verdict_of(unexplained={"hip": 0.1, "knee": None})
     path = tmp_path / "verdict.json"
     path.write_text(json.dumps(said))
     outcome = exoid("show", path)
     assert (outcome.code, outcome.err) == (0, "")
-    for words in ("Missing from the simulation: cogging.", "cogging at the hip (drive), probability 0.90",
-                  "  amplitude 0.3 N·m (0.2 … 0.4)", "  - it repeats", "at the floor"):  # fmt: skip
+    for words in ("Missing from the simulation: cogging", "cogging at the knee (drive), probability 0.90",
+                  "  amplitude 1.5 N·m (1.4 … 1.6)", "  - it takes 0.50 of 0.82", "at the floor"):  # fmt: skip
         assert words in outcome.out
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ('{"contract": "verdict/1", "status"', "is no whole JSON document (line 1, column 35:"),
+        ('{"contract": "verdict/1"}', "status: missing; add it"),
+        (json.dumps(verdict_of(noise_floor_nm={"hip": 0.1, "knee": float("nan")})),
+         "noise_floor_nm.knee: found nan, expected a finite number"),
+    ],
+)  # fmt: skip
+def test_a_damaged_verdict_is_refused_in_a_line_that_names_the_key(exoid, tmp_path, text, says):
+    path = tmp_path / "verdict.json"
+    path.write_text(text)
+    outcome = exoid("show", path)
+    assert outcome.code == 2
+    assert outcome.err.startswith(f"exoid: {path}: {says}")
+    assert "Parquet" not in outcome.err
 
 
 def test_quiet_prints_nothing(exoid, recording):
@@ -87,11 +96,10 @@ def test_a_file_that_breaks_its_contract_is_shown_and_then_refused(exoid, tmp_pa
 
 def test_verdict_and_trajectory_toml_are_recognised(exoid, tmp_path):
     verdict = tmp_path / "verdict.json"
-    verdict.write_text(json.dumps({"contract": "verdict/1", "status": "explained", "noise_floor_nm": {"hip": 0.5}}))
+    verdict.write_text(json.dumps(verdict_of()))
     outcome = exoid("show", verdict)
     assert outcome.code == 0
     assert "verdict/1" in outcome.out
-    assert "noise_floor_nm.hip" in outcome.out
     trajectory = tmp_path / "paper.toml"
     trajectory.write_text('unit = "deg"\nomega_rad_s = 0.628\ntheta0_rad = [0.1, 0.2]\na = [[1.0]]\nb = [[2.0]]\n')
     assert "trajectory as TOML" in exoid("show", trajectory).out

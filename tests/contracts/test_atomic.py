@@ -1,13 +1,15 @@
 """Files are whole or not there, and a folder that takes none is refused before the work."""
 
 import errno
+import json
 import os
 from pathlib import Path
 
+import pyarrow as pa
 import pytest
 
-from pipelines.contracts import atomic
-from pipelines.contracts.atomic import open_folder, write_text
+from pipelines.contracts import atomic, parquet
+from pipelines.contracts.atomic import all_or_none, open_folder, write_text
 from pipelines.contracts.parquet import refuse_place
 from pipelines.errors import InputError
 
@@ -53,3 +55,61 @@ def test_a_pipe_is_not_replaced_by_a_file(tmp_path, write, linked):
 def test_a_folder_is_not_replaced_by_a_file(tmp_path):
     with pytest.raises(InputError, match="is a folder, expected the name of a file to write"):
         write_text(tmp_path, "x")
+
+
+TABLE = pa.table({"time_s": [0.0, float("nan"), 2.0]})
+
+
+def save_table(path, when, table=TABLE, **more):
+    parquet.save(path, [table], {"contract": "x/1", "created_at": when, **more})
+
+
+def save_text(path, when, value=1):
+    write_text(path, json.dumps({"value": value, "provenance": {"created_at": when}}))
+
+
+def save_together(path, when):
+    with all_or_none(path.parent) as folder:
+        save_table(folder / path.name, when)
+
+
+@pytest.mark.parametrize("save", [save_table, save_text, save_together])
+def test_what_is_made_anew_and_says_the_same_stays_byte_for_byte_with_a_new_time(tmp_path, save):
+    path = tmp_path / "result"
+    save(path, "2026-01-01T00:00:00+00:00")
+    before = path.read_bytes()
+    os.utime(path, (0, 0))
+    save(path, "2026-01-02T00:00:00+00:00")
+    assert path.read_bytes() == before
+    assert path.stat().st_mtime > 0
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(
+    ("save", "other"),
+    [
+        (save_text, {"value": 2}),
+        (save_table, {"config": {"order": 2}}),
+        (save_table, {"table": pa.table({"time_s": [0.0, 1.0, 2.0]})}),
+        (save_table, {"table": TABLE.rename_columns(["time_z"])}),
+        (
+            save_table,
+            {"table": pa.table([[0.0, 1.0, 2.0]], pa.schema([pa.field("time_s", "double", True, {"u": "s"})]))},
+        ),
+    ],
+)
+def test_what_says_something_else_replaces_what_was_there(tmp_path, save, other):
+    path, then, now = tmp_path / "result", "2026-01-01T00:00:00+00:00", "2026-01-02T00:00:00+00:00"
+    save(path, then)
+    save(path, now, **other)
+    assert now.encode() in path.read_bytes()
+    assert then.encode() not in path.read_bytes()
+
+
+def test_what_is_left_of_a_table_is_replaced(tmp_path):
+    path = tmp_path / "result"
+    save_table(path, "2026-01-01T00:00:00+00:00")
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-20] + bytes(20))
+    save_table(path, "2026-01-01T00:00:00+00:00")
+    assert path.read_bytes() == whole

@@ -1,5 +1,7 @@
 from datetime import datetime
 
+import numpy
+
 from pipelines.contracts import RECORDING, describe
 
 
@@ -13,5 +15,6 @@ def test_a_result_names_its_inputs_by_name_and_hash(tmp_path, swinging_leg, run_
     assert origin["inputs"] == [{"name": "a.txt", "sha256": digest}]
     assert origin["created_by"] == "exoid 0.1.0"
     assert datetime.fromisoformat(origin["created_at"]).utcoffset().total_seconds() == 0
+    assert origin["software"]["numpy"] == numpy.__version__
     RECORDING.write(tmp_path / "r.parquet", swinging_leg, run_metadata | origin)
     assert RECORDING.read(tmp_path / "r.parquet").metadata["config"] == {"order": 4}

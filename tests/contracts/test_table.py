@@ -118,13 +118,21 @@ def test_a_folder_is_refused(tmp_path, swinging_leg, run_metadata):
     )
 
 
+def test_a_mistyped_name_is_told_from_one_of_another_file(tmp_path, swinging_leg, run_metadata):
+    RECORDING.write(tmp_path / "exo_alone_train.parquet", swinging_leg, run_metadata)
+    slip = refusal(RECORDING.read, tmp_path / "exo_alone_trian.parquet")
+    assert slip.endswith(f"no such file; did you mean {tmp_path / 'exo_alone_train.parquet'}?")
+    other = refusal(RECORDING.read, tmp_path / "with_human_train.parquet")
+    assert other.endswith("no such file; check the name, or make it first")
+
+
 @pytest.mark.parametrize(
     ("entry", "told"),
     [
         (
             None,
-            "has no `exoid` entry in its schema metadata; add one with at least "
-            '{"contract": "<name>/<version>"}, see docs/contracts.md',
+            "has no `exoid` entry in its schema metadata, so exoid did not write it; `exoid import` makes a recording "
+            'of a log; for a table of your own add {"contract": "<name>/<version>"}, see docs/contracts.md',
         ),
         (b"{", "its `exoid` metadata is not JSON (Expecting property name enclosed in double quotes: "
                "line 1 column 2 (char 1)); write it again"),

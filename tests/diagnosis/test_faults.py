@@ -124,6 +124,16 @@ def test_angles_too_coarse_to_tell_whether_stamps_are_right_are_too_coarse_to_su
     assert "too coarse to tell" in fault.what and not fault.spoils
 
 
+def test_stamps_that_are_wrong_by_less_than_the_angles_noise_spoil_nothing(session):
+    frame, metadata = session[SPOILED]
+    rng = np.random.default_rng(6)
+    shaken = {name: frame[name] + rng.normal(0.0, 5e-4, len(frame)) for name in ("hip_angle_rad", "knee_angle_rad")}
+    late = frame["time_s"] + np.minimum(rng.exponential(4e-4, len(frame)), 4.5e-3)
+    session[SPOILED] = frame.assign(**shaken, time_s=late), metadata
+    fault = next(f for f in faults_of(session) if f.channel == "time_s")
+    assert "of the angles' own noise at most" in fault.what and not fault.spoils
+
+
 def test_samples_taken_unevenly_under_even_stamps_are_jitter(session):
     frame, _ = session[SPOILED]
     count = np.arange(len(frame))

@@ -10,12 +10,13 @@ from matplotlib.figure import Figure
 from pipelines.diagnosis import figures, replayed
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.error_budget import scatter_between_periods, shares_of_causes
-from pipelines.diagnosis.figures.against import against, binned_mean
+from pipelines.diagnosis.figures.against import against
 from pipelines.diagnosis.fitted_model import model_of_run
 from pipelines.diagnosis.observations import observe
 from pipelines.diagnosis.verdict import verdict
 from pipelines.dynamics.replay import replay
 from pipelines.errors import InputError
+from pipelines.signals.binned_mean import binned_mean
 from tests.diagnosis.sessions import session
 
 
@@ -154,7 +155,7 @@ def test_a_tone_is_folded_onto_its_crest(diagnosed):
     ]
     seen = against("tone", replace(found, before=replace(found.before, residuals=humming)), "knee", ("with_human",))
     assert "3.14 Hz" in seen.label
-    x, mean = binned_mean(seen.x, seen.before)
+    x, mean = binned_mean(seen.x, seen.before, seen.x.min(), seen.x.max())
     np.testing.assert_allclose(mean, 2.0 * np.cos(2 * np.pi * x), atol=0.35)
 
 

@@ -42,7 +42,7 @@ def with_errors(d, extended, status="partly_explained"):
 def test_a_fault_that_was_masked_is_told_beside_the_cause(stuck):
     said = verdict(stuck)["summary"]
     assert said.startswith("Missing from the simulation: parallel spring at the knee")
-    assert "Left out as faults of acquisition: run_1.parquet, hip_angle_rad: the hip's angle is stuck" in said
+    assert "Beside it, faults of acquisition: run_1.parquet, hip_angle_rad: the hip's angle is stuck" in said
 
 
 def test_what_is_left_at_the_other_joint_is_said_to_be_there_and_how_much(stuck):

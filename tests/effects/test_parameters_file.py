@@ -48,3 +48,10 @@ def test_a_parameter_too_few_is_refused_with_the_names_that_belong_there():
         InputError, match="parallel_spring@knee has values stiffness, expected stiffness, rest_angle; correct them"
     ):
         model_from_parameters(frame[frame["name"] != "rest_angle"], "with_human")
+
+
+def test_a_mistyped_parameter_is_told_what_it_may_be():
+    (spring,) = (t for t in TERMS if t.effect.label == "parallel_spring@knee")
+    frame = table(spring).replace({"name": {"stiffness": "stifness"}})
+    with pytest.raises(InputError, match=r"has values stifness, rest_angle, expected .*; did you mean stiffness\?"):
+        model_from_parameters(frame, "with_human")

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from pipelines.acquisition.journal import journal_of
 from pipelines.acquisition.recover import recover
 from pipelines.contracts import RECORDING
+from pipelines.contracts.beside import journal_of
 from tests.faults.faults import Case, cases
 from tests.faults.process import fill_the_disk, send, strike
 from tests.faults.proxy import Frame, RtuFrame, TcpFrame

@@ -234,7 +234,7 @@ def cases(frames: type[Frame]) -> list[Case]:
         Case("a reply tells a wrong length", From(longer), gap=True, frames=TcpFrame),
         Case("a reply has another function", From(another_function), "function 3, expected 23"),
         Case("exception reply 4, device failure", From(refuse(4)), "Modbus exception 4: it failed"),
-        Case("exception reply 6, device busy", From(refuse(6)), "Modbus exception 6: it is busy"),
+        Case("exception reply 6, device busy", From(refuse(6)), "it is busy (server device busy); end what"),
         Case("a bit of the counter is flipped", From(flip(1, 1)), "counter"),
         Case("a high bit of the counter is flipped", From(flip(0, 4)), "counter"),
         Case("a bit of the clock is flipped", From(flip(2, 1)), "its clock went"),

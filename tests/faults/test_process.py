@@ -6,9 +6,9 @@ import signal
 import numpy as np
 import pytest
 
-from pipelines.acquisition.journal import journal_of
 from pipelines.acquisition.recover import recover
 from pipelines.contracts import RECORDING
+from pipelines.contracts.beside import journal_of
 from tests.faults.process import fill_the_disk, send, strike
 from tests.faults.runs import wrong_rows
 

@@ -7,6 +7,7 @@ import tomllib
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.io import savemat
 
 from exoid_cli.app import run
 from pipelines.importing.guess.names import meaning
@@ -118,6 +119,16 @@ def test_a_current_needs_a_torque_constant_that_no_log_tells(imported, guessed, 
     assert (refused.code, "torque.unit: needs torque_constant_nm_a" in refused.err) == (2, True)
     filled = text.replace("# torque_constant_nm_a = ", "torque_constant_nm_a = 0.1")
     assert imported(path, map_text=filled).code == 0
+
+
+def test_a_voltage_on_a_joint_that_may_slide_names_both_gains_and_the_number_that_the_log_holds(guessed, tmp_path):
+    time = np.arange(4000) / 1000.0
+    place = 0.2 * np.sin(2.0 * time)
+    path = tmp_path / "slide.mat"
+    savemat(path, {"t": time, "qm": place, "vir": 2.0 * np.cos(2.0 * time), "gtau": 35.15, "kp": 160.0})
+    text, doubts = guessed(path)
+    assert re.search(r"# gain_nm_v = +# FILL IN: .*perhaps gtau = 35.15, .*; gain_n_v where it slides", text)
+    assert "kp" not in doubts["joint[0].torque.gain_nm_v"]
 
 
 def test_several_joints_are_told_apart_and_never_sure_of_their_signs(guessed, pendulum, write_csv):

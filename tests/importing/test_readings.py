@@ -211,3 +211,33 @@ def test_what_jumps_otherwise_is_no_full_counter(imported, pendulum, write_csv):
     for jump in (np.where(np.arange(2000) == 700, 4.0, 0.0), np.where(np.arange(2000) > 700, 2.5, 0.0)):
         path = write_csv(pendulum.columns() | {"angle": pendulum.angle + jump})
         assert "wraps_at" not in imported(path).told
+
+
+@pytest.mark.parametrize("told", [[1, 0], [True, False]])
+def test_rows_of_a_drive_that_was_off_are_left_out(imported, pendulum, write_csv, told):
+    """A current of 0 says nothing of the torque while the bridge is open."""
+    columns = pendulum.columns() | {"on": np.repeat(told, 1000)}
+    text = MAP.replace('name = "pivot"', 'name = "pivot"\nenabled = "on"')
+    outcome = imported(write_csv(columns), map_text=text)
+    assert_allclose(outcome.recording().frame["pivot_torque_nm"], pendulum.torque[:1000], atol=1e-12)
+    assert "on is 0 in 1 000 rows: the drive was off" in " ".join(outcome.told.split())
+
+
+def test_a_drive_that_was_never_on_and_a_column_that_is_not_there_are_refused(imported, pendulum, write_csv):
+    path = write_csv(pendulum.columns() | {"on": np.zeros(2000)})
+    never = imported(path, map_text=MAP.replace('name = "pivot"', 'name = "pivot"\nenabled = "on"'))
+    assert (never.code, "'on' says of every row that the drive was off" in never.err) == (2, True)
+    absent = imported(path, map_text=MAP.replace('name = "pivot"', 'name = "pivot"\nenabled = "onn"'))
+    assert (absent.code, "has no column 'onn', which joint[0].enabled" in absent.err) == (2, True)
+
+
+def test_joints_that_make_no_mechanism_are_told_before_anybody_waits_for_a_fit(imported, pendulum, write_csv):
+    columns, text = pendulum.columns(), MAP.replace('velocity = { column = "velocity", unit = "rad/s" }\n', "")
+    first = text[text.index("[[joint]]") : text.index("[[recording]]")]
+    for name in ("elbow", "wrist"):
+        columns |= {f"{name}_angle": pendulum.angle, f"{name}_torque": pendulum.torque}
+        own = first.replace('"pivot"', f'"{name}"').replace('column = "', f'column = "{name}_')
+        text = text.replace("[[recording]]", own + "[[recording]]")
+    outcome = imported(write_csv(columns), map_text=text)
+    assert outcome.code == 0, outcome.err
+    assert "exoid identify and exoid diagnose do not" in " ".join(outcome.told.split())

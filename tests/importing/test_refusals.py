@@ -11,6 +11,7 @@ import pytest
 
 from pipelines.contracts import RECORDING
 from pipelines.settings.map_reference import reference
+from pipelines.settings.transmission import gain
 from tests.importing.conftest import MAP
 
 BAD_MAPS = [
@@ -19,7 +20,8 @@ BAD_MAPS = [
     ('unit = "N·m"', 'unit = "mA"', "torque.unit: needs torque_constant_nm_a; add it from the data sheet"),
     ('unit = "rad"', 'unit = "counts"', "angle.unit: needs counts_per_turn"),
     ('unit = "N·m"', 'unit = "N·m", gain_nm_v = 2.0', "torque.unit: has no use for gain_nm_v; remove it"),
-    ('unit = "N·m"', 'unit = "N·n"', "torque.unit: found 'N·n', expected one of torque: N·m"),
+    ('unit = "N·m"', 'unit = "N·n"', "torque.unit: found 'N·n', expected one of torque: N·m", "did you mean N·m?"),
+    ('unit = "rad/s"', 'unit = "rads"', "velocity.unit: found 'rads', expected one of", "did you mean rad/s?"),
     ('column = "torque"', 'column = "angle"', "found 'angle', which is joint[0].angle already"),
     ('column = "torque"', 'column = "torque", expression = "2 * torque"', "expected either column or expression"),
     ('column = "torque"', 'expression = "__import__(1)"', "expected numbers and columns with + - * / ( )"),
@@ -238,3 +240,10 @@ def test_ten_rows_are_too_few_to_be_a_run(imported, pendulum, write_csv):
 def test_a_joint_that_never_moves_is_told(imported, pendulum, write_csv):
     outcome = imported(write_csv(pendulum.columns() | {"angle": np.full(2000, 0.3)}))
     assert "pivot_angle_rad: is 0.3 in every row; nothing can be learnt from it" in outcome.told
+
+
+def test_a_sliding_joints_voltage_asks_for_its_own_gain_and_not_for_a_screw_alone():
+    with pytest.raises(ValueError, match=r"^needs lead_m, or gain_n_v in place of gain_nm_v; add it"):
+        gain("voltage", "force", {"gain_nm_v": 2.0}, 1.0)
+    with pytest.raises(ValueError, match=r"^needs gain_n_v; add it"):
+        gain("voltage", "force", {}, 1.0)

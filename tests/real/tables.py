@@ -81,12 +81,18 @@ def pendulum(name: str, found: Mapping[str, Diagnosed], data: Path) -> str:
     for key, d in found.items():
         if not key.startswith(name):
             continue
-        plain = slow_fit(with_rotor(d.motions[0]), of_purpose(d.motions, "train"))
+        trained = of_purpose(d.motions, "train")
+        plain, refitted = slow_fit(with_rotor(d.motions[0]), trained), slow_fit(d.model, trained)
         for motion in d.motions:
-            predicted = (their_torque(theirs, motion), plain.torque(motion), d.model.torque(motion))
+            predicted = (
+                their_torque(theirs, motion),
+                plain.torque(motion),
+                d.model.torque(motion),
+                refitted.torque(motion),
+            )
             errors = [text for torque in predicted for text in _both(slow_error(torque, motion))]
             rows.append((motion.file.removesuffix(".parquet"), motion.purpose, *errors))
-    models = ("published", "least squares", "extended")
+    models = ("published", "least squares", "extended", "refitted")
     headings = ("run", "for", *(f"{model}, {unit}" for model in models for unit in ("N·m", "%")))
     return table(headings, rows)
 

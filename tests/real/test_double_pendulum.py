@@ -2,9 +2,9 @@
 
 import pytest
 
-from tests.real.machines import LOGS, diagnosed
+from tests.real.machines import LOGS, diagnosed, of_purpose, with_rotor
 from tests.real.published import double_pendulum, their_torque
-from tests.real.relative_error import slow_error
+from tests.real.relative_error import slow_error, slow_fit
 
 
 @pytest.fixture(scope="module")
@@ -22,6 +22,18 @@ def test_the_extended_model_is_better_than_the_published_parameters(fourier, the
         ours = slow_error(fourier.model.torque(motion), motion)
         published = slow_error(their_torque(theirs, motion), motion)
         assert (ours.rms < published.rms).all(), motion.file
+
+
+def test_friction_that_goes_with_the_load_of_a_planetary_gear_is_named_and_foretells_what_no_fit_has_seen(fourier):
+    assert fourier.causes[0] == ("load_dependent_friction", "shoulder")
+    assert not any(
+        fault["channel"] == "time_s" for fault in fourier.verdict["data_faults"] if "rebuild" in fault["what"]
+    )
+    (seen_by_none,) = of_purpose(fourier.motions, "validate")
+    plain = slow_fit(with_rotor(seen_by_none), of_purpose(fourier.motions, "train"))
+    ours, theirs = (slow_error(model.torque(seen_by_none), seen_by_none) for model in (fourier.model, plain))
+    assert ours.percent[0] < 6.0
+    assert (ours.rms < theirs.rms).all()
 
 
 @pytest.mark.slow

@@ -42,8 +42,12 @@ def write_recording(folder, joints=LEG, seconds=20.0, rate_hz=200.0, name=RUN, *
     for joint in joints:
         angle, _, _, torque = motion_of(joints, time)[joint.name]
         columns |= {joint.column("angle"): angle, joint.column("torque"): torque}
-    told = {"run": "with_human", "purpose": "validate", "sample_rate_hz": rate_hz, "joints": named(joints)} | metadata
-    RECORDING.write(folder / "recordings" / name, pd.DataFrame(columns), told | describe())
+    told = (
+        {"run": "with_human", "purpose": "validate", "sample_rate_hz": rate_hz, "joints": named(joints)}
+        | describe()
+        | metadata
+    )
+    RECORDING.write(folder / "recordings" / name, pd.DataFrame(columns), told)
     return folder / "recordings" / name
 
 

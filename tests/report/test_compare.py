@@ -5,10 +5,12 @@ import re
 import numpy as np
 import pytest
 
+from pipelines.contracts import PARAMETERS
+from pipelines.errors import InputError
 from pipelines.report.compare import changes, compare, titles_of
 from pipelines.report.parameters import Estimate
 from pipelines.report.session import find
-from tests.report.sessions import write_session, write_verdict
+from tests.report.sessions import AXIS, LEG, write_parameters, write_session, write_verdict
 
 
 def estimate(value, half, name="X1"):
@@ -77,3 +79,28 @@ def test_a_hostile_session_is_escaped_beside_another(tmp_path, opened):
     with opened(page_file, width=390) as page:
         assert page.get_by_text(evil).count() > 2
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_sessions_of_different_machines_are_refused_by_what_differs(tmp_path):
+    leg, axis = (find([write_session(tmp_path / name, joints)]) for name, joints in (("leg", LEG), ("axis", AXIS)))
+    says = r"leg is of another machine than axis \(hip \(revolute\), knee \(revolute\), and axis \(prismatic\)\)"
+    with pytest.raises(InputError, match=says):
+        compare(leg, axis, ("leg", "axis"))
+
+
+def test_a_parameter_of_another_unit_is_never_subtracted(tmp_path):
+    first, second = pair(tmp_path, 0.0)
+    path = second.folders[0] / "identified" / "parameters.parquet"
+    table = PARAMETERS.read(path)
+    table.frame.loc[0, "unit"] = "kg·m"
+    PARAMETERS.write(path, table.frame, table.metadata)
+    with pytest.raises(InputError, match=r"X1 \(with_human\) is in kg·m² and in kg·m, expected one unit"):
+        compare(first, find(second.folders), ("a", "b"))
+
+
+def test_without_verdicts_the_page_says_why_no_errors_are_laid_side_by_side(tmp_path):
+    sessions = []
+    for name in ("monday", "tuesday"):
+        write_parameters(tmp_path / name)
+        sessions.append(find([tmp_path / name]))
+    assert "a verdict of each session, so no errors can be laid side by side" in compare(*sessions, ("a", "b")).text

@@ -1,7 +1,9 @@
 """The page in a real browser, opened from its file, without a network."""
 
+import numpy as np
 import pytest
 
+from pipelines.contracts import SIMULATION, Joint
 from pipelines.report.report import report
 from pipelines.report.session import find
 from tests.report.sessions import (
@@ -93,8 +95,12 @@ def test_a_printed_page_shows_every_chart_on_white(opened, page_file):
         assert page.evaluate("[...document.querySelectorAll('details')].every(d => d.open)")
         paper = page.evaluate("getComputedStyle(document.documentElement).getPropertyValue('--paper')")
         assert paper.strip() == "#ffffff"
+        page.wait_for_function("[...exoid.plots.values()].flat().every(u => u.status === 1)")
+        for key in page.evaluate("Object.keys(exoid.data.charts)"):
+            assert all(colours > 5 for colours in page.evaluate(DRAWN, key)), key
         page.evaluate("dispatchEvent(new Event('afterprint'))")
         assert page.evaluate("document.documentElement.dataset.theme") is None
+        assert page.evaluate("[...exoid.plots.values()].flat().every(u => u.height === u.onScreen)")
         assert len(page.pdf(format="A4")) > 50_000
 
 
@@ -109,6 +115,55 @@ def test_the_leg_moves(opened, page_file):
         stage.get_by_role("button", name="Pause").click()
         assert page.evaluate(picture) != before
         assert float(stage.locator("output").inner_text().split()[0]) > 0.1
+
+
+ROOM = """() => {
+    const c = document.querySelector('[data-stage] canvas');
+    const copy = Object.assign(document.createElement('canvas'), { width: c.width, height: c.height });
+    copy.getContext('2d', { willReadFrequently: true }).drawImage(c, 0, 0);
+    const all = copy.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+    let [left, right, top, bottom] = [c.width, 0, c.height, 0];
+    for (let i = 0; i < all.length / 4; i++) if (all[4 * i + 3]) {
+        const x = i % c.width, y = Math.floor(i / c.width);
+        [left, right] = [Math.min(left, x), Math.max(right, x)];
+        [top, bottom] = [Math.min(top, y), Math.max(bottom, y)];
+    }
+    return [left, c.width - 1 - right, top, c.height - 1 - bottom];
+}"""
+"""Pixels left free on each side of the machine."""
+
+
+def test_a_pendulum_that_swings_up_stays_in_the_picture(opened, tmp_path):
+    joints = (Joint("joint"),)
+    recording, model = write_recording(tmp_path, joints), write_parameters(tmp_path, joints)
+    path = write_replay(tmp_path, model, recording, joints)
+    table = SIMULATION.read(path)
+    for column in ("joint_reference_rad", "joint_angle_rad"):
+        table.frame[column] = table.frame[column] / 0.4 * np.pi
+    SIMULATION.write(path, table.frame, table.metadata)
+    page_file = tmp_path / "report.html"
+    page_file.write_text(report(find([tmp_path])), encoding="utf-8")
+    with opened(page_file) as page:
+        stage = page.locator("[data-stage]").first
+        stage.scroll_into_view_if_needed()
+        for part in range(0, 1000, 100):
+            stage.locator("input").evaluate("(e, k) => { e.value = k; e.dispatchEvent(new Event('input')); }", part)
+            assert min(page.evaluate(ROOM)) > 2
+
+
+def test_an_exaggerated_difference_is_said_on_the_picture(opened, page_file):
+    with opened(page_file) as page:
+        stage = page.locator("[data-stage]").first
+        stage.scroll_into_view_if_needed()
+        assert stage.locator("select").input_value() == "1"
+        page.evaluate(
+            """() => {
+                const stage = document.querySelector('[data-stage] canvas').getContext('2d');
+                stage.fillText = text => { window.said = text; };
+            }"""
+        )
+        stage.locator("select").select_option("5")
+        assert page.evaluate("window.said") == "difference from measured drawn × 5"
 
 
 EVIL = "</script><script>alert('broken in')</script><img src=x onerror=alert(1)>\"'{{7*7}}"

@@ -1,18 +1,26 @@
 """What the page says is what the files hold, whatever stages there were."""
 
 import json
+import platform
 import re
 import shutil
 
+import numpy as np
+import pandas as pd
 import pytest
 
-from pipelines.contracts import PARAMETERS
+from pipelines.contracts import CANDIDATES, PARAMETERS, RESIDUALS, Joint, describe
 from pipelines.contracts.provenance import provenance_of, sha256
 from pipelines.errors import InputError
-from pipelines.report.report import report
+from pipelines.report import provenance
+from pipelines.report.animation import animations
+from pipelines.report.bars import budget
+from pipelines.report.report import charts, report
 from pipelines.report.session import find
+from pipelines.report.standstill import moving
 from tests.report.sessions import (
     AXIS,
+    verdict_of,
     write_parameters,
     write_recording,
     write_replay,
@@ -117,7 +125,43 @@ def test_what_was_made_of_an_older_recording_is_said_at_the_top(tmp_path):
     folder = write_session(tmp_path / "leg")
     write_recording(folder, seconds=10.0)
     top = re.search(r'<section id="verdict".*?</section>', report(find([folder])), re.S)[0]
-    assert "diagnosed/verdict.json was made of another version of with_human_validate.parquet than the one here" in top
+    assert len(re.findall("has changed since", top)) == 1
+    assert "with_human_validate.parquet has changed since" in top
+    assert "more files were made of it; `exoid run` or `make` makes again" in top
+
+
+def imported(folder, **given):
+    """Write a recording that was imported of a log and a map, the map beside it and the log elsewhere."""
+    folder.mkdir()
+    log, table = folder / "log.csv", folder / "machine.toml"
+    log.write_text("t,q\n0,1\n")
+    table.write_text("[time]\n")
+    write_recording(folder, imported={"source": "log.csv", "given": given}, **describe([log, table]))
+    log.unlink()
+    return folder
+
+
+def test_a_map_in_the_folder_is_known_by_its_bytes_and_a_log_elsewhere_by_the_path_it_was_given(tmp_path):
+    folder = imported(tmp_path / "lab", source="../logs/log.csv", map="old/machine.toml")
+    lines = [command.line for command in provenance.commands(find([folder]))]
+    assert lines[0] == f"exoid import ../logs/log.csv --map {folder / 'machine.toml'} -o {folder / 'recordings'}/"
+    page = report(find([folder]))
+    assert re.search(r"of log.csv <span class=\"pill\">not in these folders", page)
+    assert not re.search(r"of machine.toml <span", page)
+    (folder / "machine.toml").write_text("[joint]\n")
+    assert "--map old/machine.toml" in provenance.commands(find([folder]))[0].line
+
+
+def test_the_commands_that_repeat_it_end_with_the_report(session_folder):
+    assert provenance.commands(find([session_folder]))[-1].line == f"exoid report {session_folder}"
+
+
+def test_versions_are_told_where_files_have_them_and_nothing_where_they_do_not(tmp_path):
+    path = write_parameters(tmp_path)
+    assert f"Made with Python {platform.python_version()}, numpy {np.__version__}" in report(find([tmp_path]))
+    table = PARAMETERS.read(path)
+    PARAMETERS.write(path, table.frame, {key: value for key, value in table.metadata.items() if key != "software"})
+    assert "Made with Python" not in report(find([tmp_path]))
 
 
 def test_two_verdicts_are_refused_in_a_line_that_says_what_to_do(tmp_path):
@@ -139,3 +183,94 @@ def test_a_broken_file_beside_good_ones_is_told_and_does_no_harm(tmp_path):
     (tmp_path / "broken.parquet").write_bytes(b"PAR1 and nothing else")
     page = report(find([tmp_path]))
     assert "broken.parquet: " in page
+
+
+def worsened(folder, joint="knee", effect="stribeck_friction"):
+    """Write a verdict whose cause makes everything worse but the torque away from reversals."""
+    said = verdict_of()
+    cause = said["causes"][0] | {"effect": effect, "joint": joint}
+    write_verdict(
+        folder, causes=[cause],
+        baseline_rmse_unmasked_nm={"hip": 0.8, "knee": 2.95}, extended_rmse_unmasked_nm={"hip": 0.4, "knee": 3.38},
+        extended_simulation_rmse_rad={"hip": 0.02, "knee": 0.0367},
+    )  # fmt: skip
+
+
+def verdict_part(page):
+    return re.search(r'<section id="verdict".*?</section>', page, re.S)[0]
+
+
+def test_where_the_causes_make_it_worse_that_is_said_on_the_tile_and_below(tmp_path):
+    folder = write_session(tmp_path / "leg")
+    assert "worse with the causes" not in verdict_part(report(find([folder])))
+    worsened(folder)
+    top = verdict_part(report(find([folder])))
+    assert re.search(r"22\.4 → 36\.7 <span>mrad</span></div><small>worse with the causes", top)
+    assert "the knee&#39;s torque error is 2.95 → 3.38 N·m with the causes" in top
+    assert "What is named raises the most that can hold it" in top
+    assert "the knee strays 22.4 → 36.7 mrad with the causes: nothing corrects such a simulation" in top
+    assert "the hip strays" not in top
+
+
+def test_errors_are_told_away_from_reversals_and_with_them_as_the_residuals_have_them(session_folder, page_file):
+    rows = RESIDUALS.read(session_folder / "diagnosed" / "residuals.parquet").frame
+    rows = rows[rows["model"] == "extended"]["knee_residual_nm"], rows[rows["model"] == "extended"]["scored"]
+    shown = page_file.read_text(encoding="utf-8")
+    for words, error in (("away from reversals", rows[0][rows[1]]), ("reversals included", rows[0])):
+        line = re.search(rf"<td>knee torque, computed, {words}, N·m</td>(.*?)</tr>", shown)[1]
+        assert float(re.findall(r'value="([^"]*)"', line)[1]) == pytest.approx(np.sqrt(np.mean(error**2)))
+
+
+def test_seconds_in_which_a_joint_stands_are_told_from_those_in_which_it_moves_throughout():
+    time = np.arange(0, 3.0, 0.005)
+    place = np.where(time < 1.0, time, np.where(time < 1.6, 1.0, time - 0.6))  # stands from 1.0 to 1.6 s
+    noise = 1e-4 * np.random.default_rng(0).standard_normal(len(time))
+    frame = pd.DataFrame(
+        {"time_s": time, "window": (time // 1.0).astype(int), "knee_reference_rad": place + noise, "x": 0}
+    )
+    assert set(frame.loc[moving(frame, Joint("knee")), "window"]) == {0, 2}
+
+
+@pytest.mark.parametrize("status", ["nothing_missing", "unknown_cause"])
+def test_a_verdict_without_causes_shows_the_model_without_them_alone(tmp_path, status):
+    folder = write_session(tmp_path / "leg")
+    write_verdict(folder, status=status, causes=[], error_budget={j: {"noise_floor": 0.07} for j in ("hip", "knee")})
+    session = find([folder])
+    page = report(session)
+    drawn = {series.label for chart in charts(session).all for series in chart.all_series}
+    assert "rigid body and friction" in drawn
+    assert "with the causes" not in drawn
+    assert all(set(one.angles) == {"measured", "before"} for one in animations(session))
+    for words in ("with the cause", "with the named cause"):
+        assert words not in page[: page.index('<script type="application/json"')]
+
+
+def test_a_budget_below_the_floor_says_so_and_gives_no_second_floor(tmp_path):
+    shares = {joint: {"noise_floor": 0.07, "unexplained": 0.0} for joint in ("hip", "knee")}
+    floor = {joint: 0.3 for joint in shares}
+    (below, _) = budget(verdict_of(error_budget=shares, noise_floor_nm=floor))
+    assert below.segments[0].label == "noise, all of it below the floor"
+    floor = {joint: 0.07**0.5 for joint in shares}
+    (at, _) = budget(verdict_of(error_budget=shares, noise_floor_nm=floor))
+    assert at.segments[0].label == "noise floor"
+
+
+def test_gains_have_a_unit_in_the_heading_and_none_an_interval_of_no_width(tmp_path):
+    folder = write_session(tmp_path / "leg")
+    path = folder / "diagnosed" / "candidates.parquet"
+    table = CANDIDATES.read(path)
+    table.frame[["gain_nm", "gain_low_nm", "gain_high_nm"]] = 0.41
+    CANDIDATES.write(path, table.frame, table.metadata)
+    page = report(find([folder]))
+    assert "gain, 95 %, N·m" in page
+    assert "0.410 (no interval)" in page
+    assert "0.410 (0.410" not in page
+
+
+def test_every_symbol_is_explained_by_the_effect_it_belongs_to(page_file):
+    page = page_file.read_text(encoding="utf-8")
+    assert "tau = Ks sgn(v) + Km v" in page
+    assert '<abbr title="friction torque once the joint moves">' in page
+    assert "inertia about the hip with the knee at a right angle" in page
+    foreseen = re.search(r"standard error foreseen.*?</table>", page, re.S)[0]
+    assert re.search(r"<td>X1</td>.*?<td class=\"nowrap\">kg·m²</td>", foreseen)

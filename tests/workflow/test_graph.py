@@ -13,7 +13,7 @@ from pipelines.contracts import parquet
 from pipelines.errors import SettingsError
 from pipelines.settings import Experiment, datasets
 from pipelines.settings.template import create
-from pipelines.workflow.graph import graph
+from pipelines.workflow.graph import STAGES, graph
 
 # Settings are split by exoid itself; every other command only writes the file it was asked for.
 STAND_IN = f"""#!/bin/sh
@@ -87,6 +87,11 @@ def test_make_calls_the_commands_of_the_graph_each_after_those_it_needs(make):
     place = {step.target: called.index(" ".join(step.command).replace("./", "")) for step in steps}
     for step in steps:
         assert all(place[file] < place[step.target] for file in step.inputs if file in place)
+
+
+def test_a_new_experiment_has_every_stage_there_is(make):
+    steps = graph(Experiment.load(make.folder / "exoid.toml"), Path("exoid.toml"), Path("."))
+    assert tuple(dict.fromkeys(step.stage for step in steps)) == STAGES
 
 
 def test_where_the_model_with_causes_cannot_move_all_else_is_made(make):

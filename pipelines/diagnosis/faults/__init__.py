@@ -19,8 +19,8 @@ from pipelines.diagnosis.faults.units import angle_unit_faults, torque_unit_faul
 from pipelines.diagnosis.faults.wiring import angle_faults, cuff_faults, wiring_faults
 from pipelines.mechanics.motion import Motion
 
-LEAST_S = 5.0
-"""Of an exoskeleton's run that faults must leave, or it is not worth its place."""
+LEAST_S, LEAST_SHARE = 5.0, 0.5
+"""Of an exoskeleton's run that faults must leave, or it is not worth its place; of a short one, this share of it."""
 
 __all__ = ["Fault", "excluding", "find_faults"]
 
@@ -52,7 +52,10 @@ def find_faults(motions: Sequence[Motion]) -> list[Fault]:
 def _hopeless(motions: Sequence[Motion], faults: Iterable[Fault]) -> list[Fault]:
     """Return the faults, those of runs of which too little is left without them as such that masking does not help."""
     hopeless = {
-        m.file for m in excluding(motions, faults) if m.valid.sum() / m.sample_rate_hz < m.machine.lasting(LEAST_S)
+        sound.file
+        for whole, sound in zip(motions, excluding(motions, faults), strict=True)
+        if sound.valid.sum()
+        < min(sound.machine.lasting(LEAST_S) * sound.sample_rate_hz, LEAST_SHARE * whole.valid.sum())
     }
     return [replace(fault, samples=None) if fault.file in hopeless else fault for fault in faults]
 

@@ -1,6 +1,7 @@
 """Time as stamped: samples that are missing, stamps that jitter, clocks at another rate, counters that jump."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ JITTER = 0.04
 encoder count."""
 HALF, SURE = 0.5, 3.0
 """Share of the stamps' straying that angles follow, between none and all; standard errors."""
+BELOW = 0.5
+"""Of the angles' own noise: what wrong stamps do to the angles and is less adds an eighth to that noise at most."""
 BLOCK = 20
 """Samples whose sums are nearly independent."""
 RATE = 0.01
@@ -118,24 +121,12 @@ def _irregular(motion: Motion, on_grid: NDArray, jitter: float) -> Fault:
     """Report uneven steps: they spoil a run where the angles contradict the stamps, or there are none to ask.
 
     Samples that were taken unevenly are as good as any where the stamps say when. Where the angles are too coarse to
-    tell, what a wrong stamp does to them is too small to be seen as well.
+    tell, what a wrong stamp does to them is too small to be seen as well; where they do tell, it may still be.
     """
-    explained, spoils = "take time from the device's clock, not from the host's", True
-    if motion.measured_angle is not None:
-        followed, error = _followed(motion, motion.measured_angle, on_grid)
-        if followed + SURE * error < HALF:
-            explained = (
-                "the angles are smooth against the sample count, so only the stamps are wrong: "
-                "rebuild time_s from the device's counter and sample rate"
-            )
-        elif followed - SURE * error > HALF:
-            explained, spoils = "the angles follow the stamps: the samples were taken then, and nothing is lost", False
-        else:
-            explained, spoils = (
-                "the angles are too coarse to tell whether the stamps are right, and so to suffer where they are not: "
-                "no sample is left out; better take time from the device's clock",
-                False,
-            )
+    if motion.measured_angle is None:
+        explained, spoils = "take time from the device's clock, not from the host's", True
+    else:
+        explained, spoils = _judged(_Asked.of(motion, motion.measured_angle, on_grid))
     return Fault(
         motion.file,
         "time_s",
@@ -145,19 +136,51 @@ def _irregular(motion: Motion, on_grid: NDArray, jitter: float) -> Fault:
     )
 
 
-def _followed(motion: Motion, angle: NDArray, on_grid: NDArray) -> tuple[float, float]:
-    """Return how far the angles follow uneven stamps, and its standard error.
+@dataclass(frozen=True)
+class _Asked:
+    """What angles say of uneven stamps."""
 
-    1 where the samples were taken when the stamps say: an angle at uneven instants is rough, d angle = speed d t;
-    0 where they were taken evenly.
-    """
-    rough = np.diff(angle, 3, axis=0)
-    stray = np.diff(on_grid / motion.sample_rate_hz, 3)[:, np.newaxis] * motion.dq[2:-1]
-    whole = len(rough) // BLOCK * BLOCK
-    # Neighbouring differences share samples; sums over so many are nearly independent.
-    sums = np.sum(rough * stray, axis=1)[:whole].reshape(-1, BLOCK).sum(axis=1)
-    scale = max(float(np.sum(stray**2)), np.finfo(float).tiny)
-    return float(np.sum(rough * stray)) / scale, float(np.sqrt(len(sums)) * np.std(sums)) / scale
+    followed: float
+    """1 where the samples were taken when the stamps say: an angle at uneven instants is rough, d angle = speed d t;
+    0 where they were taken evenly."""
+    error: float
+    """Standard error of ``followed``."""
+    share: float
+    """What the stamps' straying would do to an angle, over the angle's own noise; the largest of the joints."""
+
+    @classmethod
+    def of(cls, motion: Motion, angle: NDArray, on_grid: NDArray) -> "_Asked":
+        """Compare the roughness of angles (n, J) with what stamps (n,), in sample periods off their grid, would make.
+
+        Third differences hold what a smooth motion does not: noise of angles and of stamps.
+        """
+        rough = np.diff(angle, 3, axis=0)
+        stray = np.diff(on_grid / motion.sample_rate_hz, 3)[:, np.newaxis] * motion.dq[2:-1]
+        whole = len(rough) // BLOCK * BLOCK
+        # Neighbouring differences share samples; sums over so many are nearly independent.
+        sums = np.sum(rough * stray, axis=1)[:whole].reshape(-1, BLOCK).sum(axis=1)
+        tiny = np.finfo(float).tiny
+        scale = max(float(np.sum(stray**2)), tiny)
+        return cls(
+            followed=float(np.sum(rough * stray)) / scale,
+            error=float(np.sqrt(len(sums)) * np.std(sums)) / scale,
+            share=float(np.max(np.std(stray, axis=0) / np.maximum(np.std(rough, axis=0), tiny))),
+        )
+
+
+def _judged(asked: _Asked) -> tuple[str, bool]:
+    """Say what uneven stamps mean, and whether they spoil the run."""
+    if asked.followed - SURE * asked.error > HALF:
+        return "the angles follow the stamps: the samples were taken then, and nothing is lost", False
+    if asked.followed + SURE * asked.error >= HALF:
+        return (
+            "the angles are too coarse to tell whether the stamps are right, and so to suffer where they are not: "
+            "no sample is left out; better take time from the device's clock"
+        ), False
+    told = "the angles are smooth against the sample count, so only the stamps are wrong: "
+    if asked.share < BELOW:
+        return f"{told}by {100 * asked.share:.2g} % of the angles' own noise at most, and nothing is lost", False
+    return f"{told}rebuild time_s from the device's counter and sample rate", True
 
 
 def _rate(motion: Motion, on_grid: NDArray) -> Iterator[Fault]:

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.dependence import VARIABLES, Variable, knows, pooled, tone
 from pipelines.diagnosis.diagnose import Diagnosis
-from pipelines.diagnosis.figures.palette import AFTER, BEFORE, NOISE
+from pipelines.diagnosis.figures.palette import AFTER, BEFORE
 from pipelines.diagnosis.observations import Run
 from pipelines.mechanics.units import unit_at
+from pipelines.plots import NOISE
+from pipelines.signals.binned_mean import binned_mean
 
-BINS, FEWEST = 40, 8
-"""Of a running mean, and the blocks that a bin needs to have one."""
 DOTS = 2000
 """At most, or a cloud hides its shape (and takes long to draw)."""
 LINES = ("-", "--", ":", "-.")
@@ -114,17 +114,8 @@ def draw(axis: Axes, seen: Against, floor: float, height: float, changed: bool) 
         axis.plot(seen.x[::step], residual[::step], ".", ms=1.8, mew=0, color=colour, alpha=alpha, rasterized=True)
     for residual, colour, _ in kinds:
         for part, line in zip(seen.parts, cycle(LINES)):
-            axis.plot(*binned_mean(seen.x[part], residual[part]), line, color=colour, lw=2)
+            if part.any():
+                x = seen.x[part]
+                axis.plot(*binned_mean(x, residual[part], x.min(), x.max()), line, color=colour, lw=2)
     axis.set_ylim(-height, height)
     axis.set_xlabel(seen.label)
-
-
-def binned_mean(x: NDArray, y: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the middles of equally wide bins along ``x`` (n,) and the mean of ``y`` in each; NaN where few are."""
-    if not len(x):
-        return x, y
-    edges = np.linspace(x.min(), x.max(), BINS + 1)
-    number = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, BINS - 1)
-    count = np.bincount(number, minlength=BINS)
-    mean = np.bincount(number, y, BINS) / np.maximum(count, 1)
-    return 0.5 * (edges[1:] + edges[:-1]), np.where(count >= FEWEST, mean, np.nan)

@@ -11,17 +11,11 @@ from matplotlib.patches import Patch
 
 from pipelines.diagnosis.diagnose import Diagnosis
 from pipelines.diagnosis.error_budget import FLOOR, LEFT, REPEATS, WANDERS
-from pipelines.diagnosis.figures.palette import AFTER, CAUSE, NOISE
-from pipelines.label import effect_labelled, in_words
+from pipelines.label import SHARES, effect_labelled, in_words
+from pipelines.plots import BLUE, CAUSES, NOISE
+from pipelines.plots import WANDERS as SCATTER
 
-WORDS = {
-    FLOOR: "noise floor",
-    REPEATS: "unexplained, repeats every period",
-    WANDERS: "unexplained, does not repeat",
-    LEFT: "unexplained",
-}
-COLOURS = {FLOOR: NOISE, REPEATS: AFTER, WANDERS: "#93b4f5", LEFT: AFTER}
-CAUSES = (CAUSE, "#f59e0b", "#7c2d12")
+COLOURS = {FLOOR: NOISE, REPEATS: BLUE, WANDERS: SCATTER, LEFT: BLUE}
 ROOM = 0.07
 """Share of a bar that a number needs to stand in it."""
 SMALL = 0.095
@@ -61,7 +55,7 @@ def colours_of(budget: Mapping[str, Mapping[str, float]]) -> dict[str, str]:
 
 def words_of(key: str) -> str:
     """Say what a share is."""
-    return WORDS.get(key) or in_words(effect_labelled(key))
+    return SHARES.get(key) or in_words(effect_labelled(key))
 
 
 def stack(axis: Axes, row: float, shares: Mapping[str, float], colours: Mapping[str, str], scale: float = 1.0) -> None:

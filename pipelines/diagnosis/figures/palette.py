@@ -1,8 +1,7 @@
 """Colours that the figures of a diagnosis share."""
 
-from pipelines.plots import BLUE, GREY, ORANGE
+from pipelines.plots import BLUE, GREY
 
-BEFORE, AFTER, CAUSE = GREY, BLUE, ORANGE
-"""What the baseline leaves or simulates; what the extended model does; what a cause makes of it."""
-NOISE = "#d5dae1"
+BEFORE, AFTER = GREY, BLUE
+"""What the baseline leaves or simulates; what the extended model does."""
 MEASURED = "black"

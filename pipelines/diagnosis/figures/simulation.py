@@ -9,9 +9,10 @@ from matplotlib.figure import Figure
 
 from pipelines.diagnosis.diagnose import Diagnosis
 from pipelines.diagnosis.examined import Extended
-from pipelines.diagnosis.figures.palette import AFTER, BEFORE, MEASURED, NOISE
+from pipelines.diagnosis.figures.palette import AFTER, BEFORE, MEASURED
 from pipelines.diagnosis.replayed import Stretch, simulated_error, worst_stretch
 from pipelines.label import number
+from pipelines.plots import NOISE
 
 NARROWEST = 8.0
 """Inches that the titles need."""

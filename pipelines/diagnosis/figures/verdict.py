@@ -13,10 +13,11 @@ from pipelines.diagnosis.dependence import VARIABLES, knows, tone, variable_shar
 from pipelines.diagnosis.diagnose import Diagnosis
 from pipelines.diagnosis.figures.against import against, draw, reach
 from pipelines.diagnosis.figures.budget import colours_of, highest, lowest, rms, stack, words_of
-from pipelines.diagnosis.figures.palette import AFTER, BEFORE, NOISE
+from pipelines.diagnosis.figures.palette import AFTER, BEFORE
 from pipelines.effects import RUNS
 from pipelines.label import effect_labelled, in_words
 from pipelines.model import effect_named
+from pipelines.plots import NOISE
 
 WIDTH = 125
 """Characters of the summary in a line."""

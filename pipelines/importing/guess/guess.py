@@ -61,9 +61,10 @@ def propose(paths: Sequence[Path]) -> Proposal:
                 f"no name says angle or position, and no column integrates to another among {', '.join(source.names)}; "
                 "write the map by hand, docs/import.md tells how"
             )
+    single = {name: float(v[0]) for name, v in columns.items() if len(v) == 1 and v.dtype.kind in "iuf"}
     used = {time.column}
     for number, joint in enumerate(joints):
-        used |= set(write_joint(proposal, number, joint, here, run.time_s, alone=len(joints) == 1))
+        used |= set(write_joint(proposal, number, joint, here, run.time_s, len(joints) == 1, single))
     _write_geometry(proposal, len(joints))
     _write_recordings(proposal, paths)
     _remark_on_the_rest(proposal, [name for name in source.names if name not in used], columns)

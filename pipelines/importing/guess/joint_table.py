@@ -1,5 +1,6 @@
 """The tables of a joint in a map: its columns, their units, signs and zeros, each with its reason."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -23,13 +24,23 @@ SWINGS_RAD = 2.0
 HANGS_RAD = 0.15
 """So near is gravity's word to zero where the log has its zero there: friction and backlash spoil it by that much."""
 
+GAIN = re.compile(r"gain|^g_?(tau|f)|^k_?t(au)?$", re.IGNORECASE)
+"""What logs call the gain of a drive."""
+
 
 def write_joint(
-    proposal: Proposal, number: int, joint: JointColumns, columns: Columns, time_s: NDArray, alone: bool
+    proposal: Proposal,
+    number: int,
+    joint: JointColumns,
+    columns: Columns,
+    time_s: NDArray,
+    alone: bool,
+    constants: Mapping[str, float],
 ) -> list[str]:
     """Write a joint's tables into a map; return the columns (n,) that are in them.
 
-    Only of a joint ``alone`` does its own motion tell what its torque does: others throw it about.
+    ``constants`` are the log's single numbers, among which may be a drive's gain. Only of a joint ``alone`` does its
+    own motion tell what its torque does: others throw it about.
     """
     where = f"joint[{number}]"
     logged = {quantity: columns[m.column].astype(float) for quantity, m in joint.columns.items()}
@@ -64,7 +75,7 @@ def write_joint(
         proposal.key("wraps_at", full, "steps by so much from one row to the next: its counter was full")
     if velocity is not None:
         used.append(_write_velocity(proposal, where, joint, units))
-    used.append(_write_torque(proposal, where, joint, kind, bits, fit if alone else None))
+    used.append(_write_torque(proposal, where, joint, kind, bits, fit if alone else None, constants))
     used += _write_others(proposal, where, joint, units)
     return used
 
@@ -115,6 +126,7 @@ def _write_torque(
     kind: Kind,
     bits: Mapping[str, int | None],
     fit: TorqueFit | None,
+    constants: Mapping[str, float],
 ) -> str:
     drive = next((quantity for quantity in DRIVES if quantity in joint.columns), None)
     proposal.table("[joint.torque]", f"{where}.torque")
@@ -129,7 +141,7 @@ def _write_torque(
     )
     if bits[drive]:
         proposal.key("signed_bits", bits[drive], f"whole numbers up to 2^{bits[drive]}: its sign was lost")
-    _write_torque_unit(proposal, drive, found.unit, kind, whole=bits[drive] is not None)
+    _write_torque_unit(proposal, drive, found.unit, kind, bits[drive] is not None, constants)
     _write_torque_sign(proposal, fit)
     return found.column
 
@@ -140,11 +152,13 @@ def _what_torque(commanded: bool, rather: str) -> str:
     return rather
 
 
-def _write_torque_unit(proposal: Proposal, drive: str, named: str | None, kind: Kind, whole: bool) -> None:
+def _write_torque_unit(
+    proposal: Proposal, drive: str, named: str | None, kind: Kind, whole: bool, constants: Mapping[str, float]
+) -> None:
     dimension = UNITS[named].dimension if named else ""
     if drive == "voltage":
         proposal.key("unit", named if dimension == "voltage" else "V", "a voltage, by its name", dimension == "voltage")
-        proposal.unknown("gain_n_v" if kind == "prismatic" else "gain_nm_v", "what a volt does, from the amplifier")
+        proposal.unknown("gain_n_v" if kind == "prismatic" else "gain_nm_v", _what_a_volt_does(kind, constants))
     elif drive == "current" or dimension == "current" or whole:
         why = "its name says so" if dimension == "current" else "whole numbers, as drives tell mA"
         proposal.key("unit", named if dimension == "current" else "mA" if whole else "A", why, dimension == "current")
@@ -154,6 +168,13 @@ def _write_torque_unit(proposal: Proposal, drive: str, named: str | None, kind: 
         proposal.key("unit", named, "its name says so")
     else:
         proposal.key("unit", "N·m" if kind == "revolute" else "N", "no name says its unit; SI assumed", sure=False)
+
+
+def _what_a_volt_does(kind: Kind, constants: Mapping[str, float]) -> str:
+    """Say where the gain of an amplifier is to be had, and what it is called where the joint slides after all."""
+    held = [f"{name} = {value:.6g}" for name, value in constants.items() if GAIN.search(name)]
+    found = f"perhaps {held[0]}, which the log holds" if held else "from the amplifier"
+    return f"what a volt does, {found}" + ("; gain_n_v where it slides" if kind == "revolute" else "")
 
 
 def _write_torque_sign(proposal: Proposal, fit: TorqueFit | None) -> None:

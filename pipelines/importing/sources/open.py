@@ -11,6 +11,7 @@ from pipelines.importing.sources.rosbag import open_rosbag
 from pipelines.importing.sources.source import Source
 from pipelines.importing.sources.text import open_text
 from pipelines.settings.import_map import SourceSettings
+from pipelines.validation import similar_file
 
 BEGINNINGS = {
     b"PAR1": open_parquet,
@@ -31,7 +32,7 @@ def open_source(path: Path, settings: SourceSettings) -> Source:
         Where there is no such file, or it is of no format that exoid knows, or damaged.
     """
     if not path.exists():
-        raise InputError("no such file; check the name")
+        raise InputError(f"no such file; {similar_file(path) or 'check the name'}")
     if path.is_dir():
         if not (path / "metadata.yaml").exists():
             raise InputError("is a folder, expected a log or the folder of a ROS 2 bag; name a file in it")

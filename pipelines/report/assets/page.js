@@ -3,7 +3,7 @@
   const data = JSON.parse(document.getElementById("data").textContent);
   const plots = new Map(); // key of a chart -> its uPlots
   const groups = new Map(); // group -> {charts, range}
-  const PANEL_PX = 190, LOWER_PX = 130, PRINT_PX = 660;
+  const PANEL_PX = 190, LOWER_PX = 130, PRINT_PX = 660, PRINT_SHARE = 0.7;
 
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
 
@@ -112,6 +112,7 @@
           })],
         },
       }, [x, ...panel.series.map(column)], box);
+      u.onScreen = u.height;
       made.push(u);
     });
     if (group.range) made.forEach((u) => u.setScale("x", { min: group.range[0], max: group.range[1] }));
@@ -149,16 +150,17 @@
   }, { rootMargin: "600px 0px" });
   figures.forEach((figure) => seen.observe(figure));
 
-  function fit(width) {
+  function fit() {
     for (const figure of figures) {
       const place = figure.querySelector(".plot");
       for (const u of plots.get(figure.dataset.chart) || []) {
-        const wanted = width || place.clientWidth;
-        if (wanted > 0 && u.width !== wanted) u.setSize({ width: wanted, height: u.height });
+        const wanted = place.clientWidth;
+        if (wanted > 0 && (u.width !== wanted || u.height !== u.onScreen)) u.setSize({ width: wanted, height: u.onScreen });
       }
     }
   }
-  const redraw = () => { for (const made of plots.values()) for (const u of made) u.redraw(true); for (const stage of stages) stage.draw(); };
+  // A plot that has not been drawn yet has no scale to redraw at; it will take the colours that there are.
+  const redraw = () => { for (const made of plots.values()) for (const u of made) if (u.status === 1) u.redraw(true); for (const stage of stages) stage.draw(); };
   new ResizeObserver(() => fit()).observe(document.querySelector("main"));
   for (const details of document.querySelectorAll("details")) details.addEventListener("toggle", () => fit());
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
@@ -170,7 +172,7 @@
     closed.forEach((details) => { details.open = true; });
     figures.forEach(draw);
     for (const figure of figures) for (const u of plots.get(figure.dataset.chart) || []) {
-      u.setSize({ width: figure.closest(".grid, .hero") ? PRINT_PX / 2 - 30 : PRINT_PX, height: u.height });
+      u.setSize({ width: figure.closest(".grid, .hero") ? PRINT_PX / 2 - 30 : PRINT_PX, height: PRINT_SHARE * u.height });
     }
     redraw();
   });
@@ -182,7 +184,7 @@
   });
 
   // The machine in motion.
-  const LINE_PX = { measured: 16, before: 6, after: 3.5 };
+  const LINE_PX = { measured: 14, before: 7, after: 3 };
   class Stage {
     constructor(box, told) {
       this.told = told;
@@ -242,8 +244,7 @@
       ctx.scale(scale, scale);
       ctx.lineCap = ctx.lineJoin = "round";
       for (const [role, values] of this.moves) {
-        ctx.strokeStyle = ctx.fillStyle = role === "measured" ? css("ink-3") : css(role === "before" ? "cause1" : role);
-        ctx.globalAlpha = role === "measured" ? 0.45 : 1;
+        ctx.strokeStyle = ctx.fillStyle = css(role);
         ctx.lineWidth = LINE_PX[role];
         const points = told.kind === "slider" ? this.slide(values, width, height) : this.hang(values, width, height);
         ctx.beginPath();
@@ -251,13 +252,18 @@
         ctx.stroke();
         for (const [x, y] of points) { ctx.beginPath(); ctx.arc(x, y, LINE_PX[role] / 2 + 2, 0, 7); ctx.fill(); }
       }
-      ctx.globalAlpha = 1;
+      if (+this.times.value !== 1) {
+        ctx.fillStyle = css("ink");
+        ctx.font = "600 13px system-ui, sans-serif";
+        ctx.fillText(`difference from measured drawn × ${this.times.value}`, 12, height - 12);
+      }
       this.slider.value = Math.floor(this.at);
       this.clock.textContent = this.time[Math.floor(this.at)].toFixed(2) + " s";
     }
     hang(values, width, height) {
-      const reach = this.told.lengths.reduce((a, b) => a + b, 0), size = 0.82 * Math.min(height, 0.7 * width) / reach;
-      let x = 0.45 * width, y = 0.09 * height, angle = 0;
+      const [left, right, up, down] = this.reached(), room = 26;
+      const size = Math.min((height - 2 * room) / (up + down), (width - 2 * room) / (left + right));
+      let x = 0.5 * (width + size * (left - right)), y = room + 0.5 * (height - 2 * room + size * (up - down)), angle = 0;
       const points = [[x, y]];
       this.angles(values).forEach((q, j) => {
         angle += q;
@@ -266,6 +272,23 @@
         points.push([x, y]);
       });
       return points;
+    }
+    // How far the links go to either side of the pivot, above and below it, in the whole motion as it is drawn now.
+    reached() {
+      const times = +this.times.value;
+      if (this.reach && this.reach.times === times) return this.reach.box;
+      const box = [0.2, 0.2, 0.05, 0.05], measured = this.moves[0][1];
+      for (const [, values] of this.moves) for (let k = 0; k < values.length; k += this.joints) {
+        let x = 0, y = 0, angle = 0;
+        for (let j = 0; j < this.joints; j++) {
+          angle += measured[k + j] + times * (values[k + j] - measured[k + j]);
+          x += this.told.lengths[j] * Math.sin(angle);
+          y += this.told.lengths[j] * Math.cos(angle);
+          box[0] = Math.max(box[0], -x); box[1] = Math.max(box[1], x); box[2] = Math.max(box[2], -y); box[3] = Math.max(box[3], y);
+        }
+      }
+      this.reach = { times, box };
+      return box;
     }
     slide(values, width, height) {
       const x = width * (0.5 + 0.42 * this.angles(values)[0] / this.told.lengths[0]);

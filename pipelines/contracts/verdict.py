@@ -1,0 +1,191 @@
+"""``verdict/1``, the answer of ``exoid diagnose`` as JSON: whole, with numbers where they belong, or refused."""
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
+
+from pipelines.errors import ContractError
+from pipelines.validation import explain
+
+Number = Annotated[FiniteFloat, Field(strict=True)]
+ByJoint = dict[str, Number]
+Interval = Annotated[list[Number], Field(min_length=2, max_length=2)]
+
+
+class _Object(BaseModel):
+    model_config = ConfigDict(extra="allow")
+
+
+class Parameter(_Object):
+    """One number of a cause."""
+
+    name: str
+    value: Number
+    unit: str
+    ci95: Annotated[list[float | None], Field(min_length=2, max_length=2)]
+    """No numbers where it has no interval."""
+
+
+class Gain(_Object):
+    """What naming a cause takes away."""
+
+    rmse_reduction_nm: Number
+    ci95: Interval
+    joint: str
+
+
+class Tie(_Object):
+    """A cause that these data cannot tell from a named one."""
+
+    effect: str
+    joint: str | None
+    why: str
+    how_to_separate: str
+    probability: Number | None = None
+
+
+class Cause(_Object):
+    """One named cause."""
+
+    effect: str
+    joint: str | None
+    side: str
+    probability: Annotated[Number, Field(ge=0.0, le=1.0)]
+    parameters: list[Parameter]
+    gain: Gain
+    indistinguishable_from: list[Tie]
+    evidence: list[str]
+
+
+class Loop(_Object):
+    """One model under adaptive control."""
+
+    tracking_rmse_rad: ByJoint
+    peak_torque_nm: ByJoint
+
+
+class Control(_Object):
+    """The adaptive loop on both models, or the reason why there is none."""
+
+    reason: str | None
+    without: Loop | None = None
+    with_: Loop | None = Field(None, alias="with")
+
+
+class Dependence(_Object):
+    """A variable and the share of the error that it foretells."""
+
+    variable: str
+    share_before: Number
+    share_after: Number
+
+
+class Fault(_Object):
+    """Something wrong with a file's data."""
+
+    file: str
+    channel: str
+    what: str
+
+
+class Residual(_Object):
+    """What is left without a known cause."""
+
+    description: str
+
+
+class Input(_Object):
+    """A file that the verdict was computed from."""
+
+    name: str
+    sha256: str
+
+
+class Provenance(_Object):
+    """Where it came from; what else stands there, nobody computes with."""
+
+    inputs: list[Input] = []
+    config: dict[str, Any] = {}
+    software: dict[str, str] = {}
+
+
+class Verdict(_Object):
+    """The document (docs/contracts.md)."""
+
+    status: str
+    summary: str
+    caveats: list[str]
+    scoring: dict[str, Any]
+    noise_floor_nm: dict[str, Annotated[Number, Field(gt=0.0)]] = Field(min_length=1)
+    baseline_rmse_nm: ByJoint
+    extended_rmse_nm: ByJoint
+    baseline_rmse_unmasked_nm: ByJoint
+    extended_rmse_unmasked_nm: ByJoint
+    baseline_simulation_rmse_rad: dict[str, Number | None]
+    extended_simulation_rmse_rad: dict[str, Number | None]
+    unexplained: dict[str, Number | None]
+    control: Control
+    error_budget: dict[str, ByJoint]
+    depends_on: dict[str, list[Dependence]]
+    units: dict[str, dict[str, str]]
+    causes: list[Cause]
+    data_faults: list[Fault]
+    residual: Residual | None
+    runs: list[str]
+    noise_floor_from: str
+    provenance: Provenance = Provenance()
+
+    @model_validator(mode="after")
+    def _joints_agree(self) -> "Verdict":
+        joints = set(self.noise_floor_nm)
+        for key, of_joints in self._tables():
+            if set(of_joints) != joints:
+                raise ValueError(f"{key} is of {_listed(of_joints)}, noise_floor_nm of {_listed(joints)}")
+        for number, cause in enumerate(self.causes):
+            if cause.gain.joint not in joints:
+                raise ValueError(f"causes[{number}].gain.joint is {cause.gain.joint!r}, no joint of noise_floor_nm")
+        return self
+
+    def _tables(self) -> Iterator[tuple[str, Mapping[str, Any]]]:
+        for key in ("baseline_rmse_nm", "extended_rmse_nm", "baseline_rmse_unmasked_nm", "extended_rmse_unmasked_nm",
+                    "baseline_simulation_rmse_rad", "extended_simulation_rmse_rad", "unexplained", "error_budget",
+                    "depends_on", "units"):  # fmt: skip
+            yield key, getattr(self, key)
+        for key, loop in (("without", self.control.without), ("with", self.control.with_)):
+            if loop:
+                yield f"control.{key}.tracking_rmse_rad", loop.tracking_rmse_rad
+                yield f"control.{key}.peak_torque_nm", loop.peak_torque_nm
+
+
+def _listed(joints: Any) -> str:
+    return ", ".join(sorted(joints)) or "no joint"
+
+
+def parsed(path: Path) -> Any:
+    """Return what a JSON file holds; ContractError, with the place, where it is not whole."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except UnicodeDecodeError as error:
+        raise ContractError(f"{path}: is no text ({error.reason} at byte {error.start}); make it again") from error
+    except json.JSONDecodeError as error:
+        raise ContractError(
+            f"{path}: is no whole JSON document (line {error.lineno}, column {error.colno}: {error.msg}); make it again"
+        ) from error
+
+
+def check(content: Mapping[str, Any], source: str) -> None:
+    """Raise a ContractError that names the first key of a verdict that is missing or no number."""
+    try:
+        Verdict.model_validate(content)
+    except ValidationError as error:
+        raise ContractError(f"{source}: {explain(error, content)} (`exoid diagnose` makes it again)") from error
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Return a checked verdict as its file holds it."""
+    content = parsed(path)
+    check(content, str(path))
+    return dict(content)

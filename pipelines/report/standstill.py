@@ -1,0 +1,73 @@
+"""Where naming the causes makes a simulation worse, and what the files tell of why: standstill, mostly."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipelines.contracts import Joint
+from pipelines.report.numbers import digits
+from pipelines.report.session import Session
+
+SLOW = 0.1
+"""Share of its rms speed below which a joint is taken for standing."""
+OVER_S = 0.1
+"""Over which speed is measured: an encoder's noise is no motion."""
+NOTABLE = 1.1
+"""How many times a simulation's error must grow for words to be made of it."""
+HOLDING = ("stribeck_friction", "presliding_hysteresis", "load_dependent_friction", "coulomb_asymmetry")
+"""Causes that hold a joint while it stands."""
+
+
+def moving(frame: pd.DataFrame, joint: Joint) -> NDArray[np.bool_]:
+    """Return (n,) whether each row of a replay is of a second in which the machine's joint never stood."""
+    time, place = (frame[name].to_numpy() for name in ("time_s", joint.column("reference")))
+    windows = frame["window"].to_numpy()
+    span = max(1, round(OVER_S / float(np.median(np.diff(time)))))
+    moved, within = place[span:] - place[:-span], windows[span:] == windows[:-span]
+    slow = np.abs(moved) < SLOW * np.sqrt(np.mean(moved[within] ** 2))
+    return ~np.isin(windows, windows[span:][within & slow])
+
+
+def worse(session: Session) -> list[str]:
+    """Return a sentence for each way in which the causes make things worse at a joint, and why as far as is known."""
+    verdict = session.verdict
+    if not verdict or not verdict["causes"]:
+        return []
+    return [sentence for joint in session.joints for sentence in _at(joint, verdict)]
+
+
+def strays_further(before: float | None, after: float | None) -> bool:
+    """Tell whether a simulation's error grows by more than a trifle."""
+    return before is not None and after is not None and after > NOTABLE * before
+
+
+def _at(joint: Joint, verdict: dict[str, Any]) -> Iterator[str]:
+    name, push = joint.name, joint.effort
+    if name not in verdict["noise_floor_nm"]:
+        return
+    (before, after), (all_before, all_after), (strayed, strays) = (
+        (verdict[f"baseline_{key}"][name], verdict[f"extended_{key}"][name])
+        for key in ("rmse_nm", "rmse_unmasked_nm", "simulation_rmse_rad")
+    )
+    holds = any(cause["joint"] == name and cause["effect"] in HOLDING for cause in verdict["causes"])
+    grew = all_after**2 - all_before**2 > verdict["noise_floor_nm"][name] ** 2
+    if grew:
+        yield (
+            f"Reversals included, the {name}'s {push} error is {digits(all_before)} → {digits(all_after)} "
+            f"{joint.unit('torque')} with the causes, and {digits(before)} → {digits(after)} away from them: a joint "
+            f"that stands is held by any {push} up to the one that breaks it free, and no model of speed can tell which"
+            + (". What is named raises the most that can hold it" if holds else "")
+        )
+    if strays_further(strayed, strays):
+        why = (
+            f"nothing corrects such a simulation, and a small error of {push} decides when a joint that stands comes "
+            "free; the table of each run tells apart the seconds in which it never stands"
+        )
+        yield (
+            f"Simulated for 1 s by the recorded {push}, the {name} strays {digits(1e3 * strayed)} → "
+            f"{digits(1e3 * strays)} m{joint.unit('angle')} with the causes: "
+            + (why if grew or holds else "these files do not tell why")
+        )
