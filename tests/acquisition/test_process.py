@@ -198,4 +198,6 @@ def test_when_the_host_is_killed_the_drives_stop_the_leg_and_disable_themselves(
     config.write_text(config.read_text().replace("300.0", "1.0"))
     again = start([*arguments[:-1], tmp_path / "two.parquet", "--reset-faults"])
     _, err = again.communicate(timeout=60)
-    assert (again.returncode, err) == (0, "")
+    assert again.returncode == 0
+    # On a busy computer a run in real time may miss a sample, and tells so: no fault of a drive is left to tell.
+    assert all("samples were missed" in line for line in err.splitlines()), err
