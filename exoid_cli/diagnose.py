@@ -40,7 +40,7 @@ def diagnose(
       exoid diagnose recordings/*.parquet -o diagnosed/
     """
     from pipelines.contracts import CANDIDATES, PARAMETERS, RESIDUALS, describe
-    from pipelines.contracts.atomic import open_folder, write_text
+    from pipelines.contracts.atomic import all_or_none, open_folder, write_text
     from pipelines.diagnosis.candidate_table import candidates
     from pipelines.diagnosis.detect import as_json, detectability
     from pipelines.diagnosis.diagnose import diagnose as find
@@ -68,21 +68,22 @@ def diagnose(
         "mechanism": motions[0].machine.mechanism.name,
         "geometry": motions[0].geometry.metadata(),
         "method": {"name": "joint fit of baseline and named causes", "status": found.status},
+        "collinear": found.collinear,
+        "unrealizable": found.unrealizable,
     }
     frames = {"parameters": found.parameters, "residuals": found.residuals, "candidates": candidates(found)}
     visible = as_json(detectability(found.train, found.baseline, found.floor))
-    # The verdict goes first and comes last: it never stands beside tables of another diagnosis.
-    (output / "verdict.json").unlink(missing_ok=True)
-    for name, contract in tables.items():
-        contract.write(output / f"{name}.parquet", frames[name], shared | (model if name == "parameters" else {}))
-    write_text(
-        output / "detectability.json", json.dumps(visible | {"provenance": shared}, indent=1, ensure_ascii=False) + "\n"
-    )
-    for old in (output / f"{name}.{kind}" for name in FIGURES for kind in ("png", "pdf")):
-        old.unlink(missing_ok=True)
-    if figures:
-        draw(found, said, output)
-    write_text(output / "verdict.json", json.dumps(said | {"provenance": shared}, indent=1, ensure_ascii=False) + "\n")
+    with all_or_none(output, vouching="verdict.json") as made:
+        for name, contract in tables.items():
+            contract.write(made / f"{name}.parquet", frames[name], shared | (model if name == "parameters" else {}))
+        for name, told in (("detectability", visible), ("verdict", said)):
+            text = json.dumps(told | {"provenance": shared}, indent=1, ensure_ascii=False)
+            write_text(made / f"{name}.json", f"{text}\n")
+        if figures:
+            draw(found, said, made)
+        for old in (f"{name}.{kind}" for name in FIGURES for kind in ("png", "pdf")):
+            if not (made / old).exists():
+                (output / old).unlink(missing_ok=True)
     console.emit(said)
     show_verdict(said, motions[0].machine.joints)
     console.wrote(

@@ -36,6 +36,8 @@ def show_verdict(said: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
 
 
 def _show_cause(cause: Mapping[str, Any]) -> None:
+    from pipelines.label import cause_label
+
     where = f" at the {cause['joint']}" if cause["joint"] else ""
     console.say(f"\n{cause['effect']}{where} ({cause['side']}), probability {cause['probability']:.2f}")
     for p in cause["parameters"]:
@@ -43,8 +45,7 @@ def _show_cause(cause: Mapping[str, Any]) -> None:
     for sentence in cause["evidence"]:
         console.note(f"- {sentence}")
     for tie in cause["indistinguishable_from"]:
-        other = f"{tie['effect']}@{tie['joint']}" if tie["joint"] else tie["effect"]
-        console.note(f"or {other}: {tie['why']}; {tie['how_to_separate']}")
+        console.note(f"or {cause_label(tie)}: {tie['why']}; {tie['how_to_separate']}")
 
 
 def _in_words(parameter: Mapping[str, Any]) -> str:

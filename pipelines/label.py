@@ -1,5 +1,8 @@
 """A cause's label, ``effect@joint`` (see ``Effect.label``): whose it is, and how sentences say it."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from pipelines.effects import Effect
 from pipelines.mechanics.machine import Machine
 from pipelines.model import effect_named
@@ -14,6 +17,11 @@ SHARES = {
     "unexplained": "unexplained",
 }
 """Shares of the verdict's ``error_budget`` that are no cause, in words."""
+
+
+def cause_label(cause: Mapping[str, Any]) -> str:
+    """Return the label of a cause, or of a rival, as a verdict has it."""
+    return f"{cause['effect']}@{cause['joint']}" if cause["joint"] else str(cause["effect"])
 
 
 def effect_labelled(label: str) -> Effect:

@@ -11,6 +11,7 @@ from pipelines.effects import EFFECTS, RUNS, Effect, Parameter, Side
 from pipelines.effects.friction import Friction
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
+from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import THE_LEG, Machine
 from pipelines.mechanics.motion import Motion
 from pipelines.validation import closest, suggestion
@@ -197,3 +198,13 @@ def term_from(effect: Effect, values: Mapping[str, float]) -> Term:
         )
     physical = np.array([values.get(name, parameter.default) for name, parameter in known.items()], dtype=float)
     return Term(effect, effect.values_from(physical))
+
+
+def unrealizable(parameters: pd.DataFrame, machine: Machine, geometry: Geometry) -> list[str]:
+    """Say why no real machine has the rigid bodies of a ``parameters/1`` table; empty when one may."""
+    bodies = parameters[parameters["effect"] == RigidBody.name]
+    return [
+        f"{run}: {reason}"
+        for run, rows in bodies.groupby("run", sort=False)
+        for reason in machine.mechanism.unrealizable(rows["value"].to_numpy(float), geometry)
+    ]

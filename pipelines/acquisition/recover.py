@@ -8,6 +8,7 @@ from pipelines.acquisition.lock import locked
 from pipelines.acquisition.recorded import Account, account_of, place_for, write_recording
 from pipelines.contracts.beside import JOURNAL
 from pipelines.errors import InputError
+from pipelines.validation import similar_file
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,9 @@ def recover(path: Path, output: Path | None = None) -> Recovered:
         Where it is none, is still written to, or holds no sample, and where the output is there already.
     """
     if not path.exists():
-        raise InputError(f"{path}: no such file; `exoid recover` takes the journal that a killed run left")
+        raise InputError(
+            f"{path}: no such file; {similar_file(path) or '`exoid recover` takes the journal that a killed run left'}"
+        )
     if not path.is_file():  # a pipe would be waited for
         raise InputError(f"{path}: is no file, expected the journal that a killed run left; name another")
     with locked(path) as lock:

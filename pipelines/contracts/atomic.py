@@ -44,21 +44,27 @@ def refuse_what_is_no_file(path: Path) -> None:
 
 
 @contextmanager
-def all_or_none(folder: Path) -> Iterator[Path]:
+def all_or_none(folder: Path, vouching: str | None = None) -> Iterator[Path]:
     """Yield a temporary folder within ``folder``; the files written there move up once the block ends well.
 
-    On any failure, Ctrl-C included, they go and ``folder`` stays as it was.
+    On any failure, Ctrl-C included, they go and ``folder`` stays as it was. The one whose name is ``vouching`` moves
+    last, and never stands beside others than those it was made with, not even after a loss of power.
     """
     with tempfile.TemporaryDirectory(prefix=".", suffix=".tmp", dir=folder) as temporary:
         try:
             yield Path(temporary)
         except ExoidError as error:  # of a file by a name that nobody knows
             raise type(error)(str(error).replace(temporary, str(folder))) from error
+        except OSError as error:
+            error.filename = error.filename and str(error.filename).replace(temporary, str(folder))
+            raise
         made = {file: Path(os.path.realpath(folder / file.name)) for file in sorted(Path(temporary).iterdir())}
         for path in made.values():
             refuse_what_is_no_file(path)
-        for file, path in made.items():
-            _put(file, path)
+        if vouching and not all(same_but_for_the_time(path, file) for file, path in made.items()):
+            (folder / vouching).unlink(missing_ok=True)
+        for file in sorted(made, key=lambda file: file.name == vouching):
+            _put(file, made[file])
 
 
 def _put(made: Path, path: Path) -> None:

@@ -117,6 +117,7 @@ class Verdict(_Object):
 
     status: str
     summary: str
+    acquisition_at_fault: bool = False
     caveats: list[str]
     scoring: dict[str, Any]
     noise_floor_nm: dict[str, Annotated[Number, Field(gt=0.0)]] = Field(min_length=1)

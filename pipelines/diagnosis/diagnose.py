@@ -36,9 +36,11 @@ from pipelines.diagnosis.ties import ALIKE
 from pipelines.diagnosis.uncertainty import Uncertainty, uncertainty
 from pipelines.dynamics.replay import replay
 from pipelines.errors import ExoidError, InputError
+from pipelines.estimation.collinearity import collinearities
 from pipelines.label import effect_labelled
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.scale import on_one_scale
+from pipelines.model import unrealizable
 
 SEARCH_SHARE = 0.75
 """Of the progress bar that filling the bank takes."""
@@ -75,6 +77,21 @@ class Diagnosis:
     """(J,) rad: the 1 s simulation error of the baseline and of the extended model."""
     noisy_angles: bool
     """Whether only what the angles hold below 5 Hz was looked at, for above it is noise."""
+
+    @property
+    def collinear(self) -> list[str]:
+        """Which parameters of the extended model the training runs hardly tell apart, in words."""
+        fit = self.choice.named.fit
+        shapes = [(fit.causes[number].effect, i) for number, i, _ in self.sure.shapes]
+        own = [*fit.amplitudes(), *((effect, effect.shape[i]) for effect, i in shapes)]
+        names = [*self.baseline.names, *(f"{parameter.name} of {effect.label}" for effect, parameter in own)]
+        seen = np.flatnonzero(np.diag(self.sure.normal) > 0.0)
+        return collinearities(self.sure.normal[np.ix_(seen, seen)], [names[place] for place in seen])
+
+    @property
+    def unrealizable(self) -> list[str]:
+        """Why no real machine has the extended model's rigid bodies; empty when one may."""
+        return unrealizable(self.parameters, self.baseline.machine, self.train[0].motion.geometry)
 
     @property
     def causes(self) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 from pipelines.diagnosis.candidates import Candidate, columns_under, expanded, gram_of_runs, lowest
 from pipelines.diagnosis.gram import Gram, error, solve
 from pipelines.diagnosis.observations import Baseline, Run, with_load
-from pipelines.effects import Parameter, Side
+from pipelines.effects import Effect, Parameter, Side
 
 SWEEPS = 2
 EVALUATIONS = 14
@@ -59,18 +59,18 @@ class Fit:
         themselves, an amplitude beyond what is typical means little.
         """
         most = self.shares.max(axis=0)
-        for column, parameter in enumerate(self._amplitudes(), start=baseline.size):
+        for column, (_, parameter) in enumerate(self.amplitudes(), start=baseline.size):
             beyond = abs(self.values[column]) > BEYOND * max(map(abs, parameter.typical))
             if beyond and most[column] > MOST_OF_ALL:
                 return True
         return False
 
-    def _amplitudes(self) -> Iterator[Parameter]:
-        """Yield what each of the causes' columns is the amplitude of, in their order."""
+    def amplitudes(self) -> Iterator[tuple[Effect, Parameter]]:
+        """Yield effect and parameter that each of the causes' columns is the amplitude of, in their order."""
         for cause in self.causes:
             dealt = list(zip(cause.effect.linear, cause.apart, strict=True))
-            yield from (p for p, apart in dealt if not apart)
-            yield from [p for p, apart in dealt if apart] * self.acting(cause)
+            yield from ((cause.effect, p) for p, apart in dealt if not apart)
+            yield from [(cause.effect, p) for p, apart in dealt if apart] * self.acting(cause)
 
     def acting(self, cause: Candidate) -> int:
         """Return in how many of the runs a cause acts."""

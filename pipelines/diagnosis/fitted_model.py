@@ -16,7 +16,7 @@ def fitted_model(made: Fit, baseline: Baseline, kind: str) -> Model:
     """Return a fit as the model of a kind of run; what each run has for itself is as in the first one fitted."""
     # Nobody asks how sure the values are.
     size = len(made.values)
-    frame, _ = tables.parameters(made, baseline, Uncertainty(np.zeros((size, size)), 1.0, ()))
+    frame, _ = tables.parameters(made, baseline, Uncertainty(np.zeros((size, size)), 1.0, (), np.eye(size)))
     return model_from_parameters(frame, kind, baseline.machine)
 
 

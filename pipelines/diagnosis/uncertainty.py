@@ -26,6 +26,8 @@ class Uncertainty:
     critical: float
     shapes: tuple[tuple[int, int, int], ...]
     """(cause, shape parameter, run) behind each shape's place after the linear values; run -1 where shared."""
+    normal: NDArray
+    """Weighted normal matrix of the same parameters in the same order: what collinearity is read from."""
 
 
 def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: NDArray) -> Uncertainty:
@@ -67,7 +69,7 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
         if i == 0:
             cause = fit.causes[number]
             covariance[at, at] += (cause.effect.known_to * cause.shapes[max(r, 0)][0]) ** 2
-    return Uncertainty(covariance, critical, tuple(places))
+    return Uncertainty(covariance, critical, tuple(places), gram)
 
 
 def _slope(

@@ -44,6 +44,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "contract": "verdict/1",
         "status": d.status,
         "summary": _summary(d, causes, left),
+        "acquisition_at_fault": bool(d.spoilt),
         "caveats": _caveats(d),
         "scoring": {
             "bandwidth_hz": first.block.cutoff_hz(first.motion.sample_rate_hz),

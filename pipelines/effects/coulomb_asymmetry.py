@@ -10,6 +10,7 @@ class CoulombAsymmetry(Effect):
     name = "coulomb_asymmetry"
     title = "Coulomb asymmetry"
     side = Side.DRIVE
+    holds = True
     equation = "tau = a abs(sgn v): Ks + a forward, Ks - a backward"
     source = "Janot, Vandanjon, Gautier (2014), IEEE Trans. Control Systems Technology 22(1): the drive chain's offset"
     looks_like = "a constant while the joint moves, whichever way; at standstill it is gone"

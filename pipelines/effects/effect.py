@@ -110,6 +110,8 @@ class Effect(ABC):
     """Places of joints at which another parameter takes it up whole, and which."""
     by_angle: ClassVar[bool] = False
     """True where it shows only in a torque that depends on where the joints stand, as gravity's does."""
+    holds: ClassVar[bool] = False
+    """True where it raises what can hold a joint that stands."""
     whole_leg: ClassVar[bool] = False
     acts_in: ClassVar[tuple[str, ...]] = RUNS
     linear: ClassVar[tuple[Parameter, ...]] = ()

@@ -10,6 +10,7 @@ class LoadDependentFriction(Effect):
     name = "load_dependent_friction"
     title = "Load-dependent friction"
     side = Side.DRIVE
+    holds = True
     equation = "tau = mu abs(transmitted torque) sgn(v)"
     source = "Hamon, Gautier, Garrec (2010), IROS: dry friction depending on load and velocity"
     looks_like = "a square wave with the motion's direction whose height follows the load"

@@ -10,6 +10,7 @@ class PreslidingHysteresis(Effect):
     name = "presliding_hysteresis"
     title = "Presliding hysteresis"
     side = Side.DRIVE
+    holds = True
     equation = "tau = F z, dz/dt = v / travel * (1 - z sgn(v))^i, i = 1 unless said"
     source = "Dahl (1976), AIAA Journal 14(12), eq. 4"
     looks_like = "friction against angle: a loop whose corners are rounded after each reversal"

@@ -12,6 +12,7 @@ class StribeckFriction(Effect):
     name = "stribeck_friction"
     title = "Stribeck friction"
     side = Side.DRIVE
+    holds = True
     equation = "tau = F exp(-abs(v / vs)^d) sgn(v), d = 2 unless said"
     source = "Stribeck (1902); Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), eq. 3"
     looks_like = "a narrow peak of friction on both sides of zero speed"

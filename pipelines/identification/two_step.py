@@ -23,7 +23,7 @@ from pipelines.identification.runs import Runs, checked
 from pipelines.identification.validation import Validation, validate
 from pipelines.mechanics.run import Run
 from pipelines.mechanics.scale import on_one_scale
-from pipelines.model import Model, Term, baseline
+from pipelines.model import Model, Term, baseline, unrealizable
 
 
 @dataclass(frozen=True)
@@ -201,14 +201,8 @@ def _one_step(problem: Problem, estimator: Estimator, rows: Sequence[Row]) -> ND
 
 
 def _unrealizable(table: pd.DataFrame, runs: Runs) -> list[str]:
-    bodies = table[table["effect"] == "rigid_body"]
-    mechanism, geometry = runs.motions[0].machine.mechanism, runs.motions[0].geometry
-    sentences = []
-    for run in bodies["run"].unique():
-        X = bodies.loc[bodies["run"] == run, "value"].to_numpy(float)
-        sentences += [f"{run}: {reason}" for reason in mechanism.unrealizable(X, geometry)]
     driving = table[(table["effect"] == "friction") & (table["ci95_high"] < 0.0)]
-    return sentences + [
+    return unrealizable(table, runs.motions[0].machine, runs.motions[0].geometry) + [
         f"{row['name']} friction of {row['joint']} is {row['value']:.3g} {row['unit']} ({row['ci95_low']:.3g} to "
         f"{row['ci95_high']:.3g}) and would drive the joint; look for a wrong sign of its torque or its angle, or for "
         "what is taken for friction (exoid diagnose)"

@@ -13,6 +13,7 @@ from pipelines.errors import ContractError, SettingsError
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.sampled_trajectory import SampledTrajectory
 from pipelines.settings.base import Settings, load_toml
+from pipelines.validation import similar_file
 
 Trajectory = FourierTrajectory | SampledTrajectory
 
@@ -66,7 +67,9 @@ def read_trajectory(path: Path | str) -> Trajectory:
 
 def _from_toml(path: Path) -> FourierTrajectory:
     if not path.exists():
-        raise SettingsError(f"{path}: no such file; check the name, or make one with `exoid design`")
+        raise SettingsError(
+            f"{path}: no such file; {similar_file(path) or 'check the name, or make one with `exoid design`'}"
+        )
     file = load_toml(path, CoefficientFile)
     to_rad = np.pi / 180.0 if file.unit == "deg" else 1.0
     return FourierTrajectory(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from pipelines.errors import InputError
-from pipelines.label import SHARES, effect_labelled, in_words
+from pipelines.label import SHARES, cause_label, effect_labelled, in_words
 
 TONES = {"noise_floor": "noise", "repeatable_unexplained": "left", "not_repeatable": "wanders", "unexplained": "left"}
 """Names of the colours of what is no cause."""
@@ -134,11 +134,6 @@ def label_in_words(label: str) -> str:
     except InputError:
         name, _, joint = label.partition("@")
         return name.replace("_", " ") + (f" at the {joint}" if joint else "")
-
-
-def cause_label(cause: dict[str, Any]) -> str:
-    """Return the label of a cause in the verdict."""
-    return f"{cause['effect']}@{cause['joint']}" if cause["joint"] else cause["effect"]
 
 
 def causes_in_words(causes: Sequence[dict[str, Any]]) -> str:

@@ -6,8 +6,9 @@ from math import hypot
 from typing import Any
 
 from pipelines.errors import InputError
+from pipelines.label import cause_label
 from pipelines.report.acquisition import runs
-from pipelines.report.bars import Fall, cause_label, label_in_words, torque_unit
+from pipelines.report.bars import Fall, label_in_words, torque_unit
 from pipelines.report.page import render
 from pipelines.report.parameters import Estimate, estimates
 from pipelines.report.report import headline, machine, status

@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 
 from pipelines.contracts import Joint
+from pipelines.label import cause_label
 from pipelines.report import provenance
 from pipelines.report.acquisition import Run
 from pipelines.report.acquisition import runs as recordings
 from pipelines.report.animation import animations
-from pipelines.report.bars import budget, cause_label, causes_in_words, falls, label_in_words
+from pipelines.report.bars import budget, causes_in_words, falls, label_in_words
 from pipelines.report.chart import Chart, thinned_alike
 from pipelines.report.control import control_charts, loops
 from pipelines.report.excitation import excitations
@@ -154,15 +155,10 @@ def status(verdict: dict[str, Any] | None) -> dict[str, str]:
     """Return a verdict's status in words, and the tone of its badge."""
     if not verdict:
         return {"words": "not diagnosed", "tone": ""}
-    if is_spoilt(verdict):
+    if verdict.get("acquisition_at_fault"):
         return {"words": "acquisition, not physics", "tone": "bad"}
     words, tone = STATUS.get(verdict["status"], (verdict["status"].replace("_", " "), ""))
     return {"words": words, "tone": tone}
-
-
-def is_spoilt(verdict: dict[str, Any]) -> bool:
-    """Tell whether acquisition was at fault, so that no physics is blamed."""
-    return verdict["summary"].startswith("Acquisition, not physics")
 
 
 def headline(session: Session) -> str:
@@ -170,7 +166,7 @@ def headline(session: Session) -> str:
     verdict = session.verdict
     if not verdict:
         return "The verdict cannot be read" if session.has_damaged_verdict else "Not diagnosed yet"
-    if is_spoilt(verdict):
+    if verdict.get("acquisition_at_fault"):
         return "The recordings are at fault, not the model"
     if verdict["causes"]:
         words = causes_in_words(verdict["causes"])

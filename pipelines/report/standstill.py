@@ -8,6 +8,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
+from pipelines.model import BY_NAME
 from pipelines.report.numbers import digits
 from pipelines.report.session import Session
 
@@ -17,8 +18,6 @@ OVER_S = 0.1
 """Over which speed is measured: an encoder's noise is no motion."""
 NOTABLE = 1.1
 """How many times a simulation's error must grow for words to be made of it."""
-HOLDING = ("stribeck_friction", "presliding_hysteresis", "load_dependent_friction", "coulomb_asymmetry")
-"""Causes that hold a joint while it stands."""
 
 
 def moving(frame: pd.DataFrame, joint: Joint) -> NDArray[np.bool_]:
@@ -52,7 +51,10 @@ def _at(joint: Joint, verdict: dict[str, Any]) -> Iterator[str]:
         (verdict[f"baseline_{key}"][name], verdict[f"extended_{key}"][name])
         for key in ("rmse_nm", "rmse_unmasked_nm", "simulation_rmse_rad")
     )
-    holds = any(cause["joint"] == name and cause["effect"] in HOLDING for cause in verdict["causes"])
+    known = [
+        BY_NAME[cause["effect"]] for cause in verdict["causes"] if cause["joint"] == name and cause["effect"] in BY_NAME
+    ]
+    holds = any(effect.holds for effect in known)
     grew = all_after**2 - all_before**2 > verdict["noise_floor_nm"][name] ** 2
     if grew:
         yield (

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from pipelines.contracts import Joint
-from pipelines.report.bars import cause_label, falls, label_in_words, torque_unit
+from pipelines.label import cause_label
+from pipelines.report.bars import falls, label_in_words, torque_unit
 from pipelines.report.measured import replayed
 from pipelines.report.numbers import digits
 from pipelines.report.session import Session

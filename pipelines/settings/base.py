@@ -9,7 +9,7 @@ from typing import Any, Self, TypeVar, get_args
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from pipelines.errors import SettingsError
-from pipelines.validation import explain
+from pipelines.validation import explain, similar_file
 
 
 class Settings(BaseModel):
@@ -48,7 +48,9 @@ def load_toml(path: Path | str, model: type[Model]) -> Model:
 
 def _content(path: Path) -> dict[str, Any]:
     if not path.exists():
-        raise SettingsError(f"{path}: no such file; `exoid init DIR` writes a commented one to start from")
+        raise SettingsError(
+            f"{path}: no such file; {similar_file(path) or '`exoid init DIR` writes a commented one to start from'}"
+        )
     if path.is_dir():
         raise SettingsError(f"{path}: is a folder, expected a TOML file; name the file in it")
     try:

@@ -13,7 +13,7 @@ from pipelines.settings.filter import FilterSettings
 from pipelines.settings.identify import IdentifySettings
 from pipelines.settings.mechanism import MechanismSettings
 from pipelines.settings.simulate import SimulateSettings
-from pipelines.validation import suggestion
+from pipelines.validation import similar_file, suggestion
 
 
 def _four_runs() -> tuple[RunSettings, ...]:
@@ -72,7 +72,8 @@ class Experiment(Settings):
         for key, name in named.items():
             if not self.file(name).is_file():
                 raise SettingsError(
-                    f"{self._path}: {key}: {self.file(name)}: no such file; name one relative to the experiment's file"
+                    f"{self._path}: {key}: {self.file(name)}: no such file; "
+                    + (similar_file(self.file(name)) or "name one relative to the experiment's file")
                 )
 
     def refuse_what_cannot_run(self) -> None:

@@ -15,7 +15,7 @@ from pipelines.settings import transmission
 from pipelines.settings.base import Settings, load_toml
 from pipelines.settings.rig import GeometrySettings
 from pipelines.settings.units import unit_named, units_of
-from pipelines.validation import closest
+from pipelines.validation import closest, similar_file
 
 LARGEST_ZERO = 1e12
 
@@ -286,7 +286,10 @@ def load_map(path: Path) -> ImportMap:
         Where there is no such file.
     """
     if not path.exists():
-        raise SettingsError(f"{path}: no such file; `exoid import FILE... --guess --map {path}` proposes one")
+        raise SettingsError(
+            f"{path}: no such file; "
+            + (similar_file(path) or f"`exoid import FILE... --guess --map {path}` proposes one")
+        )
     return load_toml(path, ImportMap)
 
 

@@ -137,6 +137,23 @@ def test_a_mistyped_command_line_is_one_line_too(exoid, arguments, line):
     assert (outcome.code, outcome.out, outcome.err) == (2, "", line)
 
 
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (["design", "--evaluate"], "excitation.toml"),
+        (["recover"], "one.parquet.journal"),
+        (["settings", "check"], "rig.toml"),
+        (["show"], "verdict.json"),
+    ],
+    ids=lambda value: value[0] if isinstance(value, list) else None,
+)
+def test_a_mistyped_file_of_any_kind_gets_the_name_that_was_meant(exoid, tmp_path, words, meant):
+    (tmp_path / meant).touch()
+    outcome = exoid(*words, tmp_path / meant.replace("i", "", 1).replace("one", "onne"))
+    assert (outcome.code, outcome.out) == (2, "")
+    assert f"no such file; did you mean {tmp_path / meant}?" in outcome.err
+
+
 def test_exoid_alone_prints_its_help(exoid):
     outcome = exoid()
     assert "Usage: exoid" in outcome.out

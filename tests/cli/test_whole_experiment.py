@@ -108,6 +108,12 @@ def test_what_make_has_done_exoid_takes_for_done_and_the_other_way_round(exoid, 
     assert make(experiment)[1] == []
 
 
+def test_what_is_made_anew_and_says_the_same_makes_nothing_stale(exoid, experiment):
+    for stage in ("filter", "diagnose"):
+        assert exoid(stage, "--again").code == 0
+    assert {one["state"] for one in json.loads(exoid("status", "--json").out)} == {"done"}
+
+
 def test_a_command_alone_leaves_what_is_up_to_date(exoid, experiment):
     for command, *results in (
         ("design", "trajectory.parquet"),

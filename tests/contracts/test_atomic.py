@@ -57,6 +57,28 @@ def test_a_folder_is_not_replaced_by_a_file(tmp_path):
         write_text(tmp_path, "x")
 
 
+def test_a_file_that_vouches_for_others_never_stands_beside_those_it_was_not_made_with(tmp_path, monkeypatch):
+    def make(**texts):
+        with all_or_none(tmp_path, vouching="a") as made:
+            for name, text in texts.items():
+                write_text(made / name, text)
+
+    make(a="one", b="one")
+    real = os.replace
+    monkeypatch.setattr(
+        atomic.os, "replace", lambda new, old: exit("killed") if old == tmp_path / "b" else real(new, old)
+    )
+    with pytest.raises(SystemExit):
+        make(a="two", b="two")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"b": "one"}
+
+
+def test_a_full_disk_is_told_by_the_name_of_the_file_not_of_its_temporary_place(tmp_path):
+    with pytest.raises(OSError) as refused, all_or_none(tmp_path) as made:
+        raise OSError(errno.ENOSPC, "No space left on device", str(made / "b"))
+    assert refused.value.filename == str(tmp_path / "b")
+
+
 TABLE = pa.table({"time_s": [0.0, float("nan"), 2.0]})
 
 

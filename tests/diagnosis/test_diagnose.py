@@ -102,6 +102,7 @@ def test_a_fault_of_acquisition_is_named_before_any_physics():
     said = verdict(diagnose(flipped))
     assert said["data_faults"]
     assert said["causes"] == []
+    assert said["acquisition_at_fault"]
     assert said["summary"].startswith("Acquisition, not physics")
 
 
