@@ -4,7 +4,8 @@ from collections import deque
 from dataclasses import dataclass
 
 FROZEN_RAD, FROZEN_CYCLES = 0.03, 10
-"""How far a joint is told to go, and in how many cycles, before a value that never changed is taken for frozen."""
+"""How far a joint is told to go, and in how many cycles, before a value that never changed is taken for frozen; and how
+far what else is told of the joint must contradict it: a joint may stick to its friction."""
 ANSWER_CYCLES = 5
 """Cycles after which a joint has begun to go where it was told, whatever its drive takes for that."""
 KEPT = 1024
@@ -46,8 +47,12 @@ class Held:
     """The first sample that told it."""
     travel: float = 0.0
     """How far the joint had been told to go by then, rad."""
+    gone: float = 0.0
+    """How far it had gone by then by the speed that was told, rad; NaN where none is."""
+    angle: float = 0.0
+    """Where it was by the angle that was told, rad."""
 
-    def tell(self, value: object, count: int, travel: float) -> None:
-        """Take the value of a sample, and how far the joint was told to go up to it, rad."""
+    def tell(self, value: object, count: int, travel: float, gone: float = 0.0, angle: float = 0.0) -> None:
+        """Take the value of a sample, and what was known of the joint's motion then."""
         if value != self.value:
-            self.value, self.since, self.travel = value, count, travel
+            self.value, self.since, self.travel, self.gone, self.angle = value, count, travel, gone, angle

@@ -24,6 +24,9 @@ from pipelines.settings.rig import RigSettings, SensorSettings
 
 REST_RAD = 0.02
 """How far the leg may have moved between the plan and the moment at which the drives are enabled."""
+WALK = 0.9
+"""Share of its speed limit at which a joint is led back to the plan: at the whole of it a drive that follows well would
+break it by what it overshoots, and by a count."""
 SLACK_SAMPLES = 2
 """How far set-points may be ahead of their speed limit for a moment: they come in step with samples, which the host
 sees up to one sample late or early."""
@@ -89,8 +92,8 @@ class Supervisor:
         self._held = [0 for _ in rig.drive]
         """For how many samples each drive has been held at rest in the stop."""
         self._sample_s = np.full(len(rig.drive), 1.0 / sample_rate_hz)
-        self._step = np.array([drive.speed_rad_s for drive in rig.drive]) * self._sample_s
-        """(J,) how far each speed limit leads in a sample, rad."""
+        self._step = WALK * np.array([drive.speed_rad_s for drive in rig.drive]) * self._sample_s
+        """(J,) how far set-points walk in a sample, rad, if the plan itself goes no farther."""
         self._in_force = self.sent
         """(J,) set-points, rad, that are reached at the sample which is latched when the last ones are sent."""
         self._lead = np.zeros_like(self.sent)
@@ -214,7 +217,7 @@ class Supervisor:
         if awaited_s > self.rig.safety.longest_reply_s + SLACK_SAMPLES / self.rate:
             return self._slow(joint, now)
         due, planned = self._planned(self._found + int(awaited_s * self.rate))
-        base, step = self.base[joint], self._step[joint]
+        base, step = self.base[joint], max(self._step[joint], abs(planned[joint]))
         reference = float(np.clip(due[joint], base - step, base + step))
         self._speed[joint] = np.clip(reference - base, *sorted((0.0, planned[joint]))) * self.rate
         return self._pass(joint, reference, now)
@@ -249,7 +252,7 @@ class Supervisor:
         while self.state is not self._due(self._index(found)):
             self._go(FOLLOWING[FOLLOWING.index(self.state) + 1])
         due, planned = self._planned(found)
-        step = self._step if found > self._found else 0.0  # one step a sample
+        step = np.maximum(self._step, np.abs(planned)) if found > self._found else 0.0  # one step a sample
         reference = np.clip(due, self.base - step, self.base + step)
         self._refuse_to_lag(due, reference)
         # A step back to the plan is no motion to be slowed down from: it may be far faster than the plan.

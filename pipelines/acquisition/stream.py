@@ -6,7 +6,7 @@ counter and its clock, between an angle and its speed, between a value and the m
 contradicts nothing passes; docs/faults.md says how large it can be.
 """
 
-from math import ceil
+from math import ceil, inf
 
 from pipelines.acquisition.counter import RATE_TOLERANCE, keeps_time
 from pipelines.acquisition.frozen import ANSWER_CYCLES, FROZEN_CYCLES, FROZEN_RAD, Held, Told
@@ -39,6 +39,7 @@ class Stream:
         self._most = self._cycle * (1 + ceil(rig.safety.watchdog_s * sample_rate_hz))
         self._told = told
         self._held = {name: Held() for name in CHANGING}
+        self._gone = 0.0
         self._first: Reading | None = None
         self._last: Reading | None = None
         self._newest_at_first: int | None = None
@@ -106,7 +107,7 @@ class Stream:
             or self._step(before, found)
             or self._leap(before, found)
             or self._echo(before, found)
-            or self._frozen(found)
+            or self._frozen(before, found)
         )
         if why:
             raise DeviceError(why)
@@ -181,16 +182,28 @@ class Stream:
             "register of reference in the rig file, or what else writes to the drive"
         )
 
-    def _frozen(self, found: Reading) -> str | None:
-        """Tell which register stands still while the joint is told to move."""
+    def _frozen(self, before: Reading, found: Reading) -> str | None:
+        """Tell which register stands still while the joint is told to move, and moves by what else is known of it."""
         travel = self._told.at(found.sequence - ANSWER_CYCLES * self._cycle).travel
+        self._gone += found.velocity * (found.sequence - before.sequence) / self._rate
         for name, unit in CHANGING.items():
             held = self._held[name]
-            held.tell(getattr(found, name), found.sequence, travel)
+            held.tell(getattr(found, name), found.sequence, travel, self._gone, found.angle)
             samples, went = found.sequence - held.since, travel - held.travel
-            if samples >= FROZEN_CYCLES * self._cycle and went > FROZEN_RAD:
+            if samples < FROZEN_CYCLES * self._cycle or went <= FROZEN_RAD:
+                continue
+            seconds = samples / self._rate
+            if not self._contradicted(name, held, found, seconds) <= FROZEN_RAD:  # NaN: nothing else is known
                 return (
-                    f"{self._label}: tells {name} {held.value:.6g} {unit} for {samples / self._rate:.3f} s, while it "
-                    f"was told to go {went:.3f} rad; its register is frozen, or the joint is blocked"
+                    f"{self._label}: tells {name} {held.value:.6g} {unit} for {seconds:.3f} s, while it was told to go "
+                    f"{went:.3f} rad; its register is frozen, or the joint is blocked"
                 )
         return None
+
+    def _contradicted(self, name: str, held: Held, found: Reading, seconds: float) -> float:
+        """Return by how much angle or speed contradict a value that stood still, rad; of a current nothing is known."""
+        if name == "angle":
+            return abs(self._gone - held.gone)
+        if name == "velocity":
+            return abs(found.angle - held.angle - found.velocity * seconds)
+        return inf

@@ -81,6 +81,15 @@ def test_a_register_of_a_record_that_stands_still_while_the_joint_is_told_to_mov
             take(hip, replace(moved(number), **held))
 
 
+def test_a_joint_that_sticks_to_its_friction_is_left_to_the_following_error(hip):
+    """Its angle stands still and so does its speed, at nought: neither contradicts the other, and its current rises."""
+    swing(hip, BEGINS + 1250)
+    stuck = replace(moved(BEGINS + 1250), velocity=0.0)
+    sticking = [replace(moved(k), angle=stuck.angle, velocity=0.0) for k in range(BEGINS + 1250, BEGINS + 1450)]
+    assert abs(moved(BEGINS + 1450).angle - stuck.angle) > 0.06
+    assert all(take(hip, *sticking))
+
+
 def test_a_register_that_stands_still_while_the_joint_is_told_to_stand_is_not(hip):
     still = Told()
     still.tell(BEGINS, 0.0)
