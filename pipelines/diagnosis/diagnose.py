@@ -36,7 +36,7 @@ from pipelines.diagnosis.ties import ALIKE
 from pipelines.diagnosis.uncertainty import Uncertainty, uncertainty
 from pipelines.dynamics.replay import replay
 from pipelines.errors import ExoidError, InputError
-from pipelines.estimation.collinearity import collinearities
+from pipelines.estimation.collinearity import collinearities, profiled
 from pipelines.label import effect_labelled
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.scale import on_one_scale
@@ -85,8 +85,10 @@ class Diagnosis:
         shapes = [(fit.causes[number].effect, i) for number, i, _ in self.sure.shapes]
         own = [*fit.amplitudes(), *((effect, effect.shape[i]) for effect, i in shapes)]
         names = [*self.baseline.names, *(f"{parameter.name} of {effect.label}" for effect, parameter in own)]
-        seen = np.flatnonzero(np.diag(self.sure.normal) > 0.0)
-        return collinearities(self.sure.normal[np.ix_(seen, seen)], [names[place] for place in seen])
+        # Nobody asks for the zeros of the cuffs.
+        normal = profiled(self.sure.normal, np.arange(len(self.baseline.names), self.baseline.size))
+        seen = np.flatnonzero(np.diag(normal) > 0.0)
+        return collinearities(normal[np.ix_(seen, seen)], [names[place] for place in seen])
 
     @property
     def unrealizable(self) -> list[str]:

@@ -148,11 +148,11 @@ class Baseline:
 
     @property
     def names(self) -> list[str]:
-        """What messages call the columns."""
+        """What messages call the columns, but for the cuffs' zeros, which are the last."""
         body = [p.name for p in self.machine.mechanism.parameters]
         person = [f"the person's {name}" for name in body] if len(self.bodies) == 2 else []
         friction = [f"{joint} {p.name}" for joint in self.joints for p in Friction(joint, on=self.machine).linear]
-        return body + person + friction + [f"cuff force zero {number + 1}" for number in range(ZEROS * self.cuffs)]
+        return body + person + friction
 
     def columns(self, motor: Motion, link: Motion, human: Motion | None = None) -> NDArray:
         """Baseline columns at full rate, (n, O, size).

@@ -18,6 +18,16 @@ def scaled_gram(gram: NDArray) -> NDArray:
     return gram / np.outer(size, size)
 
 
+def profiled(gram: NDArray, others: NDArray) -> NDArray:
+    """Return what A'A, (p, p), tells of some parameters where the ``others``, indices (k,), are unknown as well.
+
+    It is the Schur complement of the others' block, (p - k, p - k).
+    """
+    kept = np.setdiff1d(np.arange(len(gram)), others)
+    across = gram[np.ix_(kept, others)]
+    return np.asarray(gram[np.ix_(kept, kept)] - across @ np.linalg.pinv(gram[np.ix_(others, others)]) @ across.T)
+
+
 def collinearities(gram: NDArray, names: Sequence[str]) -> list[str]:
     """Say which groups of parameters the data hardly separate; empty when all are well apart.
 

@@ -59,6 +59,9 @@ def test_a_hidden_effect_is_named_with_its_size_and_the_error_falls_to_the_floor
     assert size["value"] == pytest.approx(values[parameter], rel=0.15)
     np.testing.assert_allclose(found.after.errors.rms, found.standing.floor, rtol=0.08)
     assert first["gain"]["ci95"][0] > 0
+    assert found.unrealizable == []
+    # A peak of friction and its level are told apart by how it falls with speed alone; the others stand for themselves.
+    assert ["knee coulomb" in sentence for sentence in found.collinear] == [True] * (effect == "stribeck_friction")
 
 
 def test_a_drag_that_training_was_too_slow_for_is_named_where_faster_runs_bear_it_out():

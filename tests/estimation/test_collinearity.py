@@ -1,6 +1,6 @@
 import numpy as np
 
-from pipelines.estimation.collinearity import collinearities
+from pipelines.estimation.collinearity import collinearities, profiled
 
 
 def gram(*columns):
@@ -27,3 +27,10 @@ def test_columns_well_apart_raise_no_word():
 def test_units_do_not_make_a_collinearity():
     t = np.linspace(0, 10, 2001)
     assert collinearities(gram(1e6 * np.sin(t), 1e-6 * np.cos(t)), ["a", "b"]) == []
+
+
+def test_what_is_told_of_some_parameters_with_others_unknown_is_the_inverse_of_their_covariance():
+    whole = gram(*np.random.default_rng(3).normal(size=(5, 200)))
+    kept, others = [0, 2, 4], np.array([1, 3])
+    covariance = np.linalg.inv(whole)[np.ix_(kept, kept)]
+    np.testing.assert_allclose(profiled(whole, others), np.linalg.inv(covariance), rtol=1e-9)
