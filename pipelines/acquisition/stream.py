@@ -204,6 +204,8 @@ class Stream:
         """Return by how much angle or speed contradict a value that stood still, rad; of a current nothing is known."""
         if name == "angle":
             return abs(self._gone - held.gone)
+        if name == "velocity" and found.angle == held.angle and found.velocity != 0.0:
+            return inf  # one that stands has no speed
         if name == "velocity":
             return abs(found.angle - held.angle - found.velocity * seconds)
         return inf

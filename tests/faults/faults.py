@@ -1,5 +1,6 @@
 """Everything that can befall a frame, a connection or a device between exoid and the drives, by name."""
 
+import struct
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
@@ -123,6 +124,20 @@ def add(place: slice, counts: int) -> Fault:
     return stepped
 
 
+def another_master(away_rad: float) -> Fault:
+    """Let the set-point that a drive holds be another than what it was sent, as after a write of somebody else's."""
+
+    def written_over(frame: Frame, link: Link) -> list[bytes]:
+        if frame.function != EXCHANGE:
+            return [frame.raw]
+        words = frame.written
+        counts = int.from_bytes(struct.pack(">2H", *words[:2]), "big", signed=True) + round(1e6 * away_rad)
+        other = struct.pack(">i", counts)
+        return [frame.with_body(frame.body[:11] + other + frame.body[15:])]
+
+    return written_over
+
+
 def swap(place: slice) -> Fault:
     """Turn the words of every 32-bit register of a stretch round."""
 
@@ -218,6 +233,7 @@ def cases(frames: type[Frame]) -> list[Case]:
         Case("a cuff sensor's reply is lost", From(lose, unit=CUFF), run="with_human"),
         Case("a cuff sensor's replies are all lost", From(lose, unit=CUFF, times=ALWAYS), "sensor thigh_front",
              run="with_human"),
+        Case("the knee's replies are all lost", From(lose, unit=KNEE, times=ALWAYS), "drive knee"),
         Case("a reply is duplicated", From(twice)),
         Case("a request is duplicated", From(twice, replies=False)),
         Case("every reply is duplicated", From(twice, times=ALWAYS)),
@@ -254,6 +270,10 @@ def cases(frames: type[Frame]) -> list[Case]:
              run="with_human"),
         Case("the angle's words are swapped half way", From(swap(ANGLE), times=ALWAYS), "angle"),
         Case("the current's words are swapped half way", From(swap(CURRENT), times=ALWAYS), "torque"),
+        Case("another master writes a set-point 0.4 rad away", From(another_master(0.4), replies=False),
+             "hip torque"),
+        Case("another master writes set-points 5 mrad away, again and again",
+             From(another_master(0.005), replies=False, times=ALWAYS)),
         Case("the clock steps forward by 1 s", From(add(TIME, 1_000_000), times=ALWAYS), "by its own clock"),
         Case("the clock steps back by 1 s", From(add(TIME, -1_000_000), times=ALWAYS), "its clock went from"),
         Case("the knee's clock steps forward by 20 ms", From(add(TIME, 20_000), unit=KNEE, times=ALWAYS),

@@ -17,6 +17,7 @@ from pipelines.acquisition.check.rate import Rate, check_rate, cycles
 from pipelines.acquisition.check.rings import check_rings
 from pipelines.acquisition.check.zeros import check_zeros
 from pipelines.acquisition.counter import RATE_TOLERANCE
+from pipelines.acquisition.line import Line
 from pipelines.acquisition.machine import Drive, Machine, Sensor
 from pipelines.acquisition.pace import SLOW
 from pipelines.errors import DeviceError
@@ -102,9 +103,15 @@ async def look(machine: Machine, rate_hz: float | None, *, alone: bool) -> RigRe
     """
     report = RigReport(rate_hz)
     present: dict[Probe, tuple[DeviceReport, Series]] = {}
-    for probe in probes_of(machine):
+    probes = probes_of(machine)
+    lost = await _connect(probes)
+    for line, why in lost.items():
+        report.findings.append(_told_by(why, [probe for probe in probes if probe.part.device.line is line]))
+    for probe in probes:
         device = DeviceReport(probe.name, probe.part.device.label)
         report.devices.append(device)
+        if probe.part.device.line in lost:
+            continue
         try:
             await _meet(probe, device)
         except DeviceError as error:
@@ -124,10 +131,20 @@ async def look(machine: Machine, rate_hz: float | None, *, alone: bool) -> RigRe
     return report
 
 
+async def _connect(probes: Sequence[Probe]) -> dict[Line, DeviceError]:
+    """Open all lines at once, as each may take its time to fail; return why those are not there that are not."""
+    lines = list({probe.part.device.line: None for probe in probes})
+    ended = await asyncio.gather(*(line.connect() for line in lines), return_exceptions=True)
+    lost = {line: error for line, error in zip(lines, ended, strict=True) if isinstance(error, BaseException)}
+    for error in lost.values():
+        if not isinstance(error, DeviceError):
+            raise error
+    return {line: error for line, error in lost.items() if isinstance(error, DeviceError)}
+
+
 async def _meet(probe: Probe, report: DeviceReport) -> None:
-    """Connect, read the identity, and read one device many times."""
+    """Read the identity, and read one device many times."""
     device, loop = probe.part.device, asyncio.get_running_loop()
-    await device.line.connect()
     report.connected = True
     for entry in probe.part.map.identity:
         (found,) = await device.read(entry.address, 1)

@@ -1,9 +1,13 @@
 """What is wrong with a rig is found without moving it, and said in words."""
 
+import re
+import socket
 import time
+from contextlib import ExitStack
 
 import pytest
 
+from pipelines.acquisition.check.check import check_rig
 from pipelines.rig import server
 
 ANGLE = 'angle = { address = 104, type = "int32", scale = 1e-6, unit = "rad" }'
@@ -152,12 +156,25 @@ def test_an_absent_device_is_said_to_be_absent_and_the_others_are_checked(checke
     assert [device.latency is not None for device in report.devices] == [True, True, True, False, True, True]
 
 
-def test_a_rig_that_is_off_is_said_to_refuse(checked, rig_file):
-    from pipelines.acquisition.check.check import check_rig
-
+def test_a_rig_that_is_off_is_said_to_refuse(rig_file):
     report = check_rig(rig_file("real_time", 1))
     assert len(report.findings) == 6
     assert "refuses the connection; check that the rig is on" in told(report)
+
+
+def test_lines_that_do_not_come_about_are_waited_for_at_once_and_not_one_after_the_other(rig_file):
+    """Six TLS lines to ports that take connections and say nothing."""
+    with ExitStack() as stack:
+        ports = [stack.enter_context(socket.create_server(("127.0.0.1", 0))).getsockname()[1] for _ in range(6)]
+        rig, number = rig_file("real_time", connect_s=1.0), iter(range(6))
+        text = re.sub(r"^(map = .*)$", lambda m: f'{m[1]}\nline = "l{next(number)}"', rig.read_text(), flags=re.M)
+        lines = (f'[line.l{k}]\ntransport = "tls"\nport = {port}\n' for k, port in enumerate(ports))
+        rig.write_text(text + "".join(lines))
+        began = time.monotonic()
+        report = check_rig(rig)
+        took = time.monotonic() - began
+    assert [str(finding).partition(":")[2].count("no TLS connection") for finding in report.findings] == [1] * 6
+    assert took < 5.0, "two seconds are those of one line"
 
 
 def test_another_device_is_told_by_its_identity_and_not_judged_further(checked):
