@@ -13,6 +13,8 @@ from pipelines.mechanics.trajectory import Trajectory
 from pipelines.settings.rig import LONGEST_RAMP_S, RigSettings
 
 RAMP_GROWTH = 1.2
+TOO_FAST = 1.05
+"""Times the speed limit that a motion may reach between two set-points that keep it."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,24 @@ def check_trajectory(rig: RigSettings, trajectory: Trajectory, duration_s: float
     run = SetPoints(nowhere, partial(_run, trajectory, sample_rate_hz), samples, nowhere)
     for first, piece in run.pieces():
         _refuse_outside(rig, piece, first, sample_rate_hz)
+        _refuse_what_set_points_do_not_show(rig, trajectory, first, first + len(piece), sample_rate_hz)
     return samples
+
+
+def _refuse_what_set_points_do_not_show(
+    rig: RigSettings, trajectory: Trajectory, begin: int, end: int, rate: float
+) -> None:
+    """Refuse a motion too fast for so few set-points: from one to the next it turns round, and they show a slow one."""
+    for share in (0.5, 0.75):  # where the one shows a standstill, the other does not
+        speed = trajectory.at((np.arange(begin, end) + share) / rate)[1]
+        for j, drive in enumerate(rig.drive):
+            fastest = TOO_FAST * drive.speed_rad_s
+            if (k := _first_outside(speed[:, j], -fastest, fastest)) is not None:
+                raise InputError(
+                    f"the {drive.joint} would move at {speed[k, j]:.3f} rad/s at {(begin + k + share) / rate:.3f} s, "
+                    f"which {rate:g} set-points a second do not show, but the rig allows {drive.speed_rad_s:g} rad/s; "
+                    "make the excitation slower: is its omega_rad_s in rad/s?"
+                )
 
 
 def _run(trajectory: Trajectory, sample_rate_hz: float, begin: int, end: int) -> NDArray:

@@ -69,6 +69,16 @@ def test_a_motion_too_fast_for_the_rig_is_refused(rig_file, motion):
     assert str(caught.value).endswith("but the rig allows 3 rad/s; make the excitation slower or smaller")
 
 
+@pytest.mark.parametrize(("a", "b"), [(0.05, 0.0), (0.0, 0.05)])
+def test_a_motion_whose_set_points_show_a_standstill_is_refused_for_its_own_speed(rig_file, a, b):
+    """One whole turn a sample: the phase is the same at each set-point."""
+    alias = FourierTrajectory(
+        np.array([0.6, -0.9]), np.array([[a], [0.0]]), np.array([[b], [0.0]]), omega=2 * np.pi * RATE
+    )
+    with pytest.raises(InputError, match=r"the hip would move at .* which 200 set-points a second do not show"):
+        make_plan(load_rig(rig_file()), alias, REST, 5.0, RATE)
+
+
 def test_a_run_shorter_than_the_period_does_not_let_the_ramps_leave_the_limits(rig_file):
     # The first half of the period keeps the limits; the ramps run the other half, where the hip is at 2 rad.
     half = FourierTrajectory(
