@@ -78,6 +78,7 @@ def identify(
         "validation": found.validation.as_json(),
         "collinear": found.collinear,
         "unrealizable": found.unrealizable,
+        "angle_noise": found.angle_noise,
     }
     PARAMETERS.write(output / "parameters.parquet", found.parameters, shared | described)
     left = output / "residuals.parquet"
@@ -103,6 +104,7 @@ def _report(found: "Identified", machine: "Machine") -> None:
             "unrealizable": found.unrealizable,
             "method": found.method,
             "remarks": found.remarks,
+            "angle_noise": found.angle_noise,
         }
     )
     show_parameters(rows, machine.joints, found.one_step.tolist())
@@ -126,6 +128,7 @@ def _report(found: "Identified", machine: "Machine") -> None:
     for sentence in found.remarks:
         console.say(f"{sentence}.")
     for sentence in [
+        *found.angle_noise,
         *found.collinear,
         *(f"not a real {'leg' if machine.is_exoskeleton else 'machine'}: {s}" for s in found.unrealizable),
     ]:

@@ -10,7 +10,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.diagnosis import tables
-from pipelines.diagnosis.angle_noise import is_loud
 from pipelines.diagnosis.bank import Bank, fill, silent
 from pipelines.diagnosis.choice import (
     Choice,
@@ -28,7 +27,7 @@ from pipelines.diagnosis.fitted_model import model_of_run
 from pipelines.diagnosis.floor import Floor, noise_floor
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, like_trained, observe, with_load
 from pipelines.diagnosis.search import imperfection
-from pipelines.diagnosis.second_look import CUTOFF_HZ, below, slower
+from pipelines.diagnosis.second_look import slower
 from pipelines.diagnosis.session import refuse_unfit
 from pipelines.diagnosis.status import Standing, status_of
 from pipelines.diagnosis.thinned import thinned
@@ -36,10 +35,12 @@ from pipelines.diagnosis.ties import ALIKE
 from pipelines.diagnosis.uncertainty import Uncertainty, uncertainty
 from pipelines.dynamics.replay import replay
 from pipelines.errors import ExoidError, InputError
+from pipelines.estimation.angle_noise import CUTOFF_HZ, is_loud
 from pipelines.estimation.collinearity import collinearities, profiled
 from pipelines.label import effect_labelled
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.scale import on_one_scale
+from pipelines.mechanics.slow_motion import below
 from pipelines.model import unrealizable
 
 SEARCH_SHARE = 0.75
@@ -140,7 +141,7 @@ def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = s
     faults = tuple(find_faults(motions))
     sound = [thinned(motion) for motion in excluding(motions, faults)]
     train, validate = _dealt(sound)
-    if noisy := is_loud(train):
+    if noisy := is_loud([run.motion for run in train]):
         sound = [below(motion, CUTOFF_HZ) for motion in sound]
         train, validate = _dealt(sound)
     if not any(fault.spoils for fault in faults):

@@ -12,11 +12,11 @@ from pipelines.diagnosis.error_budget import error_budget
 from pipelines.diagnosis.examined import PERCEIVED
 from pipelines.diagnosis.faults import Fault
 from pipelines.diagnosis.gain import gain
-from pipelines.diagnosis.second_look import CUTOFF_HZ
 from pipelines.diagnosis.status import AT_FLOOR, EXPLAINED
 from pipelines.diagnosis.ties import tie_between
 from pipelines.diagnosis.unknown import Unknown, unknown
 from pipelines.effects import Effect
+from pipelines.estimation.angle_noise import CUTOFF_HZ, IN_WORDS
 from pipelines.estimation.regression import mask_in_words
 from pipelines.label import amount, effect_labelled, in_words, number
 from pipelines.model import effect_named
@@ -189,9 +189,8 @@ def _summary(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -
 def _caveats(d: Diagnosis) -> list[str]:
     """Return what the runs at hand could not show whatever is missing."""
     noisy = (
-        f"above {CUTOFF_HZ:g} Hz the angles hold accelerations that no torque goes with: noise, which would let every "
-        f"fit take the machine for too light; looked at below {CUTOFF_HZ:g} Hz: set filter.cutoff_hz = {CUTOFF_HZ:g} "
-        "for the other stages, and see to encoder counts and time stamps"
+        f"{IN_WORDS}, which would let every fit take the machine for too light; looked at below {CUTOFF_HZ:g} Hz: set "
+        f"filter.cutoff_hz = {CUTOFF_HZ:g} for the other stages, and see to encoder counts and time stamps"
     )
     return [noisy] * d.noisy_angles + _of_one_kind(d)
 

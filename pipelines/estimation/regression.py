@@ -90,10 +90,11 @@ def mask_in_words(machine: Machine) -> str:
 def away_from_reversals(motion: Motion) -> NDArray:
     """Tell for each sample and joint whether it moves, and has moved for a while: (n, J) bool."""
     slow = np.abs(motion.dq) < reversal_speeds(motion.machine)
-    return ~np.column_stack([dilate(column, _padding(motion)) for column in slow.T])
+    return ~np.column_stack([dilate(column, padding(motion)) for column in slow.T])
 
 
-def _padding(run: Run) -> int:
+def padding(run: Run) -> int:
+    """Return how many samples beside a reversal are left out."""
     return round(REVERSAL_PADDING_S * run.sample_rate_hz)
 
 
@@ -109,7 +110,7 @@ def away_from_turns(motion: Motion) -> NDArray:
 
 def regressions(run: Run, model: Model) -> Iterator[Regression]:
     """Yield a run as one linear regression, piece by piece."""
-    for piece in run.pieces(block_average(run).decimation + _padding(run)):
+    for piece in run.pieces(block_average(run).decimation + padding(run)):
         yield regress(piece, model)
 
 

@@ -15,6 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.effects import Effect, Parameter
+from pipelines.estimation.angle_noise import CUTOFF_HZ, IN_WORDS, is_loud
 from pipelines.estimation.collinearity import collinearities
 from pipelines.estimation.estimator import Estimate, Estimator, estimated
 from pipelines.estimation.least_squares import WeightedLeastSquares
@@ -24,6 +25,11 @@ from pipelines.identification.validation import Validation, validate
 from pipelines.mechanics.run import Run
 from pipelines.mechanics.scale import on_one_scale
 from pipelines.model import Model, Term, baseline, unrealizable
+
+BIASED = (
+    f"{IN_WORDS}, which lets every fit take the machine for too light; set filter.cutoff_hz = {CUTOFF_HZ:g}, and see "
+    "to encoder counts and time stamps"
+)
 
 
 @dataclass(frozen=True)
@@ -57,6 +63,8 @@ class Identified:
     """How it was found, for the file's metadata."""
     remarks: list[str]
     """What the method says of these data, a sentence each."""
+    angle_noise: list[str]
+    """A sentence where noise of the angles biases every fit; empty where it does not."""
 
 
 def identify(motions: Sequence[Run], estimator: Estimator | None = None) -> Identified:
@@ -115,6 +123,7 @@ def identify(motions: Sequence[Run], estimator: Estimator | None = None) -> Iden
         unrealizable=_unrealizable(table, runs),
         method=_method(estimator, fits),
         remarks=[f"{kind}: {remark}" for kind, fit in fits.items() for remark in fit.remarks],
+        angle_noise=[BIASED] * is_loud(training.runs),
     )
 
 
