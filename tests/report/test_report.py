@@ -274,3 +274,18 @@ def test_every_symbol_is_explained_by_the_effect_it_belongs_to(page_file):
     assert "inertia about the hip with the knee at a right angle" in page
     foreseen = re.search(r"standard error foreseen.*?</table>", page, re.S)[0]
     assert re.search(r"<td>X1</td>.*?<td class=\"nowrap\">kg·m²</td>", foreseen)
+
+
+def test_what_the_fits_say_against_a_model_stands_beside_its_parameters(tmp_path):
+    told = {
+        "collinear": ["this motion hardly separates X1 and spring"],
+        "unrealizable": ["exo_alone: X1 is -0.3 kg·m²"],
+        "angle_noise": ["above 5 Hz the angles hold noise"],
+    }
+    for extended in (False, True):
+        path = write_parameters(tmp_path, extended=extended)
+        table = PARAMETERS.read(path)
+        PARAMETERS.write(path, table.frame, {**table.metadata, **told})
+    page = report(find([tmp_path]))
+    for words in ("hardly separates X1", "Not a real machine: exo_alone: X1", "Biased: above 5 Hz"):
+        assert page.count(words) == 2
