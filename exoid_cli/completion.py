@@ -40,7 +40,7 @@ def stages(begun: str) -> Iterator[str]:
     from exoid_cli.place import place_of
 
     with suppress(ExoidError):
-        yield from _beginning(begun, dict.fromkeys(step.stage for step in place_of(None).steps))
+        yield from _beginning(begun, dict.fromkeys(step.stage for step in place_of(None, look_only=True).steps))
 
 
 def _beginning(begun: str, names: Iterable[str]) -> Iterator[str]:

@@ -42,6 +42,8 @@ class Place:
     experiment: "Experiment"
     steps: "tuple[Step, ...]"
     out: Path
+    damaged: tuple[Path, ...] = ()
+    """Imported recordings that cannot be read any more, for which there are no steps."""
 
     def of_stage(self, *stages: str) -> "list[Step]":
         """Return the steps of some stages."""
@@ -66,8 +68,11 @@ def why_absent(stage: str, run: str | None = None) -> str:
     return f"no [[run]] has purpose validate, without which `exoid {stage}` has nothing to do here"
 
 
-def place_of(config: Path | None, out: Path | None = None, lacking: str = "") -> Place:
-    """Return the experiment to work in; where there is none, ``lacking`` begins what is said of it."""
+def place_of(config: Path | None, out: Path | None = None, lacking: str = "", *, look_only: bool = False) -> Place:
+    """Return the experiment to work in; where there is none, ``lacking`` begins what is said of it.
+
+    One with a damaged recording is refused, unless it is only to be looked at.
+    """
     from pipelines.settings import Experiment
     from pipelines.workflow.graph import graph
     from pipelines.workflow.imported import with_imported
@@ -78,7 +83,9 @@ def place_of(config: Path | None, out: Path | None = None, lacking: str = "") ->
         raise InputError(f"{begin}there is no {NAME} in {Path.cwd()}; {_how_to_begin(named=not lacking)}")
     folder = out or file.parent
     experiment, imported = with_imported(Experiment.load(file), folder)
-    return Place(experiment, graph(experiment, file, folder, imported), folder)
+    if not look_only:
+        imported.refuse_damaged()
+    return Place(experiment, graph(experiment, file, folder, imported), folder, imported.damaged)
 
 
 def _how_to_begin(named: bool) -> str:

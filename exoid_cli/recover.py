@@ -34,7 +34,7 @@ def recover(
     from pipelines.acquisition.recover import journals_in
     from pipelines.acquisition.recover import recover as make_recording
 
-    recordings = [] if journals else [place_of(None, lacking="no journal is given").out / "recordings"]
+    recordings = [] if journals else [place_of(None, lacking="no journal is given", look_only=True).out / "recordings"]
     places = journals or [folder for folder in recordings if folder.exists()]
     found = [journal for place in places for journal in journals_in(place)]
     if not found:

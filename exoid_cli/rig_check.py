@@ -53,7 +53,7 @@ def check(
     from pipelines.errors import DeviceError
 
     if file is None:
-        experiment = place_of(config, lacking="no rig file is given").experiment
+        experiment = place_of(config, lacking="no rig file is given", look_only=True).experiment
         file = experiment.file(experiment.acquire.rig)
     if rate_hz is None and (config or is_experiment()):
         rate_hz = settings_in_force(config).acquire.sample_rate_hz

@@ -35,7 +35,7 @@ def check(
       exoid settings check
       exoid settings check my_experiment/exoid.toml --json
     """
-    place = place_of(config)
+    place = place_of(config, look_only=True)
     if place.of_stage("acquire"):
         place.experiment.refuse_what_cannot_run()
     console.emit(place.experiment.model_dump(mode="json"))

@@ -12,24 +12,35 @@ from exoid_cli.place import ConfigOption, OutOption, place_of
 if TYPE_CHECKING:
     from pipelines.workflow.freshness import Judged
 
+DO = "import it again, or remove it"
+"""With a recording that cannot be read."""
+
 
 def status(config: ConfigOption = None, out: OutOption = None) -> None:
     """Say of each stage of an experiment whether it is done, stale and why, or missing.
 
-    A result is stale where an input or a setting is another one than it was made of.
+    A result is stale where an input or a setting is another one than it was made of. An imported recording that cannot
+    be read any more has a line of its own, and makes the exit code 2.
 
     \b
     Examples:
       exoid status
       exoid status --config my_experiment/exoid.toml
     """
+    from pipelines.errors import InputError
     from pipelines.workflow.freshness import Judge
+    from pipelines.workflow.imported import damage
 
-    place = place_of(config, out)
+    place = place_of(config, out, look_only=True)
     judged = Judge(place.out).all(place.steps)
-    console.emit([_as_json(one) for one in judged])
+    console.emit([*(_damaged_as_json(file) for file in place.damaged), *(_as_json(one) for one in judged)])
     stages = [list(group) for _, group in groupby(judged, lambda one: one.step.stage)]
-    console.table(("stage", "state", "result", "why"), [_line(stage, place.out) for stage in stages])
+    damaged = [("import", "damaged", file.relative_to(place.out).as_posix(), DO) for file in place.damaged]
+    console.table(
+        ("stage", "state", "result", "why"), [*damaged, *(_line(stage, place.out) for stage in stages)]
+    )  # fmt: skip
+    if place.damaged:
+        raise InputError(damage(place.damaged))
     todo = sum(not one.done for one in judged)
     to_do = f"{todo} of {len(judged)} steps {'is' if todo == 1 else 'are'} to do; `exoid run` does what is to do."
     console.say(f"\n{to_do if todo else 'Everything is up to date.'}")
@@ -48,6 +59,10 @@ def _result(targets: Sequence[Path], counted: int) -> str:
     if len(targets) == 1:
         return targets[0].as_posix()
     return f"{counted} of {len(targets)} in {targets[0].parent.as_posix()}/"
+
+
+def _damaged_as_json(file: Path) -> dict[str, Any]:
+    return {"stage": "import", "target": file, "state": "damaged", "why": [DO], "command": None}
 
 
 def _as_json(one: "Judged") -> dict[str, Any]:

@@ -31,6 +31,15 @@ def header(path: Path) -> tuple[pa.Schema, dict[str, Any]]:
         return file.schema_arrow, _metadata(file.schema_arrow, path)
 
 
+def is_whole(path: Path) -> bool:
+    """Tell whether a file is Parquet from its first byte to its last, whoever wrote it; what it holds is not read."""
+    try:
+        with _opened(path):
+            return True
+    except ContractError:
+        return False
+
+
 def pieces(path: Path, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
     """Read a file's rows in their order, at most ``ROWS`` at a time; all columns, or those that are named."""
     with _opened(path) as file:

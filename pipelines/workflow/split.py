@@ -19,6 +19,7 @@ from pipelines.workflow.imported import with_imported
 def split(experiment: Experiment, folder: Path) -> None:
     """Write ``<section>.json``, ``run-<name>.json`` and ``graph.mk`` into a folder."""
     experiment, imported = with_imported(experiment, folder.parent)
+    imported.refuse_damaged()
     # Names that make knows stand for the places, so that the rules hold wherever make is told to work.
     steps = graph(experiment, Path("$(CONFIG)"), Path("$(OUT)"), imported)
     sections = experiment.sections("mechanism", "design", "acquire", "filter", "identify", "simulate")

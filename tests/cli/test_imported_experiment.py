@@ -76,3 +76,58 @@ def test_where_exoid_toml_is_lacking_it_is_said_that_an_empty_one_is_enough(exoi
     outcome = exoid("filter")
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
     assert "with an empty exoid.toml beside recordings/, `exoid run` does all with what was imported" in outcome.err
+
+
+@pytest.mark.parametrize("left", [0, 4, 3000])
+def test_a_damaged_recording_is_named_and_nothing_is_done_without_it(exoid, folder, left):
+    path = folder / "recordings" / "Monday-1.parquet"
+    path.write_bytes(path.read_bytes()[:left])
+    for words in ("run",), ("status",), ("filter",), ("identify",), ("diagnose",), ("simulate",), ("acquire",):
+        outcome = exoid(*words)
+        assert (outcome.code, outcome.err) == (
+            2, "exoid: recordings/Monday-1.parquet: damaged or truncated, and nothing is done without it; import it "
+            "again, or remove it\n",
+        )  # fmt: skip
+        assert "up to date" not in outcome.out
+    assert not (folder / "motions").exists()
+    first = exoid("status").out.splitlines()[1]
+    assert first.split()[:3] == ["import", "damaged", "recordings/Monday-1.parquet"]
+    told = json.loads(exoid("status", "--json").out)[0]
+    assert (told["target"], told["state"]) == ("recordings/Monday-1.parquet", "damaged")
+    path.unlink()
+    assert exoid("status").code == 0
+
+
+def test_where_every_recording_is_damaged_all_are_named(exoid, folder):
+    for path in (folder / "recordings").iterdir():
+        path.write_bytes(b"PAR1")
+    assert exoid("run").err == (
+        "exoid: recordings/Monday-1.parquet, recordings/Monday-2.parquet: damaged or truncated, and nothing is done "
+        "without them; import them again, or remove them\n"
+    )
+
+
+def test_a_table_of_somebody_elses_beside_the_recordings_is_none_of_them(exoid, folder):
+    pd.DataFrame({"t": [0.0]}).to_parquet(folder / "recordings" / "log.parquet")
+    assert exoid("status").code == 0
+
+
+def test_a_damaged_recording_of_a_named_run_is_not_recorded_over_where_others_were_imported(exoid, folder):
+    path = folder / "recordings" / "spare.parquet"
+    path.write_bytes(b"PAR1")
+    runs = ""
+    for number, purpose in enumerate(("train", "validate"), 1):
+        (folder / "recordings" / f"Monday-{number}.parquet").rename(folder / "recordings" / f"run{number}.parquet")
+        runs += f'[[run]]\nname = "run{number}"\nrun = "exo_alone"\npurpose = "{purpose}"\n'
+    (folder / "exoid.toml").write_text(runs)
+    assert exoid("status").code == 0  # no run is named spare
+    (folder / "exoid.toml").write_text(runs.replace("run1", "spare"))
+    outcome = exoid("run")
+    assert (outcome.code, "spare.parquet: damaged" in outcome.err) == (2, True)
+    assert path.read_bytes() == b"PAR1"
+
+
+def test_make_too_refuses_to_begin_with_a_damaged_recording(exoid, folder):
+    (folder / "recordings" / "Monday-1.parquet").write_bytes(b"PAR1")
+    outcome = exoid("settings", "split", "exoid.toml", "--out", ".settings")
+    assert (outcome.code, "Monday-1.parquet: damaged" in outcome.err) == (2, True)
