@@ -117,6 +117,8 @@ class Verdict(_Object):
 
     status: str
     summary: str
+    finding: str | None = None
+    """The summary without what it says of acquisition and of the floor; None where acquisition is at fault."""
     acquisition_at_fault: bool = False
     caveats: list[str]
     scoring: dict[str, Any]

@@ -44,6 +44,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "contract": "verdict/1",
         "status": d.status,
         "summary": _summary(d, causes, left),
+        "finding": None if d.spoilt else _finding(d, causes, left),
         "acquisition_at_fault": bool(d.spoilt),
         "caveats": _caveats(d),
         "scoring": {
@@ -216,7 +217,8 @@ def _of_one_kind(d: Diagnosis) -> list[str]:
 
 
 def _in_short(fault: Fault, d: Diagnosis) -> str:
-    more = f" (and {len(d.faults) - 1} more in data_faults)" if len(d.faults) > 1 else ""
+    others = len(d.faults) - 1
+    more = f" (and {others} more fault{'s' * (others > 1)}, in data_faults of verdict.json)" if others else ""
     return f"{fault.file}, {fault.channel}: {fault.what}{more}"
 
 

@@ -1,6 +1,7 @@
 """Bars as data: what the error is made of, and what naming the causes took of it."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -136,6 +137,30 @@ def label_in_words(label: str) -> str:
         return name.replace("_", " ") + (f" at the {joint}" if joint else "")
 
 
+def labels_in_words(text: str, labels: Iterable[str]) -> str:
+    """Return a sentence with the labels that stand in it said as sentences say them."""
+    known = sorted(set(labels), key=len, reverse=True)
+    any_of = re.compile(rf"(?<![\w@])(?:{'|'.join(map(re.escape, known))})(?![\w@])") if known else None
+    return any_of.sub(lambda found: label_in_words(found[0]), text) if any_of else text
+
+
 def causes_in_words(causes: Sequence[dict[str, Any]]) -> str:
-    """Return the causes of a verdict, most probable first."""
-    return " and ".join(label_in_words(cause_label(cause)) for cause in causes)
+    """Return the causes of a verdict, most probable first, each with what cannot be told from it."""
+    told = [tied_in_words(cause) for cause in causes]
+    return (", and " if any(map(ties_of, causes)) else " and ").join(told)
+
+
+def tied_in_words(cause: dict[str, Any]) -> str:
+    """Return a cause, or the one that could stand in its place, or how many could."""
+    words, ties = label_in_words(cause_label(cause)), ties_of(cause)
+    if not ties:
+        return words
+    if len(ties) > 1:
+        return f"{words} or {len(ties)} others that these data cannot tell apart"
+    other, where = label_in_words(cause_label(ties[0])), f" at the {cause['joint']}"
+    return f"{words.removesuffix(where) if other.endswith(where) else words} or {other}"
+
+
+def ties_of(cause: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return what data of this kind cannot tell from a named cause."""
+    return list(cause["indistinguishable_from"])

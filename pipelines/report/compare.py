@@ -9,6 +9,7 @@ from pipelines.errors import InputError
 from pipelines.label import cause_label
 from pipelines.report.acquisition import runs
 from pipelines.report.bars import Fall, label_in_words, torque_unit
+from pipelines.report.lead import lead
 from pipelines.report.page import render
 from pipelines.report.parameters import Estimate, estimates
 from pipelines.report.report import headline, machine, status
@@ -109,6 +110,7 @@ def compare(first: Session, second: Session, titles: tuple[str, str]) -> Compare
         "titles": titles,
         "machines": [machine(session, runs(session)) for session in pair],
         "verdicts": [session.verdict for session in pair],
+        "leads": [lead(session.verdict) if session.verdict else "" for session in pair],
         "unreadable": [trouble for session in pair for trouble in session.unreadable.values()],
         "statuses": [status(session.verdict) for session in pair],
         "headlines": [headline(session) for session in pair],

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipelines.contracts import Joint
 from pipelines.report.chart import Chart, Panel, Role, Series
 from pipelines.report.session import Artifact, Session
-from pipelines.report.standstill import moving
+from pipelines.report.standstill import moving, strays_further, torque_error_grew
 
 MODELS = {"baseline": (Role.BEFORE, "rigid body and friction"), "extended": (Role.AFTER, "with the causes")}
 """The models of ``residuals/1``, and how charts call them."""
@@ -94,8 +94,12 @@ class Score:
     words: str
     values: tuple[float | None, ...]
     """One a model, in the order of ``MODELS``; None where there is no such replay."""
+    note: str = ""
+    """What is to be said of the row, in few words."""
 
 
+LARGER = "larger with the causes"
+STANDS = "no model of speed can tell what holds a joint that stands"
 SCORES = {
     "windows": (("simulation_rmse_rad", "angle", "1 s under the recorded {drive}", 1e3, "m"),),
     "drives": (
@@ -117,7 +121,8 @@ def scores(session: Session, run: str) -> list[Score]:
                         for model in models_of(session)]  # fmt: skip
                 name = joint.place if quantity == "angle" else joint.effort
                 where = f"{joint.name} {name}, {words.format(drive=joint.effort)}, {prefix}{joint.unit(quantity)}"
-                found.append(Score(where, tuple(None if value is None else times * value for value in told)))
+                values = tuple(None if value is None else times * value for value in told)
+                found.append(Score(where, values, LARGER if strays_further(*values) else ""))
                 if what == "windows":
                     found += _while_moving(session, replays, joint, where)
     return [score for score in found if any(value is not None for value in score.values)]
@@ -129,10 +134,18 @@ def _torque_scores(session: Session, run: str, joint: Joint) -> Iterator[Score]:
         return
     rows = session.residuals.frame
     rows = rows[rows["file"] == run]
+    floor = (session.verdict or {}).get("noise_floor_nm", {}).get(joint.name)
+    grew_away = False
     for words, chosen in (("away from reversals", rows[rows["scored"]]), ("reversals included", rows)):
         left = [chosen.loc[chosen["model"] == model, joint.column("residual")] for model in models_of(session)]
         values = tuple(float(np.sqrt(np.mean(e**2))) if len(e) else None for e in left)
-        yield Score(f"{joint.name} {joint.effort}, computed, {words}, {joint.unit('torque')}", values)
+        grew = floor is not None and torque_error_grew(*values, floor=floor)
+        about = "" if grew_away or words == "away from reversals" else f"; only about reversals, where {STANDS}"
+        yield Score(
+            f"{joint.name} {joint.effort}, computed, {words}, {joint.unit('torque')}", values,
+            LARGER + about if grew else "",
+        )  # fmt: skip
+        grew_away = grew
 
 
 def _while_moving(session: Session, replays: dict[str, Artifact], joint: Joint, where: str) -> Iterator[Score]:

@@ -12,10 +12,11 @@ from pipelines.report import provenance
 from pipelines.report.acquisition import Run
 from pipelines.report.acquisition import runs as recordings
 from pipelines.report.animation import animations
-from pipelines.report.bars import budget, causes_in_words, falls, label_in_words
+from pipelines.report.bars import budget, causes_in_words, falls, label_in_words, ties_of
 from pipelines.report.chart import Chart, thinned_alike
 from pipelines.report.control import control_charts, loops
 from pipelines.report.excitation import excitations
+from pipelines.report.lead import faults_in_short, lead
 from pipelines.report.measured import (
     Score,
     angle_charts,
@@ -33,6 +34,7 @@ from pipelines.report.session import Session
 from pipelines.report.standstill import worse
 from pipelines.report.symbols import terms
 from pipelines.report.tiles import tiles, worst_joint
+from pipelines.report.unmoved import lacks_causes, unmoved
 
 MOST_CANDIDATES = 12
 """In sight; the others unfold."""
@@ -105,6 +107,9 @@ def _page(session: Session, title: str | None, values: int) -> str:
         "status": status(verdict),
         "headline": headline(session),
         "verdict": verdict,
+        "lead": lead(verdict) if verdict else "",
+        "faults": faults_in_short(verdict) if verdict else ("", 0),
+        "with_causes": _with_causes(verdict) if verdict else "",
         "quantity": quantity,
         "torque_unit": session.joints[0].unit("torque") if session.joints else "N·m",
         "terms": terms(session),
@@ -174,6 +179,12 @@ def headline(session: Session) -> str:
     return HEADLINES.get(verdict["status"], verdict["status"].replace("_", " "))
 
 
+def _with_causes(verdict: dict[str, Any]) -> str:
+    """Say which model the bars with the causes are of: of causes that are tied, the likeliest is in it."""
+    which = "likeliest" if any(map(ties_of, verdict["causes"])) else "named"
+    return f"with the {which} cause{'s' * (len(verdict['causes']) > 1)}"
+
+
 @dataclass(frozen=True)
 class ShownRun:
     """One run's charts."""
@@ -185,6 +196,10 @@ class ShownRun:
     models: tuple[str, ...]
     """What the columns of its scores are of."""
     scores: tuple[Score, ...]
+    lacks_causes: bool
+    """Whether it was simulated without the causes alone."""
+    unmoved: str
+    """Why; nothing where it could have been."""
 
 
 def _runs(session: Session, drawn: Sequence[Chart]) -> list[ShownRun]:
@@ -198,6 +213,8 @@ def _runs(session: Session, drawn: Sequence[Chart]) -> list[ShownRun]:
             name in replays,
             tuple(words for _, words in models_of(session).values()),
             tuple(scores(session, name)),
+            lacks_causes(session, name),
+            unmoved(session, name),
         )
         for name in sorted(names, key=lambda name: "human" not in name)
     ]
@@ -266,7 +283,7 @@ def _cause(cause: dict[str, Any]) -> dict[str, Any]:
                 "why": tie["why"],
                 "how": tie["how_to_separate"],
             }
-            for tie in cause["indistinguishable_from"]
+            for tie in ties_of(cause)
         ],
     }
 

@@ -38,7 +38,12 @@ def worse(session: Session) -> list[str]:
     return [sentence for joint in session.joints for sentence in _at(joint, verdict)]
 
 
-def strays_further(before: float | None, after: float | None) -> bool:
+def torque_error_grew(before: float | None, after: float | None = None, *, floor: float) -> bool:
+    """Tell whether a torque error's mean square grows by more than noise has."""
+    return before is not None and after is not None and after**2 - before**2 > floor**2
+
+
+def strays_further(before: float | None, after: float | None = None) -> bool:
     """Tell whether a simulation's error grows by more than a trifle."""
     return before is not None and after is not None and after > NOTABLE * before
 
@@ -55,7 +60,7 @@ def _at(joint: Joint, verdict: dict[str, Any]) -> Iterator[str]:
         BY_NAME[cause["effect"]] for cause in verdict["causes"] if cause["joint"] == name and cause["effect"] in BY_NAME
     ]
     holds = any(effect.holds for effect in known)
-    grew = all_after**2 - all_before**2 > verdict["noise_floor_nm"][name] ** 2
+    grew = torque_error_grew(all_before, all_after, floor=verdict["noise_floor_nm"][name])
     if grew:
         yield (
             f"Reversals included, the {name}'s {push} error is {digits(all_before)} → {digits(all_after)} "

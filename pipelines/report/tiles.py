@@ -5,7 +5,7 @@ from typing import Any
 
 from pipelines.contracts import Joint
 from pipelines.label import cause_label
-from pipelines.report.bars import falls, label_in_words, torque_unit
+from pipelines.report.bars import falls, label_in_words, ties_of, torque_unit
 from pipelines.report.measured import replayed
 from pipelines.report.numbers import digits
 from pipelines.report.session import Session
@@ -52,7 +52,7 @@ def worst_joint(session: Session) -> Joint | None:
 def _cause_tiles(verdict: dict[str, Any], cause: dict[str, Any]) -> list[Tile]:
     gain, (low, high) = cause["gain"]["rmse_reduction_nm"], cause["gain"]["ci95"]
     joint = cause["gain"]["joint"]
-    unit, ties = torque_unit(verdict, joint), len(cause["indistinguishable_from"])
+    unit, ties = torque_unit(verdict, joint), len(ties_of(cause))
     words = label_in_words(cause_label(cause))
     return [
         Tile(
@@ -62,10 +62,11 @@ def _cause_tiles(verdict: dict[str, Any], cause: dict[str, Any]) -> list[Tile]:
             words + (f", or one of {ties} that these data cannot tell from it" if ties else ""),
         ),
         Tile(
-            f"gain at the {joint}",
+            f"gain of {words}",
             digits(-gain),
             unit,
-            f"of {digits(verdict['baseline_rmse_nm'][joint])} {unit}; 95 %: {digits(-high)} … {digits(-low)}",
+            f"of {digits(verdict['baseline_rmse_nm'][joint])} {unit} at the {joint}; 95 %: "
+            f"{digits(-high)} … {digits(-low)}",
         ),
     ]
 
@@ -79,7 +80,11 @@ def _simulation_tiles(session: Session, verdict: dict[str, Any]) -> list[Tile]:
     after = verdict["extended_simulation_rmse_rad"][joint.name] if verdict["causes"] else None
     big = digits(1e3 * before) + ("" if after is None else f" → {digits(1e3 * after)}")
     is_worse = strays_further(before, after)
-    small = "worse with the causes; why is said below" if is_worse else "rms of all runs, as the diagnosis fits them"
+    small = "rms of all runs, as the diagnosis fits them"
+    if verdict["causes"] and after is None:
+        small = "without the causes; with them it cannot be simulated"
+    elif is_worse:
+        small = "worse with the causes; why is said below"
     return [Tile(f"{joint.name}, simulated for 1 s", big, f"m{joint.unit('angle')}", small, is_worse)]
 
 

@@ -40,9 +40,19 @@ def with_errors(d, extended, status="partly_explained"):
 
 
 def test_a_fault_that_was_masked_is_told_beside_the_cause(stuck):
-    said = verdict(stuck)["summary"]
+    told = verdict(stuck)
+    said = told["summary"]
     assert said.startswith("Missing from the simulation: parallel spring at the knee")
     assert "Beside it, faults of acquisition: run_1.parquet, hip_angle_rad: the hip's angle is stuck" in said
+    assert said.startswith(told["finding"])
+    assert "acquisition" not in told["finding"]
+
+
+def test_faults_that_the_summary_does_not_tell_are_counted_in_words(stuck):
+    said = [verdict(replace(stuck, faults=stuck.faults[:1] * number))["summary"] for number in (1, 2, 3)]
+    assert "data_faults" not in said[0]
+    assert said[1].endswith("(and 1 more fault, in data_faults of verdict.json).")
+    assert said[2].endswith("(and 2 more faults, in data_faults of verdict.json).")
 
 
 def test_what_is_left_at_the_other_joint_is_said_to_be_there_and_how_much(stuck):

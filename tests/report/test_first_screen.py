@@ -1,0 +1,107 @@
+"""The first screen: it claims what the data say, ties included, and says it in a few words."""
+
+import pytest
+
+from pipelines.report.bars import causes_in_words, labels_in_words
+from pipelines.report.report import report
+from pipelines.report.session import find
+from pipelines.report.tiles import tiles
+from tests.report.sessions import AXIS, verdict_of, write_session, write_verdict
+
+FAULT = {"file": "run_1.parquet", "channel": "hip_angle_rad", "what": "the hip's angle is stuck"}
+
+
+def cause(effect="cogging", joint="knee", ties=()):
+    first = verdict_of()["causes"][0]
+    rivals = [{"effect": e, "joint": j, "why": "", "how_to_separate": "", "probability": 0.1} for e, j in ties]
+    return first | {"effect": effect, "joint": joint, "indistinguishable_from": rivals}
+
+
+@pytest.mark.parametrize(
+    ("ties", "said"),
+    [
+        ([], "cogging at the knee"),
+        ([("backlash", "knee")], "cogging or backlash at the knee"),
+        ([("backlash", "hip")], "cogging at the knee or backlash at the hip"),
+        ([("base_tilt", None)], "cogging at the knee or base tilt"),
+        ([("backlash", "knee"), ("backlash", "hip")], "cogging at the knee or 2 others that these data cannot tell"),
+    ],
+)
+def test_the_headline_claims_no_cause_that_is_tied(ties, said):
+    assert causes_in_words([cause(ties=ties)]).startswith(said)
+
+
+def test_two_causes_are_parted_by_a_comma_where_one_of_them_is_tied():
+    both = cause(), cause("backlash", "hip")
+    assert causes_in_words(both) == "cogging at the knee and backlash at the hip"
+    tied = cause(), cause("backlash", "hip", [("torque_offset", "hip")])
+    assert causes_in_words(tied) == "cogging at the knee, and backlash or torque offset at the hip"
+
+
+def test_labels_in_a_sentence_are_said_in_words_and_longer_ones_are_not_cut():
+    said = labels_in_words("load@hip is not cogging@hip, nor base_tilt", ["cogging@hip", "base_tilt", "cogging"])
+    assert said == "load@hip is not cogging at the hip, nor base tilt"
+
+
+def top(folder):
+    page = report(find([folder]))
+    return page[page.index('<section id="verdict"') : page.index('<section id="measured"')]
+
+
+def test_bars_with_tied_causes_are_of_the_likeliest_and_say_so(tmp_path):
+    folder = write_session(tmp_path / "leg")
+    assert "with the likeliest cause" in top(folder)
+    write_verdict(folder, causes=[cause()])
+    assert "with the named cause" in top(folder)
+
+
+def test_faults_of_acquisition_stand_below_a_lead_that_is_the_finding_alone(tmp_path):
+    folder = write_session(tmp_path / "leg")
+    write_verdict(folder, summary="Found. Guessed. Faulty.", finding="Found.", data_faults=[FAULT, FAULT, FAULT])
+    assert '<p class="lead">Found.</p>' in top(folder)
+    assert "3 faults of acquisition, the first of them run_1.parquet, hip_angle_rad: the hip&#39;s angle" in top(folder)
+    assert 'href="#faults"' in top(folder)
+    write_verdict(folder, finding="Found.", data_faults=[FAULT])
+    assert "Beside it, a fault of acquisition: run_1.parquet" in top(folder)
+    assert 'href="#faults"' not in top(folder)
+
+
+def test_a_verdict_of_an_older_version_leads_with_its_summary_and_tells_no_fault_twice(tmp_path):
+    folder = write_session(tmp_path / "leg")
+    write_verdict(folder, summary="Found. Faulty.", data_faults=[FAULT])
+    assert '<p class="lead">Found. Faulty.</p>' in top(folder)
+    assert "faults of acquisition" not in top(folder)
+
+
+def test_each_gain_says_what_it_is_of(tmp_path):
+    folder = write_session(tmp_path / "leg")
+    write_verdict(folder, causes=[cause(), cause("backlash")])
+    gains = [tile.title for tile in tiles(find([folder])) if tile.title.startswith("gain")]
+    assert gains == ["gain of cogging at the knee", "gain of backlash at the knee"]
+
+
+RIGHT_EDGES = """() => {
+    const rows = new Map();
+    for (const tile of document.querySelectorAll('.tile')) {
+        const box = tile.getBoundingClientRect(), top = Math.round(box.top);
+        const row = rows.get(top) || { tiles: 0, right: 0 };
+        rows.set(top, { tiles: row.tiles + 1, right: Math.max(row.right, Math.round(box.right)) });
+    }
+    return [...rows.values()];
+}"""
+
+
+@pytest.mark.parametrize("width", [390, 700, 1000, 1280])
+@pytest.mark.parametrize("causes", [1, 2])
+def test_no_row_of_tiles_is_left_half_empty(opened, tmp_path, causes, width):
+    folder = write_session(tmp_path / "axis", AXIS)
+    write_verdict(folder, AXIS, causes=[cause(name, "axis") | {"gain": cause()["gain"] | {"joint": "axis"}}
+                                        for name in ("cogging", "backlash")[:causes]])  # fmt: skip
+    page_file = tmp_path / "report.html"
+    page_file.write_text(report(find([folder])), encoding="utf-8")
+    with opened(page_file, width=width) as page:
+        for media in ("screen", "print"):
+            page.emulate_media(media=media)
+            rows = page.evaluate(RIGHT_EDGES)
+            assert len({row["right"] for row in rows}) == 1
+            assert all(row["tiles"] > 1 or width == 390 for row in rows)
