@@ -89,7 +89,8 @@ def _phase(run: Run, j: int) -> NDArray | None:
 
 VARIABLES = (
     Variable("angle", "the {joint}'s angle", "rad", lambda run, j: run.state[0][:, j]),
-    Variable("speed", "the {joint}'s speed", "rad/s", lambda run, j: run.state[1][:, j]),
+    # What friction does has a jump where the joint reverses.
+    Variable("speed", "the {joint}'s speed", "rad/s", lambda run, j: run.state[1][:, j], by_direction=True),
     Variable("acceleration", "the {joint}'s acceleration", "rad/s²", lambda run, j: run.state[2][:, j]),
     Variable(
         "reversals", "the {joint}'s direction and the time since it reversed", "s", _since_reversal, by_direction=True

@@ -94,8 +94,7 @@ def _of_joint(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surf
 def _best(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surface | None:
     known = [v for v in VARIABLES if v.lasting and all(v.of(run, j) is not None for run in runs)]
     one = max((_surface([v], runs, residuals, j) for v in known), key=lambda s: s.share)
-    pairs = (p for p in itertools.combinations(known, 2) if not all(v.by_direction for v in p))
-    two = max((_surface(p, runs, residuals, j) for p in pairs), key=lambda s: s.share)
+    two = max((_surface(p, runs, residuals, j) for p in itertools.combinations(known, 2)), key=lambda s: s.share)
     best = two if two.share > one.share + BETTER else one
     return best if best.share > EARNED else None
 

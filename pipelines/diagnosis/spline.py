@@ -47,10 +47,10 @@ class Curve:
             else:
                 clipped = np.clip(x, knots[0], knots[-1])
                 part = BSpline.design_matrix(clipped, knots, DEGREE).toarray()
-            if variable.by_direction:
-                forward = run.state[1][:, self.joint, np.newaxis] > 0
-                part = np.hstack([part * forward, part * ~forward])
             design = (design[:, :, np.newaxis] * part[:, np.newaxis, :]).reshape(len(run.time), -1)
+        if any(variable.by_direction for variable in self.variables):
+            forward = run.state[1][:, self.joint, np.newaxis] > 0
+            design = np.hstack([design * forward, design * ~forward])
         return design
 
 

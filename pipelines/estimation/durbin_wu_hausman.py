@@ -4,7 +4,8 @@ Least squares and instrumental variables have the same limit unless what stands 
 what the fit leaves: noise in the angles. Their difference over its own covariance then is no larger than chance
 (Hausman, 1978, Econometrica 46(6); for robots Janot, Vandanjon and Gautier, 2014, Proc. ICRA).
 That covariance is the long-run one of the difference of both influence functions, so autocorrelated noise raises no
-alarm; what it is uncertain itself is allowed for as in Hotelling's T².
+alarm; what it is uncertain itself is allowed for as in Hotelling's T². Where it is nearly singular, only those
+combinations of parameters are judged in which the estimators can differ, as with Hausman's generalized inverse.
 """
 
 from collections.abc import Hashable, Iterator
@@ -19,6 +20,9 @@ from pipelines.estimation.estimator import Fit
 from pipelines.estimation.long_run import long_run_covariance
 
 LEVEL = 0.05
+FAINT = 0.1
+"""Variance, of a mean of 1 once each parameter is scaled by its error, below which a combination of parameters is not
+judged: so little differs there that errors of second order outdo it, which the covariance counts twice."""
 
 
 @dataclass(frozen=True)
@@ -59,11 +63,12 @@ def durbin_wu_hausman(one: Fit, other: Fit) -> DurbinWuHausman:
             yield name, ours @ one.sensitivity.T - theirs @ other.sensitivity.T
 
     difference = one.values - other.values
-    k = len(difference)
-    V, _, freedom = long_run_covariance(influences, k)
+    V, _, freedom = long_run_covariance(influences, len(difference))
     error = np.sqrt(np.diag(V))
-    scaled = difference / error
-    square = float(scaled @ np.linalg.solve(V / np.outer(error, error), scaled))
+    variance, directions = np.linalg.eigh(V / np.outer(error, error))
+    told = variance > FAINT
+    square = float(np.sum((directions.T[told] @ (difference / error)) ** 2 / variance[told]))
+    k = int(told.sum())
     rest = max(freedom - k + 1.0, 1.0)
     statistic = square * rest / (freedom * k)
     return DurbinWuHausman(difference, error, statistic, (float(k), rest), float(f.sf(statistic, k, rest)))

@@ -50,7 +50,9 @@ class InstrumentalVariables(Estimator):
             values = found.values
             if change.max() < SETTLED:
                 break
-        test = durbin_wu_hausman(start, found)
+        # On the same rows by the same weights: they would differ by what one of them leaves out, too.
+        itself = [replace(r, instruments=r.measured.regressor) for r in rows]
+        test = durbin_wu_hausman(_solved(problem, itself, found.weights), found)
         settled = () if change.max() < SETTLED else (f"did not settle in {ITERATIONS} iterations; distrust its values",)
         told = {"iterations": iteration, "durbin_wu_hausman": test.as_json()}
         return replace(found, told=told, remarks=(*settled, _sentence(test, problem.names, found.values)))
