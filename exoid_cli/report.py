@@ -76,6 +76,12 @@ def _compare(folders: tuple[Path, Path], output: Path) -> None:
         warn_of_unreadable(session)
     page = compare(first, second, titles_of(first, second))
     write_text(output, page.text)
-    console.emit({"path": str(output), "changed": page.changed, "judged": page.judged})
-    console.say(f"{page.changed} of {page.judged} parameters changed beyond their 95 % intervals")
+    apart = [{"name": one.name, "first": one.first, "second": one.second} for one in page.settings]
+    console.emit({"path": str(output), "changed": page.changed, "judged": page.judged, "headline": page.headline,
+                  "settings": apart})  # fmt: skip
+    console.say(f"{page.headline} (95 %).")
+    for line in page.errors:
+        console.say(line)
+    for one in page.settings:
+        console.say(f"{one.name}: {one.first} → {one.second}")
     console.say(f"{output}: opens in any browser")

@@ -8,12 +8,14 @@ from typing import Any
 from pipelines.errors import InputError
 from pipelines.label import cause_label
 from pipelines.report.acquisition import runs
-from pipelines.report.bars import Fall, label_in_words, torque_unit
+from pipelines.report.bars import label_in_words, torque_unit
 from pipelines.report.lead import lead
+from pipelines.report.numbers import digits
 from pipelines.report.page import render
 from pipelines.report.parameters import Estimate, estimates
 from pipelines.report.report import headline, machine, status
 from pipelines.report.session import Artifact, Session
+from pipelines.report.settings_apart import SettingApart, settings_apart
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,11 @@ class Compared:
     text: str
     changed: int
     judged: int
+    headline: str
+    """What changed, most telling first."""
+    errors: tuple[str, ...]
+    """Each joint's errors beside the floors, as a line."""
+    settings: tuple[SettingApart, ...]
 
 
 def titles_of(first: Session, second: Session) -> tuple[str, str]:
@@ -115,14 +122,82 @@ def compare(first: Session, second: Session, titles: tuple[str, str]) -> Compare
         "statuses": [status(session.verdict) for session in pair],
         "headlines": [headline(session) for session in pair],
         "models": models,
+        "settings": settings_apart(first, second),
+        "beside_floor": _beside_floor(pair),
         # A parameter that both models have is counted once, in the one that is told last and knows most.
         "beyond": models[-1].beyond if models else 0,
         "judged": models[-1].judged if models else 0,
         "causes": _causes(pair),
         "errors": _errors(pair),
     }
+    told["headline"] = _what_changed(pair, told["beyond"], told["judged"])
     text = render("compare.html", (), (), told, (*first.artifacts, *second.artifacts))
-    return Compared(text, told["beyond"], told["judged"])
+    lines = tuple(row.words for row in told["beside_floor"])
+    return Compared(text, told["beyond"], told["judged"], told["headline"], lines, tuple(told["settings"]))
+
+
+def _what_changed(pair: tuple[Session, Session], beyond: int, judged: int) -> str:
+    """Return the headline: the verdict's change before that of the parameters."""
+    of_parameters = (
+        f"{beyond} of {judged} parameters changed beyond their intervals" if beyond
+        else "no parameter changed beyond its interval" if judged
+        else "nothing that both sessions have can be compared"
+    )  # fmt: skip
+    of_verdict = _verdict_changed(pair)
+    said = f"{of_verdict}; {of_parameters}" if of_verdict else of_parameters
+    return said[:1].upper() + said[1:]
+
+
+def _verdict_changed(pair: tuple[Session, Session]) -> str:
+    """Say how the verdict changed; nothing where it did not, or one of the sessions has none."""
+    if not all(session.verdict for session in pair):
+        return ""
+    first, second = (status(session.verdict)["words"] for session in pair)
+    if first != second:
+        return f"the verdict went from {first} to {second}"
+    one, other = ({cause_label(cause) for cause in (session.verdict or {})["causes"]} for session in pair)
+    return "" if one == other else "other causes are named"
+
+
+@dataclass(frozen=True)
+class BesideFloor:
+    """One error of a joint in both sessions, each beside its session's floor."""
+
+    joint: str
+    model: str
+    unit: str
+    values: tuple[float, float]
+    floors: tuple[float, float]
+
+    @property
+    def highest(self) -> float:
+        """The largest of the four."""
+        return max(*self.values, *self.floors)
+
+    @property
+    def words(self) -> str:
+        """Say it in a line."""
+        told = [f"{digits(v)} {self.unit}, {digits(v / f)} times the floor of {digits(f)} {self.unit}"
+                for v, f in zip(self.values, self.floors, strict=True)]  # fmt: skip
+        return f"{self.joint}, {self.model}: {told[0]} → {told[1]}"
+
+
+def _beside_floor(pair: tuple[Session, Session]) -> list[BesideFloor]:
+    """Return each joint's error without causes and, where either names any, with them."""
+    first, second = (session.verdict for session in pair)
+    if not first or not second:
+        return []
+    kinds = [("rigid body and friction", "baseline_rmse_nm")]
+    if first["causes"] or second["causes"]:
+        kinds.append(("with what each names", "extended_rmse_nm"))
+    return [
+        BesideFloor(
+            joint, words, torque_unit(first, joint), (first[key][joint], second[key][joint]),
+            (first["noise_floor_nm"][joint], second["noise_floor_nm"][joint]),
+        )
+        for joint in first["baseline_rmse_nm"]
+        for words, key in kinds
+    ]  # fmt: skip
 
 
 def refuse_different_machines(pair: tuple[Session, Session], titles: tuple[str, str]) -> None:
@@ -161,7 +236,7 @@ def _models(pair: tuple[Session, Session]) -> Iterable[ModelChanges]:
     first, second = pair
     kinds = (
         ("Rigid body and friction", [next(iter(session.baselines), None) for session in pair]),
-        ("With the named causes", [session.extended for session in pair]),
+        ("With what each names", [session.extended for session in pair]),
     )
     for title, (one, other) in kinds:
         if one and other:
@@ -176,10 +251,23 @@ def _model(title: str, first: Session, one: Artifact, second: Session, other: Ar
         (first.shown(one.path), second.shown(other.path)),
         tuple(changes(a, b)),
         (
-            tuple(e.words for e in a if e.key not in keys[1]),
-            tuple(e.words for e in b if e.key not in keys[0]),
+            _only(first, [e for e in a if e.key not in keys[1]]),
+            _only(second, [e for e in b if e.key not in keys[0]]),
         ),
     )
+
+
+def _only(session: Session, alone: Sequence[Estimate]) -> tuple[str, ...]:
+    """Return the parameters that a session has alone, those of the causes that it names as such."""
+    named = {cause_label(cause) for cause in (session.verdict or {}).get("causes", [])}
+    return tuple(
+        f"{e.words} of {label_in_words(label)}, which it names" if (label := _label(e)) in named else e.words
+        for e in alone
+    )
+
+
+def _label(estimate: Estimate) -> str:
+    return f"{estimate.effect}@{estimate.joint}" if estimate.joint else estimate.effect
 
 
 def _causes(pair: tuple[Session, Session]) -> list[dict[str, Any]]:
@@ -208,21 +296,8 @@ def _cause_cell(session: Session, cause: dict[str, Any] | None) -> dict[str, Any
     }
 
 
-def _errors(pair: tuple[Session, Session]) -> list[tuple[str, list[Fall]]]:
-    """Return for each error, without causes and with them, a bar for each joint: first session, second session."""
-    first, second = (session.verdict for session in pair)
-    if not first or not second:
-        return []
-    joints = list(first["baseline_rmse_nm"])
-    kinds = [("Rigid body and friction", "baseline_rmse_nm"), ("Noise floor", "noise_floor_nm")]
-    if first["causes"] or second["causes"]:
-        kinds.insert(1, ("With the named causes", "extended_rmse_nm"))
-    return [
-        (title, [_fall(joint, first, second, key) for joint in joints])
-        for title, key in kinds
-    ]  # fmt: skip
-
-
-def _fall(joint: str, first: dict[str, Any], second: dict[str, Any], key: str) -> Fall:
-    floor = max(first["noise_floor_nm"][joint], second["noise_floor_nm"][joint])
-    return Fall(joint, torque_unit(first, joint), first[key][joint], second[key][joint], floor, None)
+def _errors(pair: tuple[Session, Session]) -> list[tuple[str, list[BesideFloor]]]:
+    """Return for each error, without causes and with them, a pair of bars for each joint."""
+    rows = _beside_floor(pair)
+    models = dict.fromkeys(row.model for row in rows)
+    return [(model[:1].upper() + model[1:], [row for row in rows if row.model == model]) for model in models]

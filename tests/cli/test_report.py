@@ -30,7 +30,7 @@ def test_in_a_folder_with_results_no_arguments_are_needed(exoid, folder, monkeyp
 def test_two_sessions_are_compared(exoid, folder, tmp_path):
     other = write_session(tmp_path / "other", shift=0.06)
     outcome = exoid("report", "--compare", folder, other, "-o", tmp_path / "compared.html")
-    assert outcome.out.startswith("5 of 5 parameters changed beyond their 95 % intervals\n")
+    assert outcome.out.startswith("5 of 5 parameters changed beyond their intervals (95 %).\n")
     assert "demo and other" in (tmp_path / "compared.html").read_text()
 
 

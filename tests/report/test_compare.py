@@ -10,7 +10,15 @@ from pipelines.errors import InputError
 from pipelines.report.compare import changes, compare, titles_of
 from pipelines.report.parameters import Estimate
 from pipelines.report.session import find
-from tests.report.sessions import AXIS, LEG, write_parameters, write_session, write_verdict
+from tests.report.sessions import (
+    AXIS,
+    LEG,
+    verdict_of,
+    write_parameters,
+    write_recording,
+    write_session,
+    write_verdict,
+)
 
 
 def estimate(value, half, name="X1"):
@@ -63,6 +71,61 @@ def test_the_page_says_what_changed(tmp_path):
     same = compare(*pair(tmp_path / "again", 0.02), ("a", "b"))
     assert same.changed == 0
     assert "No parameter changed beyond its interval" in same.text
+
+
+def told_apart(tmp_path, **changes):
+    first, second = pair(tmp_path, 0.0)
+    write_verdict(second.folders[0], **changes)
+    return compare(first, find(second.folders), ("a", "b"))
+
+
+NOTHING = {"status": "unknown_cause", "causes": []}
+
+
+def test_a_verdict_that_changed_is_told_before_parameters_that_did_not(tmp_path):
+    page = told_apart(tmp_path, **NOTHING)
+    assert page.headline == "The verdict went from explained to cause unknown; no parameter changed beyond its interval"
+    assert f"<h1>{page.headline}</h1>" in page.text
+
+
+def test_other_causes_under_the_same_status_are_a_change_too(tmp_path):
+    other = verdict_of()["causes"][0] | {"effect": "backlash"}
+    assert told_apart(tmp_path, causes=[other]).headline.startswith("Other causes are named; ")
+
+
+def test_each_error_stands_beside_the_floor_of_its_own_session(tmp_path):
+    page = told_apart(tmp_path, **NOTHING, noise_floor_nm={"hip": 0.6, "knee": 0.5})
+    assert page.errors[2] == (
+        "knee, rigid body and friction: 0.818 N·m, 3.01 times the floor of 0.272 N·m → "
+        "0.818 N·m, 1.64 times the floor of 0.500 N·m"
+    )
+    assert len(page.errors) == 4
+    assert "Errors beside the noise floor" in page.text
+
+
+def test_settings_that_differ_are_listed_and_those_that_do_not_or_only_draw_are_not(tmp_path):
+    config = [{"filter": {"cutoff_hz": cutoff, "order": 4}, "identify": {"figures": draws}}
+              for cutoff, draws in (("auto", True), (20.0, False))]  # fmt: skip
+    sessions = []
+    for name, one in zip(("monday", "tuesday"), config, strict=True):
+        write_parameters(tmp_path / name)
+        write_recording(tmp_path / name, config=one)
+        sessions.append(find([tmp_path / name]))
+    page = compare(*sessions, ("a", "b"))
+    assert [(one.name, one.first, one.second) for one in page.settings] == [("filter.cutoff_hz", '"auto"', "20.0")]
+    assert "<code>filter.cutoff_hz</code>" in page.text
+    assert "No setting differs" in compare(sessions[0], sessions[0], ("a", "a")).text
+
+
+def test_parameters_of_a_cause_that_only_one_session_names_are_told_as_such(tmp_path):
+    first, second = pair(tmp_path, 0.0)
+    path = second.folders[0] / "diagnosed" / "parameters.parquet"
+    table = PARAMETERS.read(path)
+    about = {key: value for key, value in table.metadata.items() if key != "covariance"}
+    PARAMETERS.write(path, table.frame[table.frame["effect"] != "cogging"], about)
+    write_verdict(second.folders[0], **NOTHING)
+    text = compare(first, find(second.folders), ("a", "b")).text
+    assert "Only in a: knee amplitude of cogging at the knee, which it names." in text
 
 
 def test_folders_of_one_name_are_told_apart_by_those_above(tmp_path):
