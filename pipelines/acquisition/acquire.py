@@ -1,15 +1,17 @@
 """One run on a rig, from the first connection to the recording."""
 
+import asyncio
 import logging
 import signal
 import traceback
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from collections.abc import Callable, Coroutine, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.acquisition.alone import alone
 from pipelines.acquisition.columns import columns_of
@@ -24,6 +26,7 @@ from pipelines.acquisition.plan import check_start, check_trajectory, make_plan
 from pipelines.acquisition.recorded import account_of, place_for, write_recording
 from pipelines.acquisition.resolution import refuse_coarse_set_points
 from pipelines.acquisition.sampling import sampling_of
+from pipelines.acquisition.somebody import refuse_unguarded
 from pipelines.acquisition.states import State, Supervisor
 from pipelines.contracts import RECORDING
 from pipelines.contracts.atomic import open_folder
@@ -36,6 +39,8 @@ from pipelines.settings.mechanism import MechanismSettings
 from pipelines.settings.rig import RigSettings, load_rig
 
 Begin = Callable[[RigSettings, Trajectory], None]
+HEED_S = 0.05
+"""How often it is looked for signals while devices are waited for before anything moves."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +87,11 @@ def acquire(
         Told the rig with the limits in force and the motion, both found fit, before anything is connected; what it
         raises refuses the run.
     """
-    rig = load_rig(rig_path).in_force(run.run)
+    described = load_rig(rig_path)
+    if run.run == "with_human":
+        with about(rig_path):
+            refuse_unguarded(described, sample_rate_hz)
+    rig = described.in_force(run.run)
     trajectory = read_trajectory(trajectory_path)
     with about(trajectory_path):
         check_trajectory(rig, trajectory, run.duration_s, sample_rate_hz)
@@ -116,8 +125,16 @@ def acquire(
         supervisor = Supervisor(present, sample_rate_hz, sensors)
         recording = _record(supervisor, run, trajectory, journal, metadata, report, stopped_by, reset_faults)
         run_to_its_end(recording, supervisor.abort)
-        with locked(journal) as lock:
-            return _finish(output, lock, supervisor)
+        kind, told = _ending(output, supervisor)
+        with ExitStack() as held:
+            try:
+                lock = held.enter_context(locked(journal))
+            except OSError as error:
+                raise kind(
+                    f"{told}; its samples are not in {journal} any more ({error.strerror}); where that was moved to, "
+                    "`exoid recover` makes a recording of it"
+                ) from error
+            return _finish(output, lock, kind, told, supervisor.fault)
 
 
 async def _record(
@@ -137,14 +154,7 @@ async def _record(
     report(Progress(duration_s=run.duration_s))
     try:
         supervisor.check()
-        await machine.connect()
-        await machine.refuse_driven()
-        if reset_faults:
-            await machine.reset_faults()
-        await machine.make_idle()
-        start = np.array((await machine.look()).angle)
-        if why := check_start(rig, start):
-            raise DeviceError(why)
+        start = await _heeding(_ready(machine, reset_faults), stopped_by)
         plan = make_plan(rig, trajectory, start, run.duration_s, supervisor.rate)
         supervisor.take(plan, start)
         sampling = sampling_of(machine, supervisor.rate, supervisor.judge_records)
@@ -162,11 +172,39 @@ async def _record(
         machine.close()
 
 
+async def _ready(machine: Machine, reset_faults: bool) -> NDArray:
+    """Connect, make sure that every drive is idle, and return where the leg stands, (J,) rad."""
+    await machine.connect()
+    await machine.refuse_driven()
+    if reset_faults:
+        await machine.reset_faults()
+    await machine.make_idle()
+    start = np.array((await machine.look()).angle)
+    if why := check_start(machine.rig, start):
+        raise DeviceError(why)
+    return start
+
+
+async def _heeding(work: Coroutine[Any, Any, NDArray], stopped_by: Sequence[str]) -> NDArray:
+    """Return what work comes to that moves nothing, and leave off at a signal however long a device is waited for."""
+    task = asyncio.ensure_future(work)
+    while not task.done():
+        await asyncio.wait([task], timeout=HEED_S)
+        if stopped_by and not task.done():
+            task.cancel()
+            await asyncio.wait([task])
+            raise DeviceError(f"stopped by {stopped_by[0]} before the drives were enabled; nothing was moved")
+    return task.result()
+
+
 @contextmanager
 def _signals() -> Iterator[list[str]]:
     """Collect the names of signals that ask for a stop, so that the loop and nothing else acts on them."""
     # A terminal that is closed must not leave a drive enabled either.
-    told = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "SIGHUP", "SIGQUIT": "SIGQUIT"}
+    # Ctrl-Z would leave it to the drives' own watchdogs to stop the leg.
+    told = {
+        "SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "SIGHUP", "SIGQUIT": "SIGQUIT", "SIGTSTP": "Ctrl-Z",
+    }  # fmt: skip
     # Windows knows two of them.
     names = {signal.Signals[name]: word for name, word in told.items() if name in signal.Signals.__members__}
     came, before = list[str](), {}
@@ -180,15 +218,17 @@ def _signals() -> Iterator[list[str]]:
             signal.signal(number, handler)
 
 
-def _finish(output: Path, lock: Lock, supervisor: Supervisor) -> Outcome:
+def _ending(output: Path, supervisor: Supervisor) -> tuple[type[ExoidError], str]:
+    """Return whose fault the end of a run is, and in words how it ended and how it left the leg."""
+    if supervisor.fault:
+        log = _keep_traceback(supervisor.fault, place_for(output, supervisor.why))
+        return ExoidError, f"{supervisor.why}; please report it with {log}; {_rest(supervisor)}"
+    return DeviceError, f"{supervisor.why}; {_rest(supervisor)}" if supervisor.why else "the run is complete"
+
+
+def _finish(output: Path, lock: Lock, kind: type[ExoidError], told: str, fault: BaseException | None) -> Outcome:
     """Turn the journal into a recording; raise where the run was stopped, or exoid was at fault."""
     path = lock.path
-    kind: type[ExoidError] = DeviceError
-    told = f"{supervisor.why}; {_rest(supervisor)}" if supervisor.why else "the run is complete"
-    if fault := supervisor.fault:
-        kind = ExoidError
-        log = _keep_traceback(fault, place_for(output, supervisor.why))
-        told = f"{supervisor.why}; please report it with {log}; {_rest(supervisor)}"
     try:
         journal = JournalFile(path)
         account = account_of(journal)

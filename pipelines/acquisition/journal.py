@@ -4,8 +4,10 @@ Whoever writes a journal holds a lock on it, which the system takes away whateve
 that goes on can be told from one that was killed.
 """
 
+import errno
 import io
 import json
+import os
 import threading
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -92,9 +94,19 @@ class Journal:
         """Flush time after time, until the end or until that fails."""
         while not self._failure and not self._ends.wait(FLUSH_S):
             try:
+                self._refuse_elsewhere()
                 self.flush()
             except OSError as error:
                 self._failure = error
+
+    def _refuse_elsewhere(self) -> None:
+        """Refuse to write on to a file that was removed or moved: an open one takes all, and nobody finds it again."""
+        try:
+            is_there = os.path.samestat(os.stat(self.path), os.fstat(self._file.fileno()))
+        except FileNotFoundError:
+            is_there = False
+        if not is_there:
+            raise FileNotFoundError(errno.ENOENT, "it was removed or moved while the run went on", str(self.path))
 
     def end(self, abort: str | None, found: Mapping[str, Any] | None = None) -> None:
         """Say how the run ended: why it was stopped early, None if it was not. Only a killed run never says.

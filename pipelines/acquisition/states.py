@@ -24,7 +24,7 @@ from pipelines.settings.rig import RigSettings, SensorSettings
 
 REST_RAD = 0.02
 """How far the leg may have moved between the plan and the moment at which the drives are enabled."""
-WALK = 0.9
+WALK = 0.8
 """Share of its speed limit at which a joint is led back to the plan: at the whole of it a drive that follows well would
 break it by what it overshoots, and by a count."""
 SLACK_SAMPLES = 2
@@ -92,8 +92,8 @@ class Supervisor:
         self._held = [0 for _ in rig.drive]
         """For how many samples each drive has been held at rest in the stop."""
         self._sample_s = np.full(len(rig.drive), 1.0 / sample_rate_hz)
-        self._step = WALK * np.array([drive.speed_rad_s for drive in rig.drive]) * self._sample_s
-        """(J,) how far set-points walk in a sample, rad, if the plan itself goes no farther."""
+        self._walk = WALK * np.array([drive.speed_rad_s for drive in rig.drive])
+        """(J,) how fast set-points walk back to the plan, rad/s."""
         self._in_force = self.sent
         """(J,) set-points, rad, that are reached at the sample which is latched when the last ones are sent."""
         self._lead = np.zeros_like(self.sent)
@@ -217,7 +217,7 @@ class Supervisor:
         if awaited_s > self.rig.safety.longest_reply_s + SLACK_SAMPLES / self.rate:
             return self._slow(joint, now)
         due, planned = self._planned(self._found + int(awaited_s * self.rate))
-        base, step = self.base[joint], max(self._step[joint], abs(planned[joint]))
+        base, step = self.base[joint], self._step(planned, now)[joint]
         reference = float(np.clip(due[joint], base - step, base + step))
         self._speed[joint] = np.clip(reference - base, *sorted((0.0, planned[joint]))) * self.rate
         return self._pass(joint, reference, now)
@@ -252,7 +252,7 @@ class Supervisor:
         while self.state is not self._due(self._index(found)):
             self._go(FOLLOWING[FOLLOWING.index(self.state) + 1])
         due, planned = self._planned(found)
-        step = np.maximum(self._step, np.abs(planned)) if found > self._found else 0.0  # one step a sample
+        step = self._step(planned, now) if found > self._found else 0.0  # one step a sample
         reference = np.clip(due, self.base - step, self.base + step)
         self._refuse_to_lag(due, reference)
         # A step back to the plan is no motion to be slowed down from: it may be far faster than the plan.
@@ -446,6 +446,14 @@ class Supervisor:
     def _index(self, found: int) -> int:
         """Return which set-point of the path is due at a sample."""
         return min(found - self._first, len(self._plan.reference))
+
+    def _step(self, planned: NDArray, now: float) -> NDArray:
+        """Return how far set-points may go now, (J,) rad: the plan's own step, or as far as the walk back leads by now.
+
+        After a late one the next comes soon: for the drive both may fall into one sample, which must not make the way
+        back twice as fast.
+        """
+        return np.maximum(np.abs(planned), self._walk * np.minimum(self._elapsed_s(now), self._sample_s))
 
     def _planned(self, found: int) -> tuple[NDArray, NDArray]:
         """Return the set-points (J,) rad that are due at a sample, and their steps; refuse a plan that leaps there."""

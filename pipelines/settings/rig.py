@@ -4,6 +4,7 @@ A virtual rig has a ``[plant]`` too, the machine behind its registers. No stage 
 """
 
 from collections import Counter
+from math import inf
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -90,6 +91,15 @@ class Register(Settings):
             return None
         bits = 16 * self.registers
         return (0, 2**bits - 1) if self.type.startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The least and the greatest SI value that it can tell; infinite for a float."""
+        if self.counts is None:
+            return -inf, inf
+        scale, offset = self.si
+        low, high = sorted(count * scale + offset for count in self.counts)
+        return low, high
 
     def holds(self, low: float, high: float) -> bool:
         """Tell whether it can hold every SI value from ``low`` to ``high``."""
@@ -544,6 +554,7 @@ class RigSettings(Settings):
         if self.plant is None:  # nobody is in a virtual one
             refuse_absurd(self)
         self._refuse_impossible_set_points()
+        self._refuse_limits_that_registers_cannot_tell()
         return self
 
     def _refuse_impossible_set_points(self) -> None:
@@ -574,6 +585,25 @@ class RigSettings(Settings):
                     f"torque_nm: found {drive.torque_nm:g} of the {drive.joint}, expected less than its "
                     f"controller.limit_nm ({loop.limit_nm:g}), which the drive never goes beyond; lower it"
                 )
+
+    def _refuse_limits_that_registers_cannot_tell(self) -> None:
+        """Refuse registers that end before a limit: it would be watched in vain, and the end taken for true."""
+        for drive in self.drive:
+            use, most = self.map.drive[drive.map], drive.torque_nm / drive.torque_per_ampere
+            reach = {
+                "angle": drive.angle_rad, "velocity": (-drive.speed_rad_s, drive.speed_rad_s), "current": (-most, most),
+            }  # fmt: skip
+            blocks = {"read": use.read} | ({"ring.record": use.ring.record} if use.ring else {})
+            for block, registers in blocks.items():
+                for name, limits in reach.items():
+                    _refuse_short(
+                        f"map.drive.{drive.map}.{block}.{name}", getattr(registers, name), limits, drive.joint
+                    )
+        for sensor in self.sensor:
+            most = self.safety.cuff_force_n
+            for name in ("force_x", "force_y", "force_z"):
+                register = getattr(self.map.sensor[sensor.map].read, name)
+                _refuse_short(f"map.sensor.{sensor.map}.read.{name}", register, (-most, most), sensor.cuff)
 
     def _refuse_bad_lines(self) -> None:
         devices = (*self.drive, *self.sensor)
@@ -664,3 +694,16 @@ def load_rig(path: Path | str) -> RigSettings:
     rig = load_toml(path, RigSettings)
     lines = {name: line.with_files_in(Path(path).parent) for name, line in rig.line.items()}
     return rig.model_copy(update={"line": lines})
+
+
+def _refuse_short(key: str, register: Register | None, limits: tuple[float, float], whose: str) -> None:
+    """Refuse a register that cannot tell a value beyond both limits, SI."""
+    if register is None:
+        return
+    low, high = register.span
+    if not (low < limits[0] and limits[1] < high):
+        raise ValueError(
+            f"{key}: an {register.type} of this scale tells {low:.4g} to {high:.4g}, expected more than "
+            f"{limits[0]:.4g} to {limits[1]:.4g} (SI units), what the limits of {whose} are there; correct its type or "
+            "scale, or lower the limits"
+        )

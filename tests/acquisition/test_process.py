@@ -3,6 +3,7 @@
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -107,7 +108,13 @@ def test_the_default_rig_is_started_recorded_and_ended_and_tells_nothing_sealed(
 
 @pytest.mark.parametrize(
     ("number", "name"),
-    [(signal.SIGINT, "Ctrl-C"), (signal.SIGTERM, "SIGTERM"), (signal.SIGQUIT, "SIGQUIT"), (signal.SIGHUP, "SIGHUP")],
+    [
+        (signal.SIGINT, "Ctrl-C"),
+        (signal.SIGTERM, "SIGTERM"),
+        (signal.SIGQUIT, "SIGQUIT"),
+        (signal.SIGHUP, "SIGHUP"),
+        (signal.SIGTSTP, "Ctrl-Z"),
+    ],
 )
 def test_a_signal_stops_the_leg_keeps_the_record_and_says_so_in_one_line(start, experiment, tmp_path, number, name):
     arguments, output = experiment("plain", 4000.0)
@@ -124,6 +131,40 @@ def test_a_signal_stops_the_leg_keeps_the_record_and_says_so_in_one_line(start, 
     assert table.metadata["abort"] == f"stopped by {name}"
     assert len(table.frame) >= 100
     assert ended(tmp_path)
+
+
+def test_a_folder_that_vanishes_stops_the_leg_and_hides_neither_why_nor_how_it_was_left(start, experiment, tmp_path):
+    arguments, output = experiment("plain", 4000.0)
+    process = start(arguments)
+    wait_for_rows(process, output, 100)
+    output.parent.rename(tmp_path / "moved")
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 3
+    assert "it was removed or moved while the run went on" in err
+    assert f"the leg was stopped; its samples are not in {journal_of(output)} any more" in err
+    assert len(read_journal(tmp_path / "moved" / journal_of(output).name)[0]) >= 100
+
+
+def test_a_signal_while_a_silent_device_is_waited_for_before_anything_moves_ends_it_at_once(
+    start, rig_file, excitation, tmp_path
+):
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        rig = rig_file(shipped="real_time", port=silent.getsockname()[1], connect_s=50.0)
+        config = tmp_path / "exoid.toml"
+        config.write_text(
+            f'[acquire]\nrig = "{rig.name}"\n[[run]]\nname = "one"\nrun = "exo_alone"\npurpose = "train"\n'
+            "duration_s = 1.0\nseed = 3\n"
+        )
+        process = start(
+            ["acquire", "--config", config, "--run", "one", "--trajectory", excitation, "-o", tmp_path / "one.parquet"]
+        )
+        connection, _ = silent.accept()
+        with connection:
+            connection.recv(12)  # it asks, and waits for an answer
+            process.send_signal(signal.SIGTERM)
+            _, err = process.communicate(timeout=20)
+    assert process.returncode == 3
+    assert err == "exoid: stopped by SIGTERM before the drives were enabled; nothing was moved\n"
 
 
 def test_a_killed_run_loses_no_more_than_half_a_second(start, experiment, tmp_path):

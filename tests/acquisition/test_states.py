@@ -144,10 +144,25 @@ def test_after_missed_samples_set_points_walk_back_to_the_plan_from_where_the_dr
     supervisor.resume(0, told(before + gone_on), 10.0 + 11 / RATE)
     sent = [before + gone_on, *(follow(supervisor, k) for k in range(111, 180))]
     steps = np.diff(sent)
-    assert steps[0] == pytest.approx(0.9 * 3.0 / RATE)  # short of the speed limit
-    assert steps.max() <= 0.9 * 3.0 / RATE + 1e-12
+    assert steps[0] == pytest.approx(0.8 * 3.0 / RATE)  # short of the speed limit
+    assert steps.max() <= 0.8 * 3.0 / RATE + 1e-12
     assert sent[-1] == pytest.approx(79 * 2.0 / RATE)  # the plan again
     assert steps[-1] == pytest.approx(2.0 / RATE)
+
+
+def test_a_set_point_that_comes_soon_after_a_late_one_leads_back_to_the_plan_no_faster(supervisor):
+    """For the drive both fall into one of its samples."""
+    supervisor.take(Plan(np.arange(1, 129)[:, np.newaxis] * [2.0 / RATE, 0.0], 50, 100), np.zeros(2))
+    supervisor.rest(10.0)
+    supervisor.begin(row(100), 10.0)
+    before = follow(supervisor, 101)
+    assert supervisor.missed(111, 10.0 + 11 / RATE)
+    supervisor.resume(0, told(before), 10.0 + 11 / RATE)
+    late = 10.0 + 11.8 / RATE
+    first = float(supervisor.next(111, late)[0])
+    soon = float(supervisor.next(112, late + 0.2 / RATE)[0])
+    assert first - before == pytest.approx(0.8 * 3.0 / RATE)
+    assert soon - first == pytest.approx(2.0 / RATE)  # the plan's own
 
 
 def test_a_run_that_lags_too_far_behind_its_plan_is_stopped(supervisor):

@@ -1,0 +1,39 @@
+"""What a rig must have before somebody is moved by it: limits of their own, and cuff forces that are watched."""
+
+from pipelines.errors import SettingsError
+from pipelines.settings.rig import RigSettings
+
+LIMITS = ("speed_rad_s", "torque_nm")
+
+
+def refuse_unguarded(rig: RigSettings, sample_rate_hz: float) -> None:
+    """Refuse to move somebody by a rig as its file describes it, whose limits would be those of an empty machine.
+
+    Nobody is in a virtual one.
+
+    Raises
+    ------
+    SettingsError
+        Tells the key that is missing, or the sensor that is read too seldom.
+    """
+    if rig.plant is not None:
+        return
+    for i, drive in enumerate(rig.drive):
+        for limit in LIMITS:
+            if getattr(drive.with_human, limit) is None:
+                raise SettingsError(
+                    f"drive[{i}].with_human.{limit}: missing; a run with_human needs the {drive.joint}'s own limit, no "
+                    f"higher than {getattr(drive, limit):g}"
+                )
+    if rig.sensor and rig.safety.with_human.cuff_force_n is None:
+        raise SettingsError(
+            "safety.with_human.cuff_force_n: missing; a run with_human needs its own limit of the force on a cuff, no "
+            f"higher than {rig.safety.cuff_force_n:g} N"
+        )
+    for i, sensor in enumerate(rig.sensor):
+        if sensor.every > rig.safety.watchdog_s * sample_rate_hz:
+            raise SettingsError(
+                f"sensor[{i}].every: found {sensor.every}, which is {sensor.every / sample_rate_hz:.3g} s at "
+                f"{sample_rate_hz:g} Hz; expected a force at least every {rig.safety.watchdog_s:g} s "
+                "(safety.watchdog_s), or nobody watches it; lower it"
+            )
