@@ -173,9 +173,11 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
     }
     names = [joint.name for joint in plant.joints]
     rmse = dict(zip(names, replayed.rmse.tolist(), strict=True))
-    SIMULATION.write(output, open_loop, shared | {"simulation_rmse_rad": rmse, "windows": len(replayed.first)})
     result: dict[str, Any] = {"simulation_rmse_rad": rmse}
     lacks = recorded.why_no_closed_loop(motion)
+    beside = output.with_name(f"{output.stem}-closed-loop{output.suffix}")
+    told = {"simulation_rmse_rad": rmse, "windows": len(replayed.first), "beside": [] if lacks else [beside.name]}
+    SIMULATION.write(output, open_loop, shared | told)
     if not lacks:
         with console.working("following the references"):
             made = recorded.follow_references(plant, motion)
@@ -184,7 +186,6 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
         result["closed_loop_rmse_nm"] = dict(zip(names, made.torque_rmse.tolist(), strict=True))
         scores = {key: value for key, value in result.items() if key.startswith("closed")}
         controller = motion.metadata["controller"]
-        beside = output.with_name(f"{output.stem}-closed-loop{output.suffix}")
         SIMULATION.write(beside, closed_loop, shared | scores | {"controller": controller})
     if settings.simulate.figures:
         from pipelines.simulation.figures import draw_replay

@@ -35,5 +35,7 @@ def save(figure: Figure, stem: Path, kinds: Sequence[str] = ("png", "pdf")) -> N
     box = figure.get_tightbbox().padded(plt.rcParams["savefig.pad_inches"])
     for kind in kinds:
         with whole_file(stem.with_name(f"{stem.name}.{kind}")) as path:
-            figure.savefig(path, format=kind, bbox_inches=box)
+            # Without its date a PDF that shows the same is the same, and nothing goes stale for it.
+            undated = {"CreationDate": None} if kind == "pdf" else None
+            figure.savefig(path, format=kind, bbox_inches=box, metadata=undated)
     plt.close(figure)

@@ -9,7 +9,7 @@ import pandas as pd
 from pipelines.contracts import Joint
 from pipelines.report.chart import Chart, Mark, Panel, Role, Series
 from pipelines.report.measured import MODELS, models_of
-from pipelines.report.session import Artifact, Session
+from pipelines.report.session import SWEEP, Artifact, Session
 
 GAIN = "feedback_gain_nm_s_rad"
 LIMIT = 4.0
@@ -35,7 +35,7 @@ def control_charts(session: Session) -> Iterator[Chart]:
     settled = next(iter(made.values())).metadata.get("config", {}).get("simulate", {}).get("settled_after_s", 0.0)
     for joint in session.joints:
         yield _loop_chart(joint, tables, settled)
-    sweep = _sweep_chart(session, {model: one.path.with_name("kv-sweep.csv") for model, one in made.items()})
+    sweep = _sweep_chart(session, {model: one.path.with_name(SWEEP) for model, one in made.items()})
     if sweep:
         yield sweep
 

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from pipelines import __version__
 from pipelines.contracts import describe
+from pipelines.contracts.provenance import sha256
 from pipelines.report.animation import Animation
 from pipelines.report.chart import Chart
 from pipelines.report.numbers import beside, digits
-from pipelines.report.session import Artifact
+from pipelines.report.session import SWEEP, Artifact
 
 LARGEST_BYTES = 5_000_000
 """Of a page."""
@@ -65,7 +66,12 @@ def render(
 
 def _provenance(artifacts: Iterable[Artifact]) -> dict[str, Any]:
     """Return what the page was made of, as every result of exoid's tells it."""
-    return describe() | {"inputs": [{"name": one.path.name, "sha256": one.sha256} for one in artifacts]}
+    known = list(artifacts)
+    inputs = [{"name": one.path.name, "sha256": one.sha256} for one in known]
+    # A table without metadata, drawn where the loop of its model is.
+    sweeps = dict.fromkeys(one.path.with_name(SWEEP) for one in known if one.kind == "simulation")
+    inputs += [{"name": file.name, "sha256": sha256(file)} for file in sweeps if file.is_file()]
+    return describe() | {"inputs": inputs}
 
 
 @cache

@@ -11,6 +11,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
+from pipelines.contracts import parquet
 from pipelines.contracts.beside import aborted_of, journal_of
 from pipelines.contracts.provenance import provenance_of, sha256
 from pipelines.errors import ContractError
@@ -59,7 +60,8 @@ class Judge:
     def judge(self, step: Step) -> Judged:
         """Return a step with its state; the steps that make its inputs have been judged before."""
         state = Freshness.STALE if step.target.exists() else Freshness.MISSING
-        why = tuple(self._reasons(step) if step.target.exists() else self._left_behind(step.target))
+        reasons = self._reasons(step) if step.target.exists() else self._left_behind(step.target)
+        why = tuple(dict.fromkeys(reasons))
         judged = Judged(step, state if why or state is Freshness.MISSING else Freshness.DONE, why)
         self._seen.update(dict.fromkeys(step.makes, judged))
         return judged
@@ -70,10 +72,18 @@ class Judge:
         except ContractError as error:
             yield str(error).removeprefix(f"{step.target}: ")
             return
+        yield from self._lacking([*step.beside, *(step.target.with_name(name) for name in told.get("beside", []))])
         yield from self._other_inputs(step, {(entry["name"], entry["sha256"]) for entry in told.get("inputs", [])})
         yield from _other_settings(told.get("config", {}), step.settings)
         if step.watched and step.watched.stat().st_mtime_ns > step.target.stat().st_mtime_ns:
             yield f"{self._name(step.watched)} is newer"
+
+    def _lacking(self, beside: Sequence[Path]) -> Iterator[str]:
+        for file in beside:
+            if not file.exists():
+                yield f"{self._name(file)} is missing"
+            elif file.suffix == ".parquet" and not parquet.is_whole(file):
+                yield f"{self._name(file)} is damaged"
 
     def _other_inputs(self, step: Step, recorded: Set[tuple[str, str]]) -> Iterator[str]:
         names = {name for name, _ in recorded}

@@ -25,7 +25,7 @@ class Step:
     stage: str
     """The stage it belongs to; a stage has one step, or one for each run."""
     target: Path
-    """The file that tells whether it is done, and of what it was made."""
+    """The file that tells of what it was made."""
     inputs: tuple[Path, ...]
     """Files whose content counts: targets of other steps, or the user's own."""
     settings: Mapping[str, Any]
@@ -37,7 +37,7 @@ class Step:
     watched: Path | None = None
     """A file that counts too, though no result may tell its hash."""
     beside: tuple[Path, ...] = ()
-    """Other files that the command makes, where later steps read them."""
+    """Other files that the command always makes; it is done where none is missing."""
     may_fail: bool = False
     """Whether it may be impossible, so that what needs it does without: not every model with causes can move."""
     takes_all: bool = False
@@ -45,7 +45,7 @@ class Step:
 
     @property
     def makes(self) -> tuple[Path, ...]:
-        """Every file of it that another step may need."""
+        """Every file of it."""
         return (self.target, *self.beside)
 
     @property
@@ -77,10 +77,12 @@ def graph(experiment: Experiment, config: Path, out: Path, imported: ImportedRun
                 if run.name not in imported.names]  # fmt: skip
 
     def step(
-        stage: str, target: Path, inputs: Iterable[Path], settings: Sequence[str], *command: str, run: str | None = None
-    ) -> Step:
-        counted = experiment.sections(*settings)
-        return Step(stage, target, tuple(inputs), counted, (*command, *told, "-o", _output(stage, target)), run)
+        stage: str, target: Path, inputs: Iterable[Path], settings: Sequence[str], *command: str,
+        run: str | None = None, beside: Iterable[str] = (),
+    ) -> Step:  # fmt: skip
+        counted, others = experiment.sections(*settings), tuple(target.with_name(name) for name in beside)
+        words = (*command, *told, "-o", _output(stage, target))
+        return Step(stage, target, tuple(inputs), counted, words, run, beside=others)
 
     steps = list(recorded)
     if any(trajectory in one.inputs for one in recorded):
@@ -88,19 +90,20 @@ def graph(experiment: Experiment, config: Path, out: Path, imported: ImportedRun
     for name, recording in recordings.items():
         called: tuple[str, ...] = ("filter", recording.as_posix())
         steps.append(step("filter", motions[name], [recording], ["filter"], *called, run=name))
-    steps.append(
-        step("identify", parameters, motions.values(), ("identify", "mechanism"), "identify", *_words(motions))
-    )
+    counted: tuple[str, ...] = ("identify", "mechanism")
+    words = ("identify", *_words(motions))
+    steps.append(step("identify", parameters, motions.values(), counted, *words, beside=IDENTIFIED))
     if validate:  # a diagnosis measures its gain on validation runs; without one there is none
-        verdict, counted, words = out / "diagnosed" / "verdict.json", ("filter", "mechanism"), _words(recordings)
-        diagnose = step("diagnose", verdict, recordings.values(), counted, "diagnose", *words)
+        verdict, counted = out / "diagnosed" / "verdict.json", ("filter", "mechanism")
+        words = ("diagnose", *_words(recordings))
+        steps.append(step("diagnose", verdict, recordings.values(), counted, *words, beside=DIAGNOSED))
         extended = verdict.with_name("parameters.parquet")
-        steps.append(replace(diagnose, beside=(extended,)))
 
     def simulated(model: Path, folder: Path, loop: str, replay: str) -> Iterator[Step]:
         called: tuple[str, ...] = ("simulate", model.as_posix())
         if imported.of_a_leg:
-            yield step(loop, folder / LOOP, [model], ("simulate", "mechanism"), *called)
+            sweep = [SWEEP] if experiment.simulate.sweep_nm_s_rad else []
+            yield step(loop, folder / LOOP, [model], ("simulate", "mechanism"), *called, beside=sweep)
         for name in (run.name for run in validate):
             inputs, words = [model, recordings[name]], (*called, "--replay", recordings[name].as_posix())
             yield step(replay, folder / f"replay-{name}.parquet", inputs, ("filter", "mechanism"), *words, run=name)
@@ -111,12 +114,15 @@ def graph(experiment: Experiment, config: Path, out: Path, imported: ImportedRun
     if validate:
         again = simulated(extended, out / "simulated" / "extended", "extended", "extended")
         steps += [replace(one, may_fail=True) for one in again]
-    shown = [one.target for one in steps if one.stage != "filter"]
+    shown = [file for one in steps if one.stage != "filter" for file in one.makes]
     report = step("report", out / "report.html", shown, (), "report", out.as_posix())
     return (*steps, replace(report, takes_all=True))
 
 
-LOOP, WHOLE_FOLDER = "rbf.parquet", ("identify", "diagnose")
+LOOP, SWEEP, WHOLE_FOLDER = "rbf.parquet", "kv-sweep.csv", ("identify", "diagnose")
+IDENTIFIED = ("residuals.parquet",)
+DIAGNOSED = ("parameters.parquet", "residuals.parquet", "candidates.parquet", "detectability.json")
+"""What these write besides their target, whatever they find; figures are drawn from it, and are not looked for."""
 
 
 def _output(stage: str, target: Path) -> str:

@@ -15,6 +15,9 @@ from pipelines.settings.experiment import Experiment
 from pipelines.workflow.graph import Step, graph, sealed_file
 from pipelines.workflow.imported import with_imported
 
+INCOMPLETE = "incomplete"
+"""What make is told that a step needs of whose files one is missing."""
+
 
 def split(experiment: Experiment, folder: Path) -> None:
     """Write ``<section>.json``, ``run-<name>.json`` and ``graph.mk`` into a folder."""
@@ -56,6 +59,8 @@ def _rules(steps: Sequence[Step]) -> Iterator[str]:
     for sealed in dict.fromkeys(step.watched for step in steps if step.watched):
         yield f"$(SETTINGS)/graph.mk: {sealed.as_posix()}"
         yield f"{sealed.as_posix()}:"
+    # What is phony is never up to date, nor is a step then that needs it.
+    yield f".PHONY: {INCOMPLETE}"
     for step in steps:
         yield from _rule(step)
 
@@ -65,8 +70,15 @@ def _rule(step: Step) -> Iterator[str]:
     made = [file.as_posix() for file in step.inputs if file.is_relative_to("$(OUT)")]
     settings = [f"$(SETTINGS)/{name}.json" for name in step.settings_files]
     yield ""
-    yield f"{step.target.as_posix()}: {' '.join([*made, *settings])}"
+    yield f"{step.target.as_posix()}: {' '.join([*made, *settings, *_if_incomplete(step)])}"
     # A step that may be impossible is tried, and what needs it made without it.
     yield f"\t{'-' * step.may_fail}$(EXOID) {' '.join(step.command)}"
     # With an empty recipe make looks at the file's own time, once the command has run.
     yield from (f"{file.as_posix()}: {step.target.as_posix()} ;" for file in step.beside)
+
+
+def _if_incomplete(step: Step) -> Iterator[str]:
+    """Yield what a step needs that is to be done again for a missing file; rules of several files need make 4.3."""
+    beside = " ".join(file.as_posix() for file in step.beside)
+    if beside:
+        yield f"$(if $(filter-out $(wildcard {beside}),{beside}),{INCOMPLETE})"

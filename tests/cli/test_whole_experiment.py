@@ -108,6 +108,26 @@ def test_what_make_has_done_exoid_takes_for_done_and_the_other_way_round(exoid, 
     assert make(experiment)[1] == []
 
 
+def test_a_file_that_a_stage_lacks_is_told_and_made_again(exoid, experiment):
+    lost = [
+        "identified/residuals.parquet",
+        "simulated/kv-sweep.csv",
+        "simulated/replay-exo_alone_validate-closed-loop.parquet",
+    ]
+    for name in lost:
+        (experiment / name).unlink()
+    told = {reason for one in json.loads(exoid("status", "--json").out) for reason in one["why"]}
+    assert told == {"waits for identify", "waits for simulate", "waits for replay", *(f"{x} is missing" for x in lost)}
+    again = [one["stage"] for one in json.loads(exoid("run", "--json").out)]
+    assert again == ["identify", "simulate", "replay", "report"]
+    assert all((experiment / name).is_file() for name in lost)
+    assert {one["state"] for one in json.loads(exoid("status", "--json").out)} == {"done"}
+    make(experiment)  # which goes by times, and does more
+    (experiment / "simulated" / "kv-sweep.csv").unlink()
+    assert make(experiment)[1] == ["simulate", "report"]
+    assert make(experiment)[1] == []
+
+
 def test_what_is_made_anew_and_says_the_same_makes_nothing_stale(exoid, experiment):
     for stage in ("filter", "diagnose"):
         assert exoid(stage, "--again").code == 0

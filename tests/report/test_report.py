@@ -80,7 +80,7 @@ def test_a_session_of_many_long_runs_stays_under_five_megabytes(tmp_path):
 
 def test_the_page_tells_what_it_was_made_of_as_every_result_does(session_folder, page_file):
     told = provenance_of(page_file)
-    made_of = {sha256(path) for path in session_folder.rglob("*") if path.suffix in (".parquet", ".json")}
+    made_of = {sha256(path) for path in session_folder.rglob("*") if path.suffix in (".parquet", ".json", ".csv")}
     assert {one["sha256"] for one in told["inputs"]} == made_of
 
 

@@ -5,6 +5,7 @@ import os
 from dataclasses import replace
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from pipelines.contracts import describe
@@ -115,6 +116,32 @@ def test_a_report_that_takes_all_may_have_taken_more(chain):
 def test_a_damaged_result_is_stale(chain, content):
     chain.steps[1].target.write_text(content)
     assert chain.states()["two"] == ("stale", ("does not say where it came from; make it again",))
+
+
+def test_a_step_is_done_where_all_its_files_are_there(chain):
+    first, second = chain.steps
+    beside = chain.folder / "beside.parquet"
+    step = replace(first, beside=(beside,))
+    steps = (step, replace(second, inputs=(*step.makes,)))
+
+    def states():
+        return [(one.state.value, one.why) for one in Judge(chain.folder).all(steps)]
+
+    pd.DataFrame({"a": [1]}).to_parquet(beside)
+    second.target.write_text(json.dumps({"provenance": describe(step.makes)}))
+    assert states() == [("done", ()), ("done", ())]
+    beside.write_bytes(beside.read_bytes()[:-1])
+    assert states()[0] == ("stale", ("beside.parquet is damaged",))
+    beside.unlink()
+    assert states() == [("stale", ("beside.parquet is missing",)), ("stale", ("waits for one",))]
+
+
+def test_a_file_that_a_result_tells_of_as_made_with_it_must_be_there(chain):
+    second = chain.steps[1]
+    second.target.write_text(json.dumps({"provenance": describe(second.inputs) | {"beside": ["loop.json"]}}))
+    assert chain.states()["two"] == ("stale", ("loop.json is missing",))
+    (chain.folder / "loop.json").touch()
+    assert chain.states()["two"] == ("done", ())
 
 
 def test_what_a_killed_or_stopped_run_left_is_told(tmp_path):

@@ -26,7 +26,11 @@ case "$*" in
 esac
 for last in "$@"; do :; done
 case "$last" in
-  */) mkdir -p "$last"; touch "$last/parameters.parquet" "$last/rbf.parquet" "$last/verdict.json" ;;
+  identified/|diagnosed/|./identified/|./diagnosed/) mkdir -p "$last"
+    for name in parameters.parquet residuals.parquet candidates.parquet detectability.json verdict.json; do
+      touch "$last/$name"
+    done ;;
+  */) mkdir -p "$last"; touch "$last/rbf.parquet"; [ -e nosweep ] || touch "$last/kv-sweep.csv" ;;
   *) mkdir -p "$(dirname "$last")"; touch "$last" ;;
 esac
 """
@@ -99,6 +103,30 @@ def test_where_the_model_with_causes_cannot_move_all_else_is_made(make):
     assert sorted(make()) == sorted(["design", *["acquire"] * 4, *ALL_FROM_RECORDINGS])
     assert (make.folder / "report.html").is_file()
     assert not (make.folder / "simulated" / "extended").exists()
+
+
+@pytest.mark.parametrize(
+    ("file", "again"),
+    [
+        ("identified/residuals.parquet", [*FIT, "report"]),
+        ("diagnosed/parameters.parquet", [*DIAGNOSIS, "report"]),
+        ("diagnosed/detectability.json", [*DIAGNOSIS, "report"]),
+        ("simulated/kv-sweep.csv", ["simulate", "report"]),
+    ],
+)
+def test_where_one_of_the_files_of_a_step_is_missing_it_is_done_again(make, file, again):
+    make()
+    (make.folder / file).unlink()
+    assert sorted(make()) == sorted(again)
+    assert (make.folder / file).is_file()
+    assert make() == []
+
+
+def test_without_gains_to_sweep_no_table_of_them_is_waited_for(make):
+    make.change("sweep_nm_s_rad = [", "sweep_nm_s_rad = [] # [")
+    (make.folder / "nosweep").touch()
+    make()
+    assert make() == []
 
 
 def test_an_imported_recording_is_nobodys_to_make(make):
