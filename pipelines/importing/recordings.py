@@ -71,6 +71,7 @@ def recordings(path: Path, settings: ImportMap, map_path: Path) -> Iterator[Impo
             inputs=[*_files(path), map_path], config=settings.model_dump(mode="json", exclude_none=True)
         )
         given = {"source": path.as_posix(), "map": map_path.as_posix()}
+        _refuse_short(log)
         runs = _chosen(log.runs, settings.time.restarts, log.findings)
         for number, run in enumerate(runs, 1):
             suffix = f"_run{number}" if len(runs) > 1 else ""
@@ -81,11 +82,20 @@ def _files(path: Path) -> list[Path]:
     return sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
 
 
+def _refuse_short(log: Log) -> None:
+    if log.rows < FEWEST:
+        raise InputError(f"found {counted(log.rows, 'row')}, a recording needs at least {FEWEST}; log for longer")
+    longest = max(map(len, log.runs), default=0)
+    if longest < FEWEST:
+        raise InputError(
+            f"no run of its clock has {FEWEST} rows, which a recording needs: the longest has {longest} of "
+            f"{log.rows}; correct [time] in the map"
+        )
+
+
 def _chosen(runs: Sequence[Run], restarts: str, findings: list[Finding]) -> list[Run]:
     """Return the runs that become recordings."""
     long = [run for run in runs if len(run) >= FEWEST]
-    if not long:
-        raise InputError(f"no run of its clock has {FEWEST} rows; correct [time] in the map")
     if len(runs) == 1:
         return long
     kept = long if restarts == "split" else [max(long, key=len)]

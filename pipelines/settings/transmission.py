@@ -56,6 +56,9 @@ GEARED = {
 }  # fmt: skip
 """Power of the gear ratio, by what arrives at the joint: motion is divided by it, torque is multiplied."""
 
+METRIC = {"length": ("m", "metres"), "velocity": ("m/s", "metres a second"), "force": ("N", "newtons")}
+"""What a log of a joint that slides may be in, where its map says what turns."""
+
 
 def paths(source: str, target: str) -> list[tuple[Step, ...]]:
     """Return all ways through a drive train from one dimension to another, the shortest first."""
@@ -81,16 +84,18 @@ def gain(source: str, target: str, given: Mapping[str, float], gear_ratio: float
     ways = paths(source, target)
     complete = [way for way in ways if {step.key for step in way} == set(given)]
     if not complete:
-        raise ValueError(_what_is_wrong(ways, set(given)))
+        raise ValueError(_what_is_wrong(ways, target, set(given)))
     return gear_ratio ** GEARED[target] * prod(step.factor(given[step.key]) for step in complete[0])
 
 
-def _what_is_wrong(ways: list[tuple[Step, ...]], given: set[str]) -> str:
+def _what_is_wrong(ways: list[tuple[Step, ...]], target: str, given: set[str]) -> str:
     wanted = [{step.key for step in way} for way in ways]
     for keys in wanted:
         if keys >= given:
             instead = f", or {_both(wanted[0] - given)} in place of {_both(given)}" if given - wanted[0] else ""
-            return f"needs {_both(keys - given)}{instead}; add it from the data sheet"
+            metric = METRIC[target] if keys == {"lead_m"} else None
+            rather = f', or unit = "{metric[0]}", where the log is in {metric[1]}' if metric else ""
+            return f"needs {_both(keys - given)}{instead}; add it from the data sheet{rather}"
     spare = min((given - keys for keys in wanted), key=len)
     return f"has no use for {_both(spare)}; remove it, or correct the unit"
 

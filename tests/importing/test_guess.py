@@ -131,6 +131,48 @@ def test_a_voltage_on_a_joint_that_may_slide_names_both_gains_and_the_number_tha
     assert "kp" not in doubts["joint[0].torque.gain_nm_v"]
 
 
+def test_what_changes_with_the_kind_of_a_joint_is_told_where_nothing_says_that_it_turns(guessed, tmp_path):
+    time = np.arange(4000) / 1000.0
+    place = 0.2 * np.sin(2.0 * time)
+    path = tmp_path / "slide.mat"
+    savemat(path, {"t": time, "qm": place, "qg": place + 1e-3, "vir": 2.0 * np.cos(2.0 * time)})
+    _, doubts = guessed(path)
+    assert doubts["joint[0].kind"] == (
+        'no unit of length; where it slides and the log is in metres: kind = "prismatic", angle.unit = "m", '
+        'reference.unit = "m", gain_n_v in place of gain_nm_v, '
+        "gravity_m_s2 = 0 if it lies level"
+    )
+
+
+@pytest.mark.parametrize("name", ["torque_enable", "servo_on", "drive_enabled"])
+def test_a_column_of_0_and_1_that_says_whether_the_drive_is_on_is_proposed(
+    imported, guessed, pendulum, write_csv, name
+):
+    on = np.ones(len(pendulum.time))
+    on[:50] = 0.0
+    path = write_csv(swinging(pendulum) | {name: on})
+    text, doubts = guessed(path)
+    assert re.search(rf'^enabled = "{name}" +# its name says so; 0 in 2.5% of the rows: where it is 0 ', text, re.M)
+    assert "joint[0].enabled" not in doubts
+    assert "Not used" not in text
+    assert len(imported(path, map_text=text).recording("log_train").frame) == 0.7 * len(on) - 50
+
+
+@pytest.mark.parametrize("values", [0.0, 7.0], ids=["never on", "a number"])
+def test_a_column_that_is_no_switch_is_not_proposed_whatever_its_name(guessed, pendulum, write_csv, values):
+    text, _ = guessed(write_csv(swinging(pendulum) | {"torque_enable": np.full(len(pendulum.time), values)}))
+    assert "enabled =" not in text
+    assert "Not used: torque_enable" in text
+
+
+def test_every_joint_has_its_own_switch_or_that_of_all(guessed, pendulum, write_csv):
+    one, on = swinging(pendulum), np.ones(len(pendulum.time))
+    joints = {f"{joint}_{what}": one[what] for joint in ("hip", "knee") for what in ("angle", "velocity", "torque")}
+    switches = {"enabled": on, "knee_enabled": on}
+    text, _ = guessed(write_csv({"time": pendulum.time} | joints | switches))
+    assert [joint["enabled"] for joint in tomllib.loads(text)["joint"]] == ["enabled", "knee_enabled"]
+
+
 def test_several_joints_are_told_apart_and_never_sure_of_their_signs(guessed, pendulum, write_csv):
     one = swinging(pendulum)
     columns = {"time": one["time"]}
@@ -189,7 +231,11 @@ def test_a_log_in_which_nothing_moves_gets_no_guess(pendulum, write_csv, capsys)
         ("Time (ms)", "time", "", "ms"),
         ("goal_position", "reference", "", None),
         ("LoadCell ()", "", "", None),
-        ("torque_enable", "", "", None),
+        ("torque_enable", "enabled", "", None),
+        ("hip.servo_on", "enabled", "hip", None),
+        ("DriveEnabled", "enabled", "", None),
+        ("enable_count", "", "", None),
+        ("on", "", "", None),
         ("tau_con1", "torque", "1", None),
         ("Motor Speed [1/min]", "velocity", "", "rpm"),
         ("q[1]", "angle", "1", None),

@@ -18,6 +18,8 @@ BAD_MAPS = [
     ('column = "angle"', 'column = "angel"', "has no column 'angel', which joint[0].angle in", "did you mean angle?"),
     ('unit = "rad"', 'unit = "rpm"', "angle.unit: found 'rpm', a unit of angular velocity, expected one of angle: rad"),
     ('unit = "N·m"', 'unit = "mA"', "torque.unit: needs torque_constant_nm_a; add it from the data sheet"),
+    ('name = "pivot"', 'name = "pivot"\nkind = "prismatic"', 'angle.unit: needs lead_m; add it from the data sheet, or '
+     'unit = "m", where the log is in metres'),
     ('unit = "rad"', 'unit = "counts"', "angle.unit: needs counts_per_turn"),
     ('unit = "N·m"', 'unit = "N·m", gain_nm_v = 2.0', "torque.unit: has no use for gain_nm_v; remove it"),
     ('unit = "N·m"', 'unit = "N·n"', "torque.unit: found 'N·n', expected one of torque: N·m", "did you mean N·m?"),
@@ -231,10 +233,21 @@ def test_ctrl_c_leaves_no_half_recording(pendulum, write_csv, tmp_path):
     assert list((tmp_path / "out").iterdir()) == []
 
 
-def test_ten_rows_are_too_few_to_be_a_run(imported, pendulum, write_csv):
+def test_a_log_of_fewer_than_ten_rows_is_too_short_and_its_map_not_blamed(imported, pendulum, write_csv):
     columns = {name: values[:5] for name, values in pendulum.columns().items()}
+    path = write_csv(columns)
+    outcome = imported(path)
+    assert (outcome.code, outcome.err) == (
+        2, f"exoid: {path}: found 5 rows, a recording needs at least 10; log for longer\n",
+    )  # fmt: skip
+
+
+def test_a_clock_of_which_no_run_is_long_enough_is_told_with_how_long_they_are(imported, pendulum, write_csv):
+    columns = {name: values[:30] for name, values in pendulum.columns().items()}
+    columns["time"] = np.where(np.arange(30) < 5, columns["time"], np.nan)
     outcome = imported(write_csv(columns))
-    assert (outcome.code, "no run of its clock has 10 rows" in outcome.err) == (2, True)
+    assert outcome.code == 2
+    assert "no run of its clock has 10 rows, which a recording needs: the longest has 5 of 30; correct" in outcome.err
 
 
 def test_a_joint_that_never_moves_is_told(imported, pendulum, write_csv):

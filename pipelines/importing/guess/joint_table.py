@@ -61,10 +61,10 @@ def write_joint(
     kind: Kind = "prismatic" if UNITS[units.angle].dimension == "length" else "revolute"
     proposal.table("[[joint]]", where)
     proposal.key("name", joint.name)
-    proposal.key(
-        "kind", kind, "its unit is a length" if kind == "prismatic" else "no unit of length; prismatic where it slides",
-        units.why == "its name says so",
-    )  # fmt: skip
+    why = "its unit is a length" if kind == "prismatic" else _if_it_slides(joint, units)
+    proposal.key("kind", kind, why, units.why == "its name says so")
+    if joint.enabled:
+        proposal.key("enabled", joint.enabled, _when_off(columns[joint.enabled]))
     fit = None
     if units.angle in TURNS:
         drive = next((quantity for quantity in DRIVES if quantity in logged), None)
@@ -77,7 +77,29 @@ def write_joint(
         used.append(_write_velocity(proposal, where, joint, units))
     used.append(_write_torque(proposal, where, joint, kind, bits, fit if alone else None, constants))
     used += _write_others(proposal, where, joint, units)
-    return used
+    return [*used, joint.enabled] if joint.enabled else used
+
+
+def _if_it_slides(joint: JointColumns, units: Units) -> str:
+    """Say what else changes with the kind of a joint whose unit nothing tells."""
+    if units.sure:
+        return "no unit of length; prismatic where it slides"
+    metric = {"angle": "m", "velocity": "m/s", "reference": "m"}
+    keys = [f'{quantity}.unit = "{unit}"' for quantity, unit in metric.items() if quantity in joint.columns]
+    drive = next((quantity for quantity in DRIVES if quantity in joint.columns), None)
+    named = {
+        "torque": 'torque.unit = "N"',
+        "current": "force_constant_n_a in place of torque_constant_nm_a",
+        "voltage": "gain_n_v in place of gain_nm_v",
+    }
+    changed = ['kind = "prismatic"', *keys, *([named[drive]] if drive else []), "gravity_m_s2 = 0 if it lies level"]
+    return f"no unit of length; where it slides and the log is in metres: {', '.join(changed)}"
+
+
+def _when_off(switch: NDArray) -> str:
+    off = 1.0 - float(np.mean(np.nan_to_num(switch.astype(float))))
+    said = f"its name says so; 0 in {off:.1%} of the rows" if off else "its name says so; here it always is 1"
+    return f"{said}: where it is 0 the torque is left out"
 
 
 def _write_angle(

@@ -1,7 +1,7 @@
 """Which columns belong to one joint, and which of them is its angle, its velocity, its torque."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,26 +24,53 @@ class JointColumns:
     columns: Mapping[str, Meaning]
     why: Mapping[str, str]
     """Of what was not found by its name alone."""
+    enabled: str | None = None
+    """Column of 0 and 1 that says whether its drive is on."""
 
 
 def group_joints(
     meanings: Sequence[Meaning], columns: Mapping[str, NDArray], time_s: NDArray, clock: str
 ) -> list[JointColumns]:
     """Return the joints of a log of columns (n,) at times (n,) s, in the order of their columns."""
-    usable = [m for m in meanings if m.column != clock and _moves(columns[m.column], len(time_s))]
+    usable = [
+        m for m in meanings
+        if m.column != clock and m.quantity != "enabled" and _moves(columns[m.column], len(time_s))
+    ]  # fmt: skip
+    switches = [m for m in meanings if m.quantity == "enabled" and _switches(columns[m.column], len(time_s))]
     by_joint: dict[str, list[Meaning]] = {}
     for found in usable:
         if found.quantity == "angle" and not found.commanded:
             by_joint.setdefault(found.joint, [])
     if not by_joint:
-        return _by_behaviour(usable, columns, time_s)
+        return [
+            replace(one, enabled=_switch(switches, "", alone=True)) for one in _by_behaviour(usable, columns, time_s)
+        ]
     for found in usable:
         owner = found.joint if found.joint in by_joint else "" if "" in by_joint else None
         if owner is None and len(by_joint) == 1:
             owner = next(iter(by_joint))
         if owner is not None:
             by_joint[owner].append(found)
-    return [_joint(name, members, number, len(by_joint)) for number, (name, members) in enumerate(by_joint.items(), 1)]
+    return [
+        replace(_joint(name, members, number, len(by_joint)), enabled=_switch(switches, name, len(by_joint) == 1))
+        for number, (name, members) in enumerate(by_joint.items(), 1)
+    ]
+
+
+def _switches(values: NDArray, rows: int) -> bool:
+    """Tell whether a column holds 0 and 1 alone, and not 0 alone: then it would say that the drive never was on."""
+    if values.dtype.kind not in "biuf" or len(values) != rows:
+        return False
+    known = values.astype(float)
+    known = known[np.isfinite(known)]
+    return bool(np.isin(known, (0.0, 1.0)).all()) and bool(known.any())
+
+
+def _switch(switches: Sequence[Meaning], joint: str, alone: bool) -> str | None:
+    """Return the switch of a joint: its own, else that of all, which names none."""
+    own = [m.column for m in switches if m.joint == joint]
+    of_all = [m.column for m in switches if alone or not m.joint]
+    return next(iter([*own, *of_all]), None)
 
 
 def _moves(values: NDArray, rows: int) -> bool:

@@ -28,7 +28,10 @@ WORDS: dict[str, frozenset[str]] = {
 COMMANDED = _words("ref reference goal des desired cmd command commanded con target set setpoint sp qg soll")
 FILTERED = _words("filt filtered lp smooth smoothed")
 MEASURED = _words("meas measured act actual msr fb feedback ist")
-SOMETHING_ELSE = _words("cell enable enabled fric friction error err count number status state mode id flag")
+ENABLED = _words("enable enabled servoon")
+"""Words of a switch of the drive; ``servo_on`` and the like are two."""
+SWITCHED = _words("servo drive motor torque power")
+SOMETHING_ELSE = _words("cell fric friction error err count number status state mode id flag")
 """Words that make of a torque or a position something else."""
 NOISE = _words("joint joints axis motor drive epos j m data value values log state states")
 """Words that tell nothing of which joint it is."""
@@ -45,7 +48,7 @@ class Meaning:
 
     column: str
     quantity: str
-    """One of WORDS, ``reference``, or empty where the name tells nothing."""
+    """One of WORDS, ``reference``, ``enabled``, or empty where the name tells nothing."""
     joint: str
     """What is left of the name: the joint's name or number."""
     unit: str | None
@@ -77,6 +80,8 @@ def meaning(name: str) -> Meaning:
     quantity = next((quantity for quantity, known in WORDS.items() if known & set(words)), "")
     if set(words) & SOMETHING_ELSE:
         quantity = ""
+    elif set(words) & ENABLED or ("on" in words and set(words) & SWITCHED):
+        quantity, words = "enabled", [word for word in words if word not in ENABLED | SWITCHED | {"on"}]
     elif commanded and quantity in ("angle", ""):
         quantity = "reference"
     known = set().union(*WORDS.values()) | COMMANDED | FILTERED | MEASURED | NOISE | set(UNIT_WORDS) | {"s"}
