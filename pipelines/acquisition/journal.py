@@ -53,6 +53,7 @@ class Journal:
         path.parent.mkdir(parents=True, exist_ok=True)
         # Exclusive: a journal that is there already is all that is left of a run.
         self._file = open(path, "xb", buffering=0)  # noqa: SIM115, it stays open from the first sample to the last
+        self._identity = os.fstat(self._file.fileno())
         take(self._file, wait=True)
         self._bytes = io.BytesIO()
         self._stream = pa.ipc.new_stream(self._bytes, self._schema)
@@ -102,7 +103,7 @@ class Journal:
     def _refuse_elsewhere(self) -> None:
         """Refuse to write on to a file that was removed or moved: an open one takes all, and nobody finds it again."""
         try:
-            is_there = os.path.samestat(os.stat(self.path), os.fstat(self._file.fileno()))
+            is_there = os.path.samestat(os.stat(self.path), self._identity)
         except FileNotFoundError:
             is_there = False
         if not is_there:

@@ -27,7 +27,7 @@ def record_in_real_time(tmp_path, excitation, rig_file):
     def run(run="exo_alone", **replace):
         # So slow a motion that set-points which are left out do not jerk the leg; that is not the point here.
         excitation.write_text(excitation.read_text().replace("6.283185307179586", "1.2566370614359172"))
-        changes = {"watchdog_s": 1.0, "torque_nm": 1e4, "cuff_force_n": 1e4, "speed_rad_s": 30.0}
+        changes = {"watchdog_s": 1.0, "torque_nm": 300.0, "cuff_force_n": 1e4, "speed_rad_s": 30.0}
         rig = rig_file("recorder", replace={"embedded = false": "embedded = true", **replace}, **changes)
         settings = RunSettings(name="test", run=run, purpose="train", duration_s=2.0)
         acquire(rig, settings, excitation, tmp_path / "test.parquet", 100.0)
