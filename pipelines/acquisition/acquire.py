@@ -125,16 +125,7 @@ def acquire(
         supervisor = Supervisor(present, sample_rate_hz, sensors)
         recording = _record(supervisor, run, trajectory, journal, metadata, report, stopped_by, reset_faults)
         run_to_its_end(recording, supervisor.abort)
-        kind, told = _ending(output, supervisor)
-        with ExitStack() as held:
-            try:
-                lock = held.enter_context(locked(journal))
-            except OSError as error:
-                raise kind(
-                    f"{told}; its samples are not in {journal} any more ({error.strerror}); where that was moved to, "
-                    "`exoid recover` makes a recording of it"
-                ) from error
-            return _finish(output, lock, kind, told, supervisor.fault)
+        return _finish(output, journal, supervisor)
 
 
 async def _record(
@@ -226,8 +217,22 @@ def _ending(output: Path, supervisor: Supervisor) -> tuple[type[ExoidError], str
     return DeviceError, f"{supervisor.why}; {_rest(supervisor)}" if supervisor.why else "the run is complete"
 
 
-def _finish(output: Path, lock: Lock, kind: type[ExoidError], told: str, fault: BaseException | None) -> Outcome:
+def _finish(output: Path, journal: Path, supervisor: Supervisor) -> Outcome:
     """Turn the journal into a recording; raise where the run was stopped, or exoid was at fault."""
+    kind, told = _ending(output, supervisor)
+    with ExitStack() as held:
+        try:
+            lock = held.enter_context(locked(journal))
+        except OSError as error:
+            raise kind(
+                f"{told}; its samples are not in {journal} any more ({error.strerror}); where that was moved to, "
+                "`exoid recover` makes a recording of it"
+            ) from error
+        return _recorded(output, lock, kind, told, supervisor.fault)
+
+
+def _recorded(output: Path, lock: Lock, kind: type[ExoidError], told: str, fault: BaseException | None) -> Outcome:
+    """Write the recording and remove the journal; raise what was ``told`` where the run was stopped early."""
     path = lock.path
     try:
         journal = JournalFile(path)

@@ -14,7 +14,6 @@ from pipelines.acquisition import journal, loop, machine, pace
 from pipelines.acquisition.acquire import _finish, _record
 from pipelines.acquisition.device import Device
 from pipelines.acquisition.line import Line
-from pipelines.acquisition.lock import locked
 from pipelines.acquisition.loop import Loop, run_to_its_end
 from pipelines.acquisition.states import State, Supervisor
 from pipelines.errors import DeviceError, Unanswered
@@ -344,8 +343,7 @@ def simulate(rig, settings, trajectory, path, events, rest, *, plan=None, own=No
                 ),
                 supervisor.abort,
             )
-            with locked(path.with_suffix(".journal")) as lock:
-                run.result = _finish(path, lock, supervisor)
+            run.result = _finish(path, path.with_suffix(".journal"), supervisor)
         except BaseException as error:
             run.result = error
     return run
