@@ -50,7 +50,7 @@ def report(
         return
     session = find(folders or [Path()], config)
     with console.working("writing the page"):
-        page = page_of(session, title)
+        page = page_of(session, title, output)
     write_text(output, page)
     warn_of_unreadable(session)
     summary = session.verdict["summary"] if session.verdict else None

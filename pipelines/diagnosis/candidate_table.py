@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipelines.diagnosis.choice import NEEDED, Ranked
+from pipelines.diagnosis.choice import MATERIAL, NEEDED, Ranked
 from pipelines.diagnosis.diagnose import Diagnosis
 from pipelines.diagnosis.examined import Extended
 from pipelines.diagnosis.gain import gain
@@ -47,7 +47,8 @@ def _row(d: Diagnosis, labels: tuple[str, ...], score: float, ranked: Ranked | N
     if extended:
         worth = gain(d.before.errors, extended.errors)
         row |= {"gain_nm": worth.value, "gain_low_nm": worth.low, "gain_high_nm": worth.high}
-    row["verdict"], row["reason"] = _judged(d, labels, row["train_score"])
+    more = _gained_beyond_named(d, labels, score, ranked)
+    row["verdict"], row["reason"] = _judged(d, labels, row["train_score"], more)
     return row
 
 
@@ -89,7 +90,32 @@ def _probability(d: Diagnosis, labels: tuple[str, ...]) -> float | None:
     return d.likely[label].get(rival)
 
 
-def _judged(d: Diagnosis, labels: tuple[str, ...], score: float) -> tuple[str, str]:
+def _gained_beyond_named(d: Diagnosis, labels: tuple[str, ...], score: float, ranked: Ranked | None) -> float | None:
+    """Return how much more log likelihood a set gains than what is named does; None where it holds not all of that.
+
+    Both with their shapes refined, or neither: refined ones are scored on what they were fitted to.
+    """
+    named = d.choice.named
+    if not set(named.labels) < set(labels) or not named.labels:
+        return None
+    if ranked:
+        return ranked.score - named.score
+    return score - d.choice.levels[len(named.labels) - 1][named.labels].score
+
+
+def _too_little(extra: str, more: float) -> str:
+    """Say how little one more cause adds, and how much it must."""
+    if more < NEEDED:
+        why = f"{more:+.1f} in log likelihood, where one more cause must gain {NEEDED:g}"
+    else:
+        why = (
+            f"{more:+.1f} in log likelihood, but not {MATERIAL:.0%} of a joint's error, or no more than what is named "
+            "gains in a freer form"
+        )
+    return f"{extra} adds too little beside what is named: {why}"
+
+
+def _judged(d: Diagnosis, labels: tuple[str, ...], score: float, more: float | None) -> tuple[str, str]:
     best = d.choice.named
     if d.causes and labels == best.labels:
         return "named", "it earned its place: nothing smaller explains as much, nothing larger enough more"
@@ -106,9 +132,8 @@ def _judged(d: Diagnosis, labels: tuple[str, ...], score: float) -> tuple[str, s
             rivals = set(labels) - rest
             if rest <= set(labels) and len(rivals) == 1 and next(iter(rivals)) in d.alike(label):
                 return "indistinguishable", f"it explains these data as well as {label} does"
-    if len(labels) > len(best.labels) and set(best.labels) <= set(labels):
-        extra = ", ".join(sorted(set(labels) - set(best.labels)))
-        return "rejected", f"{extra} adds too little beside what is named"
+    if more is not None:
+        return "rejected", _too_little(" and ".join(sorted(set(labels) - set(best.labels))), more)
     return (
         "rejected",
         f"it explains less than {' and '.join(best.labels)} (log likelihood {best.score - score:.1f} behind)",

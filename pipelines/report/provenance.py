@@ -2,7 +2,7 @@
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +67,44 @@ def _input(session: Session, told: dict[str, str]) -> Input:
     else:
         state = "changed" if any(one.path.name == told["name"] for one in session.artifacts) else "elsewhere"
     return Input(told["name"], told["sha256"], state)
+
+
+@dataclass(frozen=True)
+class Outside:
+    """One file that others were made of and that the folders do not hold."""
+
+    name: str
+    """Its path where a file tells one."""
+    role: str
+    """What it is, as far as those made of it tell: files of one name may be an experiment's settings and a rig's."""
+    sha256: str
+    made_of_it: tuple[str, ...]
+
+
+def outside(session: Session) -> list[Outside]:
+    """Return every file that the folders lack, once, however many were made of it."""
+    found: dict[str, Outside] = {}
+    for one in session.artifacts:
+        for told in one.inputs:
+            if _input(session, told).state != "elsewhere":
+                continue
+            name, role = _role(one, told["name"])
+            before = found.get(told["sha256"], Outside(name, role, told["sha256"], ()))
+            found[told["sha256"]] = replace(before, made_of_it=(*before.made_of_it, session.shown(one.path)))
+    return list(found.values())
+
+
+def _role(made: Artifact, name: str) -> tuple[str, str]:
+    """Return what a file that another was made of is called, with its path where that is told, and what it is."""
+    imported = made.metadata.get("imported")
+    if isinstance(imported, dict):
+        which = "map" if name.endswith(".toml") else "source"
+        given = (imported.get("given") or {}).get(which, name)
+        return (given if Path(given).name == name else name), {"map": "the log's map", "source": "a log"}[which]
+    config = made.metadata.get("config") or {}
+    if made.kind == "recording" and "rig" in config and name.endswith(".toml"):
+        return name, "the rig's file"
+    return name, ""
 
 
 def stale(session: Session) -> list[str]:
@@ -141,11 +179,13 @@ class Command:
     """Whether an exoid.toml is named that the session was not told of."""
 
 
-def commands(session: Session) -> list[Command]:
-    """Return the command lines that make the session's files again, in their order."""
+def commands(session: Session, output: Path | None = None, title: str | None = None) -> list[Command]:
+    """Return the command lines that make the session's files again, in their order, and then the page."""
     named = session.config and session.config.parent not in session.folders
     found = [made for kind in _MADE_BY for one in session.of_kind(kind) if (made := _MADE_BY[kind](session, one))]
-    found.append((["report", *map(str, session.folders), *(["--config", str(session.config)] if named else [])], False))
+    page = ["report", *map(str, session.folders), *(["--config", str(session.config)] if named else [])]
+    page += ["--title", title] if title else []
+    found.append((page + (["-o", str(output)] if output else []), False))
     lines = dict.fromkeys((shlex.join(["exoid", *words]), needs) for words, needs in found)
     return [Command(line, needs) for line, needs in lines]
 

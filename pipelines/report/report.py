@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from pipelines.report import provenance
 from pipelines.report.acquisition import Run
 from pipelines.report.acquisition import runs as recordings
 from pipelines.report.animation import animations
-from pipelines.report.bars import budget, causes_in_words, falls, label_in_words, ties_of
+from pipelines.report.bars import budget, causes_in_words, falls, label_in_words, labels_in_words, ties_of
 from pipelines.report.chart import Chart, thinned_alike
 from pipelines.report.control import control_charts, loops
 from pipelines.report.excitation import excitations
@@ -89,15 +90,18 @@ def _hero(session: Session, residuals: Sequence[Chart]) -> Chart | None:
     return next((replace(chart, key="verdict") for chart in residuals if chart.key == key), None)
 
 
-def report(session: Session, title: str | None = None) -> str:
-    """Return the page of a session, its charts as thin as it takes to stay below ``LARGEST_BYTES``."""
+def report(session: Session, title: str | None = None, output: Path | None = None) -> str:
+    """Return the page of a session, its charts as thin as it takes to stay below ``LARGEST_BYTES``.
+
+    ``output`` is where it will be written, for the command line that repeats it.
+    """
     values = VALUES
-    while len((page := _page(session, title, values)).encode()) > LARGEST_BYTES and values > FEWEST_VALUES:
+    while len((page := _page(session, title, output, values)).encode()) > LARGEST_BYTES and values > FEWEST_VALUES:
         values //= 2
     return page
 
 
-def _page(session: Session, title: str | None, values: int) -> str:
+def _page(session: Session, title: str | None, output: Path | None, values: int) -> str:
     drawn, verdict, shown = charts(session, values), session.verdict, animations(session)
     made, taken = models(session), recordings(session)
     quantity = _quantity(session)
@@ -137,10 +141,11 @@ def _page(session: Session, title: str | None, values: int) -> str:
         "animations": shown,
         "damaged_verdict": session.has_damaged_verdict,
         "unreadable": list(session.unreadable.values()),
-        "commands": provenance.commands(session),
+        "commands": provenance.commands(session, output, title),
         "settings": indented(provenance.settings(session)),
         "software": provenance.software(session),
         "origins": provenance.origins(session),
+        "outside": provenance.outside(session),
     }
     return render("report.html", drawn.all, shown, told, session.artifacts)
 
@@ -292,10 +297,13 @@ def _candidates(session: Session) -> list[dict[str, Any]]:
     if session.candidates is None:
         return []
     rows = session.candidates.frame.sort_values("rank").to_dict("records")
+    labels = {label for row in rows for label in row["causes"]}
+    named = next((row for row in rows if row["verdict"] == "named"), None)
     return [
         {
             "rank": row["rank"],
-            "words": [label_in_words(label) for label in row["causes"]],
+            "is_more": (more := _beyond(row, named)) is not None,
+            "words": [label_in_words(label) for label in (row["causes"] if more is None else more)],
             "verdict": row["verdict"],
             "tone": TONES.get(row["verdict"], ""),
             "falls": [
@@ -303,11 +311,19 @@ def _candidates(session: Session) -> list[dict[str, Any]]:
                 for joint in session.joints
                 if np.isfinite(row[joint.column("rmse_after")])
             ],
-            "gain": _gain(row),
-            "reason": row["reason"],
+            "gain": _gain(row) if more is None or named is None else digits(row["gain_nm"] - named["gain_nm"]),
+            # Whose reason it is, the row says.
+            "reason": labels_in_words(row["reason"].removeprefix(f"{' and '.join(sorted(more or ()))} "), labels),
         }
         for row in rows
     ]
+
+
+def _beyond(row: dict[Any, Any], named: dict[Any, Any] | None) -> list[str] | None:
+    """Return what a set holds beside all that is named; None where it does not hold all of that, or nothing more."""
+    if named is None or not set(named["causes"]) < set(row["causes"]):
+        return None
+    return [label for label in row["causes"] if label not in set(named["causes"])]
 
 
 def _gain(row: dict[Any, Any]) -> str:

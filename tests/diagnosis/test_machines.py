@@ -1,5 +1,6 @@
 """Machines that are no leg: what a servo or a ball screw hides is named, in its own units and at its own scale."""
 
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -71,6 +72,19 @@ def test_friction_that_differs_with_direction_is_named_at_a_ball_screw_in_newton
     assert {"rmse_before_axis_n", "rmse_after_axis_n"} <= set(tried.columns)
     taken_up = tried[tried["verdict"] == "absorbed"]["causes"].map(lambda causes: causes[0])
     assert set(taken_up) == {"rotor_inertia@axis", "torque_gain@axis"}
+
+
+def test_what_adds_too_little_is_told_with_how_little_and_how_much_it_must(screw):
+    tried = candidates(screw[0])
+    (named,) = tried[tried["verdict"] == "named"]["train_score"]
+    more = tried[tried["reason"].str.contains("adds too little")]
+    refined = more[more["gain_nm"].notna()]
+    assert len(more) > 3 and len(refined)
+    for row in more.to_dict("records"):
+        told = re.search(r"is named: ([+-]\d+\.\d) in log likelihood", row["reason"])[1]
+        assert float(told) < 6 and "where one more cause must gain 6" in row["reason"]
+        if row["gain_nm"] == row["gain_nm"]:
+            assert float(told) == pytest.approx(row["train_score"] - named, abs=0.051)
 
 
 def test_nobody_is_asked_for_runs_with_a_person_in_a_ball_screw(screw):

@@ -4,6 +4,7 @@ import json
 import platform
 import re
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -20,6 +21,7 @@ from pipelines.report.session import find
 from pipelines.report.standstill import moving
 from tests.report.sessions import (
     AXIS,
+    RUN,
     verdict_of,
     write_parameters,
     write_recording,
@@ -145,15 +147,47 @@ def test_a_map_in_the_folder_is_known_by_its_bytes_and_a_log_elsewhere_by_the_pa
     folder = imported(tmp_path / "lab", source="../logs/log.csv", map="old/machine.toml")
     lines = [command.line for command in provenance.commands(find([folder]))]
     assert lines[0] == f"exoid import ../logs/log.csv --map {folder / 'machine.toml'} -o {folder / 'recordings'}/"
-    page = report(find([folder]))
-    assert re.search(r"of log.csv <span class=\"pill\">not in these folders", page)
-    assert not re.search(r"of machine.toml <span", page)
+    (log,) = provenance.outside(find([folder]))
+    assert (log.name, log.role, log.made_of_it) == ("../logs/log.csv", "a log", (f"recordings/{RUN}",))
+    assert "Made of files that are not in these folders" in report(find([folder]))
     (folder / "machine.toml").write_text("[joint]\n")
     assert "--map old/machine.toml" in provenance.commands(find([folder]))[0].line
 
 
 def test_the_commands_that_repeat_it_end_with_the_report(session_folder):
-    assert provenance.commands(find([session_folder]))[-1].line == f"exoid report {session_folder}"
+    session = find([session_folder])
+    assert provenance.commands(session)[-1].line == f"exoid report {session_folder}"
+    assert f"exoid report {session_folder} --title Leg -o pages/leg.html" in report(
+        session, "Leg", Path("pages/leg.html")
+    )
+
+
+def test_a_rigs_file_elsewhere_is_told_once_and_from_another_of_its_name(tmp_path):
+    rig, settings = tmp_path / "rigs" / "default.toml", tmp_path / "experiments" / "default.toml"
+    for number, path in enumerate((rig, settings)):
+        path.parent.mkdir()
+        path.write_text(f"# {number}\n")
+    folder = tmp_path / "made"
+    for name in ("a.parquet", "b.parquet"):
+        write_recording(folder, name=name, **describe([rig], {"rig": {"name": "default"}}))
+    write_parameters(folder, inputs=[settings])
+    told = {(one.name, one.role): len(one.made_of_it) for one in provenance.outside(find([folder]))}
+    assert told == {("default.toml", "the rig's file"): 2, ("default.toml", ""): 1}
+    assert "recordings/a.parquet and 1 more" in report(find([folder]))
+
+
+def test_a_set_that_holds_what_is_named_tells_what_it_adds_in_words(tmp_path):
+    folder = write_session(tmp_path / "leg")
+    path = folder / "diagnosed" / "candidates.parquet"
+    table = CANDIDATES.read(path)
+    rows = table.frame.copy()
+    rows["causes"] = [["cogging@knee"], ["cogging@knee", "base_tilt"]]
+    rows["gain_nm"], rows.loc[1, "reason"] = [0.41, 0.43], "base_tilt adds too little beside cogging@knee"
+    CANDIDATES.write(path, rows, table.metadata)
+    line = re.search(r"<tr><td class=\"n\">2</td>.*?</tr>", report(find([folder])))[0]
+    assert "<small>what is named, and</small><br>base tilt</td>" in line
+    assert "0.0200<br><small>beyond what is named</small>" in line
+    assert '<td class="reason">adds too little beside cogging at the knee</td>' in line
 
 
 def test_versions_are_told_where_files_have_them_and_nothing_where_they_do_not(tmp_path):
