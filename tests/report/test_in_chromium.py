@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipelines.contracts import SIMULATION, Joint
+from pipelines.contracts import RESIDUALS, SIMULATION, Joint
 from pipelines.report.report import report
 from pipelines.report.session import find
 from tests.report.sessions import (
@@ -229,3 +229,66 @@ def test_a_million_samples_stay_fluid_and_a_spike_among_them_is_seen(opened, tmp
             key,
         )
         assert took < 200
+
+
+def test_charts_of_a_run_keep_one_time_axis_where_one_of_them_has_nothing_to_show(opened, tmp_path):
+    folder = write_session(tmp_path / "leg")
+    path = folder / "diagnosed" / "residuals.parquet"
+    table = RESIDUALS.read(path)
+    table.frame.loc[table.frame["time_s"].between(5.0, 15.0), "scored"] = False
+    RESIDUALS.write(path, table.frame, table.metadata)
+    page_file = tmp_path / "report.html"
+    page_file.write_text(report(find([folder])), encoding="utf-8")
+    shape = "k => exoid.plots.get(k).map(u => [u.bbox.left, u.bbox.width, u.scales.y.min, u.scales.y.max])"
+    with opened(page_file) as page:
+        draw_all(page)
+        key = "torque-with_human_validate-hip"
+        whole = page.evaluate(shape, key)
+        page.evaluate("k => exoid.plots.get(k)[0].setScale('x', { min: 7, max: 12 })", key)
+        zoomed = page.evaluate(shape, key)
+        assert page.evaluate(RANGE, key) == [7, 12]
+        assert [panel[:2] for panel in zoomed] == [panel[:2] for panel in whole]
+        assert zoomed[1] == whole[1]  # nothing to show: as it was
+
+
+PRINTED = """async () => {
+    dispatchEvent(new Event('beforeprint'));
+    for (let k = 0; k < 5; k++) await Promise.resolve();  // plots take their size then, and no observer is asked yet
+    const ctx = document.createElement('canvas').getContext('2d');
+    ctx.font = '12px system-ui, sans-serif';
+    const told = { wide: document.documentElement.scrollWidth, texts: [], gaps: [] };
+    for (const figure of document.querySelectorAll('[data-chart]')) {
+        const u = exoid.plots.get(figure.dataset.chart).at(-1), axis = u.axes[0];
+        told.texts.push(12 * figure.querySelector('.plot').clientWidth / u.width);
+        const labels = axis._values.map((text, i) => {
+            const half = ctx.measureText(text).width / 2, at = u.valToPos(axis._splits[i], 'x');
+            return text ? [at - half, at + half] : null;
+        }).filter(Boolean);
+        labels.slice(1).forEach((label, i) => told.gaps.push(label[0] - labels[i][1]));
+    }
+    return told;
+}"""
+"""As a browser lays a page out for paper: how wide it is, how large its charts' letters get and how far apart, px."""
+
+
+@pytest.mark.parametrize("paper", [695, 718])
+def test_on_paper_nothing_sticks_out_and_no_axis_outgrows_the_text_or_has_labels_that_meet(opened, tmp_path, paper):
+    folder = write_session(tmp_path / "leg")
+    path = folder / "diagnosed" / "residuals.parquet"
+    table = RESIDUALS.read(path)
+    table.frame["knee_angle_rad"] *= 0.126 / table.frame["knee_angle_rad"].abs().max()  # ticks of three decimals
+    RESIDUALS.write(path, table.frame, table.metadata)
+    page_file = tmp_path / "report.html"
+    page_file.write_text(report(find([folder])), encoding="utf-8")
+    with opened(page_file, width=1280) as page:
+        draw_all(page)
+        from_screen = page.evaluate(PRINTED)["gaps"]
+        page.emulate_media(media="print")
+        page.set_viewport_size({"width": paper, "height": 900})
+        printed = page.evaluate(PRINTED)
+        body, cell = (page.evaluate(f"parseFloat(getComputedStyle({of}).fontSize)")
+                      for of in ("document.body", "document.querySelector('table.scores td')"))  # fmt: skip
+        assert printed["wide"] <= paper
+        assert max(printed["texts"]) <= body
+        assert min(from_screen + printed["gaps"]) > 4
+        assert cell == pytest.approx(8 * 96 / 72, abs=0.1)

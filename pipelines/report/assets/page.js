@@ -3,7 +3,9 @@
   const data = JSON.parse(document.getElementById("data").textContent);
   const plots = new Map(); // key of a chart -> its uPlots
   const groups = new Map(); // group -> {charts, range}
-  const PANEL_PX = 190, LOWER_PX = 130, PRINT_PX = 660, PRINT_SHARE = 0.7;
+  const PANEL_PX = 190, LOWER_PX = 130;
+  // On paper: wide, in one of two columns, and there in a card; what is drawn wider makes the browser shrink the page.
+  const PRINT_PX = { wide: 660, half: 335, card: 308 }, PRINT_SHARE = 0.7;
 
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
 
@@ -47,6 +49,15 @@
     ctx.fillStyle = css("noise");
     ctx.fillRect(left, top, width, bottom - top);
     ctx.restore();
+  }
+
+  // A panel that has nothing to show in a stretch keeps its scale and so its axis, or it would grow wider than the others.
+  function lasting() {
+    let known = [-1, 1];
+    return (u, low, high) => {
+      if (low != null && high != null) known = uPlot.rangeNum(low, high, 0.1, true);
+      return known;
+    };
   }
 
   function axes(xLabel, last) {
@@ -101,7 +112,7 @@
         height: (i && chart.group ? LOWER_PX : PANEL_PX) + (last ? 36 : 0),
         legend: { show: false },
         cursor: { sync: { key: name, setSeries: false }, drag: { x: true, y: false }, points: { size: 6 } },
-        scales: { x: { time: false }, y: panel.reach ? { range: () => [-panel.reach, panel.reach] } : {} },
+        scales: { x: { time: false }, y: { range: panel.reach ? () => [-panel.reach, panel.reach] : lasting() } },
         axes: axes(chart.x_label, last),
         series: [{}, ...panel.series.map(seriesOf)],
         hooks: {
@@ -160,7 +171,8 @@
     }
   }
   // A plot that has not been drawn yet has no scale to redraw at; it will take the colours that there are.
-  const redraw = () => { for (const made of plots.values()) for (const u of made) if (u.status === 1) u.redraw(true); for (const stage of stages) stage.draw(); };
+  // Axes are laid out anew too: without, uPlot forgets that a plot has just been given another size.
+  const redraw = () => { for (const made of plots.values()) for (const u of made) if (u.status === 1) u.redraw(true, true); for (const stage of stages) stage.draw(); };
   new ResizeObserver(() => fit()).observe(document.querySelector("main"));
   for (const details of document.querySelectorAll("details")) details.addEventListener("toggle", () => fit());
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
@@ -172,7 +184,8 @@
     closed.forEach((details) => { details.open = true; });
     figures.forEach(draw);
     for (const figure of figures) for (const u of plots.get(figure.dataset.chart) || []) {
-      u.setSize({ width: figure.closest(".grid, .hero") ? PRINT_PX / 2 - 30 : PRINT_PX, height: PRINT_SHARE * u.height });
+      const place = figure.closest(".grid, .hero") ? "card" : figure.closest(".charts") ? "half" : "wide";
+      u.setSize({ width: PRINT_PX[place], height: PRINT_SHARE * u.height });
     }
     redraw();
   });
