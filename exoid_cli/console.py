@@ -21,6 +21,8 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 from rich.table import Table
 from rich.text import Text
 
+from exoid_cli.column_widths import at_slashes, columns
+
 DRAWING_S = 0.0005
 """How long the drawing of a live picture may hold up the work that it tells of."""
 
@@ -80,11 +82,14 @@ class Console:
         right = {name.strip() for name in numbers.split(",") if name.strip()}
         if title:
             self.say(Text(title, style="bold"))
+        cells = [["" if cell is None else str(cell) for cell in row] for row in rows]
+        widths = columns(headings, cells, self.out.width)
         table = Table(box=None, pad_edge=False)
-        for heading in headings:
-            table.add_column(heading, justify="right" if heading in right else "left", overflow="fold")
-        for row in rows:
-            table.add_row(*(Text("" if cell is None else str(cell)) for cell in row))
+        for heading, width in zip(headings, widths, strict=True):
+            table.add_column(heading, justify="right" if heading in right else "left", overflow="fold", width=width)
+        for row in cells:
+            table.add_row(*(Text(text if width is None else at_slashes(text, width))
+                            for text, width in zip(row, widths, strict=True)))  # fmt: skip
         with self.out.capture() as captured:
             self.out.print(table)
         # The last column is filled up with spaces, which nobody wants who copies from it.

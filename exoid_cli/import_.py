@@ -1,5 +1,6 @@
 """``exoid import``: recordings out of logs from elsewhere."""
 
+import re
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,7 +12,11 @@ from exoid_cli.place import NAME
 from pipelines.errors import InputError
 
 if TYPE_CHECKING:
+    from pipelines.importing.finding import Finding
     from pipelines.importing.recordings import Imported
+
+FEW = 3
+"""Logs of which each is told with all that was seen in it."""
 
 
 def import_(
@@ -83,22 +88,53 @@ def _import(files: list[Path], map_: Path, output: Path) -> None:
                     sources[path] = file
                     made.append(_as_json(path, recording))
             told.append({"file": file, "recordings": made})
-    for one in told:
-        _say(one)
+    if len(told) > FEW:
+        _say_in_short(told)
+    else:
+        for one in told:
+            _say(one)
     console.emit(told)
     settings_file = output.parent / NAME
     if not settings_file.exists():
         console.say(f"with an empty {settings_file.as_posix()} beside them, `exoid run` does the rest")
 
 
+def _say_in_short(told: list[dict[str, Any]]) -> None:
+    """Say of many logs a line each, and then once what was seen in several, but for its numbers."""
+    seen: dict[str, list[tuple[Finding, str]]] = {}
+    for one in told:
+        for made in one["recordings"]:
+            _say_what_was_made(made)
+        for finding in _findings(one):
+            # As in "2 rows left out": of another file the numbers are others.
+            kind = re.sub(r"\d[\d.,  ]*", "#", str(finding))
+            seen.setdefault(kind, []).append((finding, one["file"].name))
+    if seen:
+        console.say("\nSeen, with the numbers of the first file; `exoid show` tells those of each:")
+    for found in seen.values():
+        finding, first = found[0]
+        more = f" and {len(found) - 1} more" if len(found) > 1 else ""
+        console.note(f"- {finding} ({first}{more})")
+    console.say("")
+
+
 def _say(told: dict[str, Any]) -> None:
+    for made in told["recordings"]:
+        _say_what_was_made(made)
+        console.note(f"{made['span_s'][0]:.3f} to {made['span_s'][1]:.3f} s of {told['file'].name}")
+    for finding in _findings(told):
+        console.note(f"- {finding}")
+
+
+def _say_what_was_made(made: dict[str, Any]) -> None:
+    console.say(f"{made['path']}: {made['purpose']}, {made['samples']} samples, {made['sample_rate_hz']:.6g} Hz")
+
+
+def _findings(told: dict[str, Any]) -> "list[Finding]":
+    """Return what was seen in a log, once where it is of all its recordings."""
     from pipelines.importing.finding import Finding
 
-    for made in told["recordings"]:
-        console.say(f"{made['path']}: {made['purpose']}, {made['samples']} samples, {made['sample_rate_hz']:.6g} Hz")
-        console.note(f"{made['span_s'][0]:.3f} to {made['span_s'][1]:.3f} s of {told['file'].name}")
-    for finding in dict.fromkeys(Finding(**found) for made in told["recordings"] for found in made["findings"]):
-        console.note(f"- {finding}")
+    return list(dict.fromkeys(Finding(**found) for made in told["recordings"] for found in made["findings"]))
 
 
 def _as_json(path: Path, recording: "Imported") -> dict[str, Any]:

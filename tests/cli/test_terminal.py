@@ -74,6 +74,18 @@ def test_a_table_ends_its_lines_where_its_words_end(capsys):
     assert capsys.readouterr().out.splitlines() == ["what a table is called", "joint  why", "hip    a", "knee"]
 
 
+def test_a_table_too_wide_is_broken_between_words_and_in_a_path_after_a_slash(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "50")
+    rows = [("replay", "simulated/extended/replay-PULSES.parquet", "waits for identify, as it must")]
+    Console().table(("stage", "result", "why"), [*rows, ("report", "report.html", "")])
+    assert capsys.readouterr().out.splitlines() == [
+        "stage   result                 why",
+        "replay  simulated/extended/    waits for identify,",
+        "        replay-PULSES.parquet  as it must",
+        "report  report.html",
+    ]
+
+
 def test_a_remark_is_set_in_and_broken_between_words(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "30")
     Console().note("- creep the empty joint through 0.01 to 0.3 rad/s")

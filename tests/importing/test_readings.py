@@ -1,5 +1,7 @@
 """A reading becomes the quantity at the joint: unit, sign, zero, registers, drive train."""
 
+import json
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -241,3 +243,22 @@ def test_joints_that_make_no_mechanism_are_told_before_anybody_waits_for_a_fit(i
     outcome = imported(write_csv(columns), map_text=text)
     assert outcome.code == 0, outcome.err
     assert "exoid identify and exoid diagnose do not" in " ".join(outcome.told.split())
+
+
+def test_of_many_logs_each_has_a_line_and_what_was_seen_in_several_is_told_once(imported, pendulum, write_csv):
+    paths = []
+    for number in range(4):
+        columns = dict(pendulum.columns())
+        columns["torque"] = np.where(np.arange(len(pendulum.time)) % 100 < number, np.nan, columns["torque"])
+        path = write_csv(columns)
+        paths.append(path.rename(path.with_name(f"log{number}.csv")))
+    several = MAP.replace('name = "whole"', 'name = "{file}"')
+    lines = imported(*paths, map_text=several).out.splitlines()
+    assert [line.split(":")[1].split(",")[0] for line in lines[:4]] == [" train"] * 4
+    assert lines[5] == "Seen, with the numbers of the first file; `exoid show` tells those of each:"
+    seen = [line for line in lines if "no value in" in line]
+    assert seen == ["  - pivot_torque_nm: no value in 20 rows; rows left out (log1.csv and 2 more)"]
+    told = json.loads(imported(*paths, map_text=several, options=("--json",)).out)
+    assert [len(one["recordings"][0]["findings"]) > 0 for one in told] == [False, True, True, True]
+    few = imported(*paths[:3], map_text=several).out
+    assert few.count("no value in") == 2
