@@ -1,7 +1,10 @@
-"""What a shell may complete where typer cannot know it: names of effects, methods, formats, runs and stages."""
+"""What a shell may complete where typer cannot know it: names of effects, methods, formats, runs, stages, figures."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
+from pathlib import Path
+
+import typer
 
 from pipelines.errors import ExoidError
 
@@ -28,11 +31,12 @@ def formats(begun: str) -> Iterator[str]:
 
 
 def runs(begun: str) -> Iterator[str]:
-    """Yield the names of the runs in ./exoid.toml."""
-    from exoid_cli.place import settings_in_force
+    """Yield the names of the runs that are recorded in the experiment in the current folder."""
+    from exoid_cli.place import place_of
 
     with suppress(ExoidError):  # a shell has no place for what is wrong with the file
-        yield from _beginning(begun, (run.name for run in settings_in_force(None).run))
+        steps = place_of(None, look_only=True).of_stage("acquire")
+        yield from _beginning(begun, (step.run for step in steps if step.run))
 
 
 def stages(begun: str) -> Iterator[str]:
@@ -41,6 +45,15 @@ def stages(begun: str) -> Iterator[str]:
 
     with suppress(ExoidError):
         yield from _beginning(begun, dict.fromkeys(step.stage for step in place_of(None, look_only=True).steps))
+
+
+def figures(context: typer.Context, begun: str) -> Iterator[str]:
+    """Yield the names of the figures of the folders that were named, or of the current one."""
+    from pipelines.report.figures import figures as figures_of
+    from pipelines.report.session import find
+
+    with suppress(ExoidError):
+        yield from _beginning(begun, figures_of(find(context.params.get("folders") or [Path()])))
 
 
 def _beginning(begun: str, names: Iterable[str]) -> Iterator[str]:

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from exoid_cli import completion
 from exoid_cli.console import console
 from exoid_cli.report import FoldersArgument, warn_of_unreadable
 
@@ -13,7 +14,10 @@ def figures(
     folders: FoldersArgument = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the figures.")] = Path("figures"),
     only: Annotated[
-        list[str] | None, typer.Option("--only", metavar="NAME", help="This figure; may be given again.")
+        list[str] | None,
+        typer.Option(
+            "--only", metavar="NAME", help="This figure; may be given again.", autocompletion=completion.figures
+        ),
     ] = None,
 ) -> None:
     """Draw the report's figures as PDF and PNG.

@@ -193,7 +193,10 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
         with console.working("drawing"):
             title = f"{recording.stem}, simulated again"
             draw_replay(open_loop, closed_loop, plant.joints, output.with_suffix(""), title)
-    _report_replay(result, plant.joints, lacks)
+    console.emit(result | ({"no_closed_loop": lacks} if lacks else {}))
+    _report_replay(result, plant.joints)
+    if lacks:
+        console.warn(f"no closed loop for {recording}: {lacks}")
     console.wrote(
         output.parent, output.name, *([] if lacks else [beside.name]),
         *([output.with_suffix(".png").name] if settings.simulate.figures else []),
@@ -205,8 +208,7 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
         )
 
 
-def _report_replay(result: dict[str, Any], joints: "tuple[Joint, ...]", lacks: str) -> None:
-    console.emit(result | ({"no_closed_loop": lacks} if lacks else {}))
+def _report_replay(result: dict[str, Any], joints: "tuple[Joint, ...]") -> None:
     headings = {
         "simulation_rmse_rad": f"1 s windows ({joints[0].unit('angle')})",
         "closed_loop_rmse_rad": f"closed loop ({joints[0].unit('angle')})",
@@ -219,5 +221,3 @@ def _report_replay(result: dict[str, Any], joints: "tuple[Joint, ...]", lacks: s
         title="root mean square of simulated less recorded",
         numbers=", ".join(headings[key] for key in shown),
     )
-    if lacks:
-        console.warn(f"no closed loop: {lacks}")

@@ -38,9 +38,15 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 def refuse_what_is_no_file(path: Path) -> None:
     """Refuse to replace a folder, a pipe or a device: a file in its place would take it from all who use it."""
+    _refuse_the_dash(path)
     if path.exists() and not path.is_file():
         kind = "a folder" if path.is_dir() else "a pipe or a device"
         raise InputError(f"{path}: is {kind}, expected the name of a file to write; name another")
+
+
+def _refuse_the_dash(path: Path) -> None:
+    if path.name == "-":
+        raise InputError("-: stands for no standard output here, and would be a file of that name; name another")
 
 
 @contextmanager
@@ -78,6 +84,7 @@ def _put(made: Path, path: Path) -> None:
 
 def open_folder(path: Path) -> None:
     """Make a folder; where nothing can be written in it, raise the system's refusal before the work, not after it."""
+    _refuse_the_dash(path)
     path.mkdir(parents=True, exist_ok=True)
     try:
         with tempfile.TemporaryFile(dir=path) as probe:

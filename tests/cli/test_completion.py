@@ -3,6 +3,7 @@
 import pytest
 
 from exoid_cli.app import run
+from tests.report.sessions import write_recording, write_session
 
 
 @pytest.fixture
@@ -44,5 +45,15 @@ def test_runs_and_stages_come_from_the_experiment_in_the_folder(completed, exoid
     monkeypatch.chdir(tmp_path / "e")
     assert completed("exoid acquire --run with_") == ["with_human_train", "with_human_validate"]
     assert completed("exoid run di") == ["diagnose"]
+    write_session(tmp_path / "e")
+    assert completed("exoid acquire --run with_") == ["with_human_train", "with_human_validate"]
+    assert completed("exoid figures --only verd") == ["verdict"]
     (tmp_path / "e" / "exoid.toml").write_text("[desing]\n")
     assert completed("exoid run di") == []
+
+
+def test_runs_that_were_imported_are_not_offered_to_be_recorded(completed, tmp_path, monkeypatch):
+    write_recording(tmp_path, name="exo_alone_train.parquet", imported={"log": "a.csv"})
+    (tmp_path / "exoid.toml").touch()
+    monkeypatch.chdir(tmp_path)
+    assert completed("exoid acquire --run ") == []

@@ -135,3 +135,10 @@ def test_what_is_left_of_a_table_is_replaced(tmp_path):
     path.write_bytes(whole[:-20] + bytes(20))
     save_table(path, "2026-01-01T00:00:00+00:00")
     assert path.read_bytes() == whole
+
+
+def test_a_dash_is_no_name_of_a_file(tmp_path):
+    for write in (lambda path: write_text(path, "x"), open_folder):
+        with pytest.raises(InputError, match=r"^-: stands for no standard output here"):
+            write(tmp_path / "-")
+    assert list(tmp_path.iterdir()) == []

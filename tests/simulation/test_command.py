@@ -114,7 +114,7 @@ def test_replay_without_a_controller_skips_the_closed_loop_and_says_why(
     made, settings = tmp_path / "replay.parquet", quick()
     recording = recording_file(**changes)
     code, _, err = exoid("simulate", parameters_file(LIGHT), "--config", settings, "--replay", recording, "-o", made)
-    assert (code, err) == (0, f"warning: no closed loop: {told}")
+    assert (code, err) == (0, f"warning: no closed loop for {recording}: {told}")
     assert made.exists() and not (tmp_path / "replay-closed-loop.parquet").exists()
 
 
