@@ -17,6 +17,7 @@ from typing import Any, BinaryIO, Self
 
 import pyarrow as pa
 
+from pipelines.acquisition.head import COPY, copy_of, head_in
 from pipelines.acquisition.lock import locked, take
 from pipelines.contracts.beside import JOURNAL
 from pipelines.contracts.parquet import to_json
@@ -37,6 +38,13 @@ MARK = b"\xff\xff\xff\xff"
 """With this every part of an Arrow stream begins, at a multiple of eight bytes."""
 SCANNED = 65536
 """Bytes that are looked through at once for the next one, a multiple of eight."""
+NO_SAMPLE = 512
+"""So short a file holds no sample: the head of a run alone, with its columns and metadata, is longer."""
+
+
+def field_of(name: str) -> pa.Field:
+    """Return how a column of a journal is written."""
+    return pa.field(name, pa.int64() if name == "sequence" else pa.float64())
 
 
 class Journal:
@@ -45,8 +53,8 @@ class Journal:
     def __init__(self, path: Path, columns: Sequence[str], metadata: dict[str, Any]) -> None:
         self.path = path
         self.rows = 0
-        fields = [pa.field(name, pa.int64() if name == "sequence" else pa.float64()) for name in columns]
-        self._schema = pa.schema(fields, metadata={KEY: to_json(metadata, str(path)).encode()})
+        self._schema = pa.schema(map(field_of, columns), metadata={KEY: to_json(metadata, str(path)).encode()})
+        self._copy = {COPY: copy_of(self._schema.serialize().to_pybytes())}
         self._waiting: deque[Sequence[float]] = deque()
         self._failure: OSError | None = None
         self._last_words: dict[bytes, str] | None = None
@@ -57,7 +65,8 @@ class Journal:
         take(self._file, wait=True)
         self._bytes = io.BytesIO()
         self._stream = pa.ipc.new_stream(self._bytes, self._schema)
-        self._stream.write_batch(self._batch([]))  # the head comes to disk with a first batch only
+        # The head comes to disk with a first batch only, which brings its copy.
+        self._stream.write_batch(self._batch([]), custom_metadata=self._copy)
         self._hand_over()
         self._writing, self._ends = threading.Lock(), threading.Event()
         self._writer = threading.Thread(target=self._write_on, name="journal", daemon=True)
@@ -123,7 +132,8 @@ class Journal:
         with self._file:  # closed even where the disk is full
             self.flush()
             if self._last_words is not None:
-                self._stream.write_batch(self._batch([]), custom_metadata=self._last_words)
+                # The copy once more: what damages the beginning of a file may reach further than its head.
+                self._stream.write_batch(self._batch([]), custom_metadata=self._last_words | self._copy)
             self._stream.close()
             self._hand_over()
 
@@ -171,15 +181,25 @@ class JournalFile:
         self.path = path
         self.damaged = self.rows = 0
         """Of what was read last: bytes that told nothing though more came after them, and samples."""
-        try:
-            with open(path, "rb") as file:
-                self.schema = pa.ipc.open_stream(file).schema
-                file.seek(0)
-                pa.ipc.read_message(pa.PythonFile(file, mode="r"))
-                self._head = _between(file, 0, file.tell())
-            self.metadata: dict[str, Any] = json.loads(self.schema.metadata[KEY])
-        except (pa.ArrowException, EOFError, KeyError, TypeError, ValueError) as error:
-            raise ContractError(f"{path}: {_why_no_journal(path)}") from error
+        with open(path, "rb") as file:
+            try:
+                copy = head_in(file)
+                # The copy has a checksum, the head itself none: where they differ, that one is right.
+                self._head = copy or _first_part(file)
+                self._lost = 0 if self._head == _between(file, 0, len(self._head)) else len(self._head)
+                self.schema = pa.ipc.open_stream(self._head).schema
+                metadata = json.loads(self.schema.metadata[KEY])
+            except OSError as error:
+                _raise_if_the_disk_s(path, error)
+                raise ContractError(f"{path}: {_why_no_journal(path)}") from error
+            except (pa.ArrowException, EOFError, KeyError, TypeError, ValueError) as error:
+                raise ContractError(f"{path}: {_why_no_journal(path)}") from error
+        if not isinstance(metadata, dict):
+            raise ContractError(
+                f"{path}: its metadata are {_short(metadata)}, expected a table of keys and values; exoid wrote no "
+                "such journal, nothing was changed"
+            )
+        self.metadata: dict[str, Any] = metadata
 
     def batches(self) -> Iterator[Batch]:
         """Yield batch after batch; one that was cut off or is damaged is left out, and what comes after it looked for.
@@ -189,7 +209,7 @@ class JournalFile:
         InputError
             The disk does not give back what is on it.
         """
-        self.damaged = self.rows = 0
+        self.damaged, self.rows = self._lost, 0
         with open(self.path, "rb") as file:
             unread_from = len(self._head)
             place: int | None = unread_from
@@ -212,15 +232,20 @@ class JournalFile:
             rows, words = stream.read_next_batch_with_custom_metadata()
             rows.validate()
         except OSError as error:
-            if error.errno is not None:  # not what Arrow makes of a file that ends too soon
-                raise InputError(
-                    f"{self.path}: cannot be read ({error.strerror}); nothing was changed; copy it to another disk and "
-                    "recover it there"
-                ) from error
+            _raise_if_the_disk_s(self.path, error)
             return None
         except (pa.ArrowException, EOFError, StopIteration, ValueError):
             return None
-        return Batch(rows, None if words is None else dict(words))
+        return Batch(rows, dict(words) if words and ABORT in words else None)
+
+
+def _raise_if_the_disk_s(path: Path, error: OSError) -> None:
+    """Raise what the disk said; not what Arrow makes of bytes that are missing or wrong."""
+    if error.errno is not None:
+        raise InputError(
+            f"{path}: cannot be read ({error.strerror}); nothing was changed; copy it to another disk and recover it "
+            "there"
+        ) from error
 
 
 def _why_no_journal(path: Path) -> str:
@@ -228,9 +253,27 @@ def _why_no_journal(path: Path) -> str:
         if file.read(len(MAGIC)) == MAGIC:
             return "is no journal of a run but a Parquet file, of which nothing is to be recovered; see `exoid show`"
     # Only what bears a journal's name can be what is left of one.
-    if path.name.endswith(JOURNAL):
+    if not path.name.endswith(JOURNAL):
+        return f"is no journal of a run, nothing was changed; name the *{JOURNAL} that a killed run left"
+    size = path.stat().st_size
+    if size <= NO_SAMPLE:
         return "is no journal of a run, or not even its head was written and so no sample; delete it"
-    return f"is no journal of a run, nothing was changed; name the *{JOURNAL} that a killed run left"
+    return (
+        f"the head of its {size} bytes, which names the columns, is damaged or cut off, and no whole copy of it is "
+        "there; nothing was changed; keep it, samples may be in it; check the disk, and move it away to record here"
+    )
+
+
+def _short(value: object) -> str:
+    told = json.dumps(value)
+    return told if len(told) <= 40 else f"{told[:37]}..."
+
+
+def _first_part(file: BinaryIO) -> bytes:
+    """Return the part that a stream begins with."""
+    file.seek(0)
+    pa.ipc.read_message(pa.PythonFile(file, mode="r"))
+    return _between(file, 0, file.tell())
 
 
 def _between(file: BinaryIO, begin: int, end: int) -> bytes:
@@ -270,12 +313,9 @@ def refuse_leftover(path: Path) -> None:
     with locked(path) as lock:
         if not lock.free:
             raise InputError(f"{path}: another run is recording there now; choose another output or wait for its end")
-    try:
-        journal = JournalFile(path)
-    except ContractError as error:
-        raise InputError(f"{path}: holds no sample of a run that was killed; delete it") from error
+    journal = JournalFile(path)
     rows = sum(batch.rows.num_rows for batch in journal.batches())
     raise InputError(
-        f"{path}: holds {rows} samples of a run {journal.metadata['run']} that was killed; `exoid recover {path}` "
+        f"{path}: holds {rows} samples of a run {journal.metadata.get('run')} that was killed; `exoid recover {path}` "
         "makes a recording of them; or delete it"
     )

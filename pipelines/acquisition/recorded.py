@@ -8,13 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.acquisition.journal import ABORT, FOUND, ROWS, JournalFile, in_pieces
+from pipelines.acquisition.journal import ABORT, FOUND, ROWS, JournalFile, field_of, in_pieces
 from pipelines.acquisition.sound import sound_batches
 from pipelines.contracts import RECORDING
 from pipelines.contracts.beside import aborted_of
+from pipelines.errors import ContractError
 
 PIECE_ROWS = 32768
 """Samples that are held in memory at once."""
+LARGEST = 1e9
+"""Beyond this no rate, Hz, and no duration, s, is one."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +50,9 @@ class Account:
 
 def account_of(journal: JournalFile) -> Account:
     """Go through a journal and say what is there; the device's counter tells what is not."""
-    rate_hz = journal.metadata["sample_rate_hz"]
-    seconds = journal.metadata["config"]["run"]["duration_s"]
+    _refuse_other_columns(journal)
+    rate_hz = _positive(journal, "sample_rate_hz")
+    seconds = _positive(journal, "config", "run", "duration_s")
     planned, samples, reached = round(seconds * rate_hz), 0, 0
     gaps, offset, last_words = list[tuple[float, int]](), None, None
     for batch in sound_batches(journal):
@@ -61,15 +65,53 @@ def account_of(journal: JournalFile) -> Account:
         index = sequence + offset
         found, samples = _gaps(np.concatenate([[reached - 1], index]), rate_hz), samples + len(index)
         gaps, reached = gaps + found, int(index[-1]) + 1
-    if last_words is None:
+    said = None if last_words is None else _said(last_words)
+    if said is None:
         # A full disk takes the last words with it: nobody can tell the two apart.
         why = f"ended {reached / rate_hz:.3f} s into {seconds:g} s without a word: killed, or its disk was full"
-        return Account(samples, planned, rate_hz, gaps, why, damaged=journal.damaged > 0)
-    abort = last_words[ABORT].decode() or None
+        damaged = journal.damaged > 0 or last_words is not None
+        return Account(samples, planned, rate_hz, gaps, why, damaged=damaged)
+    abort, found_out, rows = said
     if not abort:
         gaps = gaps + _gaps(np.array([reached - 1, planned]), rate_hz)
-    damaged = journal.damaged > 0 or int(last_words[ROWS]) != journal.rows
-    return Account(samples, planned, rate_hz, gaps, abort, json.loads(last_words[FOUND]), damaged)
+    return Account(samples, planned, rate_hz, gaps, abort, found_out, journal.damaged > 0 or rows != journal.rows)
+
+
+def _said(last_words: dict[bytes, bytes]) -> tuple[str | None, dict[str, Any], int] | None:
+    """Return why a run stopped early, what else it found out, and its number of samples; None where that is damaged."""
+    try:
+        found = json.loads(last_words[FOUND])
+        said = last_words[ABORT].decode() or None, found, int(last_words[ROWS])
+    except (KeyError, ValueError):
+        return None
+    return said if isinstance(found, dict) else None
+
+
+def _refuse_other_columns(journal: JournalFile) -> None:
+    """Refuse a journal whose columns are none of a run's."""
+    fields = {field.name: field for field in journal.schema}
+    for name in ("time_s", "sequence", *fields):
+        found, expected = fields.get(name), field_of(name)
+        if found is None or found.type != expected.type:
+            told = "is missing" if found is None else f"holds {found.type}"
+            raise ContractError(
+                f"{journal.path}: its column {name} {told}, expected {expected.type}; exoid wrote no such journal, "
+                "nothing was changed"
+            )
+
+
+def _positive(journal: JournalFile, *keys: str) -> float:
+    """Return a number of a journal's metadata that a recording cannot be made without."""
+    value: Any = journal.metadata
+    for key in keys:
+        value = value.get(key) if isinstance(value, dict) else None
+    if isinstance(value, int | float) and not isinstance(value, bool) and 0 < value <= LARGEST:
+        return value
+    told = "is missing" if value is None else f"is {value!r:.40}"
+    raise ContractError(
+        f"{journal.path}: {'.'.join(keys)} of its metadata {told}, expected a number above 0 and up to {LARGEST:g}; "
+        "exoid wrote no such journal, nothing was changed"
+    )
 
 
 def _gaps(index: np.ndarray, rate_hz: float) -> list[tuple[float, int]]:

@@ -2,6 +2,7 @@ import threading
 import time
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from pipelines.acquisition.journal import FLUSH_S, Journal, JournalFile, refuse_leftover
@@ -168,3 +169,51 @@ def test_values_that_a_sensor_did_not_give_stay_missing(tmp_path):
     with Journal(path, COLUMNS, {"run": "exo_alone"}) as journal:
         journal.append([0.0, np.nan, 0])
     assert np.isnan(read_journal(path)[0]["hip_angle_rad"][0])
+
+
+def flipped(whole, at):
+    return whole[:at] + bytes([whole[at] ^ 0x10]) + whole[at + 1 :]
+
+
+def test_no_flipped_bit_in_the_head_costs_a_sample_or_a_word_of_the_metadata(three_batches):
+    path, places = three_batches
+    whole = path.read_bytes()
+    head = len(JournalFile(path)._head)
+    assert head < places[0]
+    for at in range(head):
+        path.write_bytes(flipped(whole, at))
+        journal = JournalFile(path)
+        assert journal.metadata == {"run": "exo_alone"}
+        assert journal.schema.names == COLUMNS
+        assert sum(batch.rows.num_rows for batch in journal.batches()) == 150
+        assert journal.damaged >= head  # so it is kept
+
+
+def test_all_that_comes_before_the_first_sample_may_be_lost(three_batches):
+    path, places = three_batches
+    whole = path.read_bytes()
+    path.write_bytes(bytes(places[0]) + whole[places[0] :])
+    frame, metadata = read_journal(path)
+    assert frame["sequence"].tolist() == list(range(150))
+    assert metadata == {"run": "exo_alone"}
+
+
+def test_a_damaged_copy_of_the_head_is_not_believed(three_batches):
+    path, _ = three_batches
+    whole = path.read_bytes()
+    place = whole.index(b"exoid-head:") + 40
+    path.write_bytes(flipped(whole, place).replace(b"exoid-head:", b"exoid-held:", 2)[: len(whole)])
+    assert read_journal(path)[1] == {"run": "exo_alone"}
+    path.write_bytes(flipped(flipped(whole, place), 6))
+    assert read_journal(path)[1] == {"run": "exo_alone"}  # from the copy at the end
+
+
+def test_a_run_that_is_killed_before_its_first_sample_has_said_no_last_word(tmp_path):
+    path = tmp_path / "run.journal"
+    journal = fill(path, 0)
+    assert [batch.last_words for batch in JournalFile(path).batches()] == [None]
+    journal.close()
+
+
+def test_other_readers_of_arrow_read_a_journal_as_it_is(three_batches):
+    assert pa.ipc.open_stream(three_batches[0]).read_all()["sequence"].to_pylist() == list(range(150))

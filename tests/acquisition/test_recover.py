@@ -1,5 +1,6 @@
 """What a killed run left becomes a whole recording, and what is missing is said."""
 
+import json
 import os
 import subprocess
 import sys
@@ -66,7 +67,7 @@ def test_wherever_a_journal_was_cut_off_all_whole_batches_are_recovered(killed, 
             recover(killed, tmp_path / f"{cut}.parquet")
             found.append(len(RECORDING.read(tmp_path / f"{cut}.parquet").frame))
         except InputError as error:
-            assert "not even its head was written" in str(error) or "holds no sample" in str(error)
+            assert ("delete it" in str(error)) == (cut <= 512 or "holds no sample" in str(error))
             found.append(0)
     assert found == sorted(found)
     assert set(found) == set(range(0, 141, 20))  # the last batch, of 7, is never whole here
@@ -285,3 +286,89 @@ def test_a_pipe_is_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError, match="is no file, expected the journal that a killed run left"):
         recover(tmp_path / "pipe")
+
+
+def without_copies(path):
+    """Make a journal one without a copy of its head, as exoid wrote them before there was one."""
+    path.write_bytes(path.read_bytes().replace(b"exoid-head:", b"exoid-held:"))
+
+
+@pytest.mark.parametrize("copies", [True, False])
+@pytest.mark.parametrize("at", [6, 20, 300])
+def test_one_flipped_bit_in_the_head_never_has_samples_deleted(killed, tmp_path, at, copies):
+    if not copies:
+        without_copies(killed)
+    content = bytearray(killed.read_bytes())
+    content[at] ^= 1 << 4
+    killed.write_bytes(content)
+    if copies:
+        made = recover(killed)
+        assert (made.account.samples, made.account.damaged) == (147, True)
+    else:
+        for refuse in (recover, refuse_leftover):
+            with pytest.raises(InputError) as refused:
+                refuse(killed)
+            assert str(refused.value).startswith(f"{killed}: the head of its {len(content)} bytes, which names the")
+            assert "keep it, samples may be in it" in str(refused.value)
+            assert "delete" not in str(refused.value)
+    assert killed.read_bytes() == content
+
+
+def test_whatever_bit_of_a_head_without_a_copy_is_flipped_what_is_refused_is_named_and_kept(killed, tmp_path):
+    without_copies(killed)
+    whole, output = killed.read_bytes(), tmp_path / "made.parquet"
+    for at in range(0, len(JournalFile(killed)._head), 7):
+        killed.write_bytes(whole[:at] + bytes([whole[at] ^ 0x10]) + whole[at + 1 :])
+        try:
+            recover(killed, output)
+            output.unlink()
+        except InputError as error:
+            assert str(error).startswith((f"{killed}: ", f"{output}: "))
+            assert "delete" not in str(error)
+            assert killed.exists()
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"config": None}, "config.run.duration_s of its metadata is missing, expected a number above 0"),
+        ({"config": {"run": 3}}, "config.run.duration_s of its metadata is missing, expected a number above 0"),
+        ({"sample_rate_hz": 0}, "sample_rate_hz of its metadata is 0, expected a number above 0"),
+        ({"sample_rate_hz": "x"}, "sample_rate_hz of its metadata is 'x', expected a number above 0"),
+        ({"sample_rate_hz": True}, "sample_rate_hz of its metadata is True, expected a number above 0"),
+        ([1, 2], "its metadata are [1, 2], expected a table of keys and values"),
+    ],
+)
+def test_metadata_of_which_no_recording_can_be_made_are_named(tmp_path, monkeypatch, changed, words):
+    path = journal_of(tmp_path / "one.parquet")
+    monkeypatch.setattr("pipelines.acquisition.journal.to_json", lambda metadata, _: json.dumps(metadata))
+    with Journal(path, COLUMNS, METADATA | changed if isinstance(changed, dict) else changed) as journal:
+        journal.append(row(0))
+    with pytest.raises(InputError) as refused:
+        recover(path)
+    assert str(refused.value).startswith(f"{path}: {words}")
+    assert refused.value.exit_code == 2
+    assert path.exists()
+
+
+def test_a_journal_without_a_counter_is_named(tmp_path):
+    path = journal_of(tmp_path / "one.parquet")
+    with Journal(path, COLUMNS[:-1], METADATA) as journal:
+        journal.append(row(0)[:-1])
+    with pytest.raises(InputError, match="its column sequence is missing, expected int64"):
+        recover(path)
+
+
+@pytest.mark.parametrize(("word", "instead"), [(b"found", b"fo\x00nd"), (b"rows", b"rowz"), (b"{}", b"{{")])
+def test_last_words_that_are_damaged_are_none_and_cost_no_sample(tmp_path, word, instead):
+    output = tmp_path / "one.parquet"
+    journal = journal_with(output, range(190))
+    journal.end("the cat came")
+    journal.close()
+    whole = journal.path.read_bytes()
+    at = whole.rindex(word)
+    journal.path.write_bytes(whole[:at] + instead + whole[at + len(word) :])
+    made = recover(journal.path)
+    assert (made.account.samples, made.account.damaged) == (190, True)
+    assert "without a word" in made.account.abort
+    assert journal.path.exists()
