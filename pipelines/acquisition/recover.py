@@ -6,6 +6,7 @@ from pathlib import Path
 from pipelines.acquisition.journal import JournalFile
 from pipelines.acquisition.lock import locked
 from pipelines.acquisition.recorded import Account, account_of, place_for, write_recording
+from pipelines.contracts import RECORDING
 from pipelines.contracts.beside import JOURNAL
 from pipelines.errors import InputError
 from pipelines.validation import similar_file
@@ -56,6 +57,7 @@ def recover(path: Path, output: Path | None = None) -> Recovered:
         output = output or place_for(path.with_name(path.name.removesuffix(JOURNAL)), account.abort)
         if output.exists():
             raise InputError(f"{output}: is there already and is not overwritten; name another file with -o")
+        RECORDING.refuse_place(output)
         write_recording(journal, output, account, recovered=True)
         if not account.damaged:
             lock.remove()

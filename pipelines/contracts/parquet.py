@@ -82,10 +82,15 @@ def save(path: Path, pieces: Iterable[pa.Table], metadata: Mapping[str, Any]) ->
 
 
 def refuse_place(path: Path, contract: str) -> None:
-    """Refuse to write where a folder is, or what is no older version of the same: a recording cannot be made again."""
+    """Refuse to write where a folder is, or what is no older version of the same: a recording cannot be made again.
+
+    Nor under a name that promises another format, or that those who look for ``*.parquet`` would never find.
+    """
     if path.is_dir():
         raise ContractError(f"{path}: is a folder, expected the name of a Parquet file to write")
     refuse_what_is_no_file(path)
+    if path.suffix != ".parquet":
+        raise ContractError(f"{path}: expected a name that ends in .parquet, which is what is written; name another")
     if not path.exists() or path.stat().st_size == 0:
         return
     try:

@@ -104,6 +104,17 @@ def test_nothing_is_overwritten(killed, tmp_path):
     assert recover(killed).path == tmp_path / "one.aborted-2.parquet"
 
 
+@pytest.mark.parametrize("name", ["a.csv", "a", "a.parquet.txt"])
+def test_a_recording_is_written_under_no_name_but_that_of_a_parquet_file(killed, tmp_path, name):
+    with pytest.raises(InputError) as refused:
+        recover(killed, tmp_path / name)
+    assert str(refused.value) == (
+        f"{tmp_path / name}: expected a name that ends in .parquet, which is what is written; name another"
+    )
+    assert killed.exists()
+    assert not (tmp_path / name).exists()
+
+
 HOLD = """\
 import sys
 from pathlib import Path

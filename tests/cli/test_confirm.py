@@ -255,3 +255,10 @@ def test_a_stale_recording_of_a_real_rig_is_not_lost_to_a_run_that_nobody_named(
     (tmp_path / "recordings").mkdir()
     recorded(embedded=False).rename(tmp_path / "recordings" / "one.parquet")
     assert exoid("acquire", "--yes", *more).code == code
+
+
+def test_a_run_is_recorded_under_no_name_but_that_of_a_parquet_file(exoid, experiment, tmp_path):
+    *arguments, _ = experiment()
+    outcome = exoid(*arguments, tmp_path / "one.csv", "--yes")
+    assert outcome.code == 2
+    assert "one.csv: expected a name that ends in .parquet" in outcome.err

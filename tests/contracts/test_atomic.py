@@ -97,7 +97,7 @@ def save_together(path, when):
 
 @pytest.mark.parametrize("save", [save_table, save_text, save_together])
 def test_what_is_made_anew_and_says_the_same_stays_byte_for_byte_with_a_new_time(tmp_path, save):
-    path = tmp_path / "result"
+    path = tmp_path / "result.parquet"
     save(path, "2026-01-01T00:00:00+00:00")
     before = path.read_bytes()
     os.utime(path, (0, 0))
@@ -121,7 +121,7 @@ def test_what_is_made_anew_and_says_the_same_stays_byte_for_byte_with_a_new_time
     ],
 )
 def test_what_says_something_else_replaces_what_was_there(tmp_path, save, other):
-    path, then, now = tmp_path / "result", "2026-01-01T00:00:00+00:00", "2026-01-02T00:00:00+00:00"
+    path, then, now = tmp_path / "result.parquet", "2026-01-01T00:00:00+00:00", "2026-01-02T00:00:00+00:00"
     save(path, then)
     save(path, now, **other)
     assert now.encode() in path.read_bytes()
@@ -129,7 +129,7 @@ def test_what_says_something_else_replaces_what_was_there(tmp_path, save, other)
 
 
 def test_what_is_left_of_a_table_is_replaced(tmp_path):
-    path = tmp_path / "result"
+    path = tmp_path / "result.parquet"
     save_table(path, "2026-01-01T00:00:00+00:00")
     whole = path.read_bytes()
     path.write_bytes(whole[:-20] + bytes(20))

@@ -322,7 +322,7 @@ def test_the_covariance_has_a_row_for_each_parameter():
 
 
 def test_nothing_but_an_older_version_of_itself_is_overwritten(tmp_path, swinging_leg, run_metadata):
-    path, notes, left_over = (tmp_path / name for name in ("a.parquet", "notes.txt", "cut.parquet"))
+    path, notes, left_over = (tmp_path / name for name in ("a.parquet", "notes.parquet", "cut.parquet"))
     RECORDING.write(path, swinging_leg, run_metadata)
     RECORDING.write(path, swinging_leg, run_metadata)
     notes.write_text("a month of work")
