@@ -226,4 +226,5 @@ def plain_line(progress: "Progress") -> str:
         angles = ", ".join(f"{drive.angle:+.3f}" for drive in progress.row.drives)
         torques = ", ".join(f"{drive.torque:+.1f}" for drive in progress.row.drives)
         head += f"  {angles} rad  {torques} N·m  {progress.rate_hz:.0f} Hz  {progress.missed} missed"
-    return f"{head}  {progress.abort}" if progress.abort else head
+    urgent = "USE THE EMERGENCY STOP  " if progress.still_enabled else ""
+    return f"{urgent}{head}  {progress.abort}" if progress.abort else urgent + head

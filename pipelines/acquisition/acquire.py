@@ -157,7 +157,7 @@ async def _record(
         except OSError as error:  # a full disk must not hide that a drive could not be disabled
             raise DeviceError(
                 f"{path}: cannot be written ({error}); make room, then `exoid recover {path}` makes a recording "
-                f"of what is in it{f'. {supervisor.why}; {_rest(supervisor)}' if supervisor.why else ''}"
+                f"of what is in it{f'. {_left(supervisor, supervisor.why)}' if supervisor.why else ''}"
             ) from error
     finally:
         machine.close()
@@ -213,8 +213,8 @@ def _ending(output: Path, supervisor: Supervisor) -> tuple[type[ExoidError], str
     """Return whose fault the end of a run is, and in words how it ended and how it left the leg."""
     if supervisor.fault:
         log = _keep_traceback(supervisor.fault, place_for(output, supervisor.why))
-        return ExoidError, f"{supervisor.why}; please report it with {log}; {_rest(supervisor)}"
-    return DeviceError, f"{supervisor.why}; {_rest(supervisor)}" if supervisor.why else "the run is complete"
+        return ExoidError, _left(supervisor, f"{supervisor.why}; please report it with {log}")
+    return DeviceError, _left(supervisor, supervisor.why) if supervisor.why else "the run is complete"
 
 
 def _finish(output: Path, journal: Path, supervisor: Supervisor) -> Outcome:
@@ -257,9 +257,9 @@ def _recorded(output: Path, lock: Lock, kind: type[ExoidError], told: str, fault
     return Outcome(place, samples, account.missed)
 
 
-def _rest(supervisor: Supervisor) -> str:
-    """Return in words how a run that was stopped has left the leg."""
-    return "the leg was stopped" if supervisor.state is State.DISABLED else "USE THE EMERGENCY STOP"
+def _left(supervisor: Supervisor, why: str) -> str:
+    """Return why a run was stopped, with how that has left the leg; what somebody must do at once comes first."""
+    return f"{why}; the leg was stopped" if supervisor.state is State.DISABLED else f"USE THE EMERGENCY STOP: {why}"
 
 
 def _keep_traceback(fault: BaseException, recording: Path) -> str:

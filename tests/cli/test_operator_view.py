@@ -178,3 +178,5 @@ def test_without_a_terminal_a_line_tells_the_same():
         "run          12.3/40.0 s  +0.500, -2.080 rad  +31.0, -4.0 N·m  200 Hz  1 missed"
     )
     assert plain_line(progress(State.ABORT, row=None, abort="stopped by Ctrl-C")).endswith("stopped by Ctrl-C")
+    urgent = plain_line(progress(State.ABORT, abort="x" * 300, still_enabled=True))
+    assert urgent.startswith("USE THE EMERGENCY STOP"), "what somebody must do at once comes first"
