@@ -8,6 +8,7 @@ import pytest
 
 from pipelines.acquisition.acquire import acquire
 from pipelines.acquisition.alone import alone
+from pipelines.acquisition.check.check import check_rig
 from pipelines.errors import DeviceError
 from pipelines.rig.server import Drive
 from pipelines.rig.servo import Servo
@@ -49,6 +50,18 @@ def test_a_second_run_on_a_rig_is_refused_before_it_connects_and_names_the_first
         "was moved"
     )
     assert not list(tmp_path.glob("*.journal"))
+
+
+@pytest.mark.parametrize("move", [False, True])
+def test_a_check_beside_a_run_is_refused_before_it_connects(rig_file, monkeypatch, move):
+    path = rig_file(port=free_port())
+
+    async def connect(*_):
+        raise AssertionError("connected")
+
+    monkeypatch.setattr("pipelines.acquisition.check.check._check", connect)
+    with alone(load_rig(path)), pytest.raises(DeviceError, match=rf"another exoid \(process {os.getpid()}\) uses"):
+        check_rig(path, 200.0, move=move)
 
 
 def test_who_is_killed_holds_no_line_any_more(rig_file):

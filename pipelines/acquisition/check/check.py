@@ -46,6 +46,8 @@ def check_rig(
     ------
     SettingsError
         Where no rate is told, and the rig records by itself.
+    DeviceError
+        Where another process holds one of the lines: nothing is connected then.
     """
     if run == "with_human":
         refuse_to_move_somebody(by_hand=operator is not None, move=move)
@@ -58,8 +60,9 @@ def check_rig(
     settings = RunSettings(name="check", run=run, purpose="train")
     place = embedded(rig, path, settings, rate_hz) if rig.embedded and rate_hz else nullcontext(rig)
     with place as present, nullcontext() if rig.clock == "lockstep" else urgent():
-        # Who only asks takes nobody's torque; the guided movement holds the lines itself.
-        with alone(present) if operator else nullcontext():
+        # Who only asks loads the devices too, and would judge what another run makes of them. The movement holds the
+        # lines itself.
+        with alone(present):
             report, start = asyncio.run(_check(present, rate_hz, run == "exo_alone", operator))
         if move and not report.findings:
             try:
