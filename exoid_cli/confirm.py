@@ -24,6 +24,8 @@ def confirm(
     """Show what will be moved and the limits in force, and ask; raise InputError unless the answer is yes."""
     import numpy as np
 
+    from pipelines.acquisition.safety import HOLD_SAMPLES
+
     _refuse_nobody_to_ask(f"run {run.name} moves somebody, which wants to be confirmed on a terminal")
     seconds = min(run.duration_s, motion.period_s or run.duration_s)
     angles, speeds = motion.at(np.arange(0.0, seconds, 1.0 / sample_rate_hz))[:2]
@@ -40,8 +42,12 @@ def confirm(
     lines.append(f"  force {cuffs}; ramps of {rig.safety.ramp_s:g} s or longer lead in and out; Ctrl-C stops it")
     stop_s = max(drive.speed_rad_s for drive in rig.drive) / rig.safety.deceleration_rad_s2
     lines.append(
-        f"  a stop takes up to {stop_s:.2g} s; stopped after {rig.safety.watchdog_s:g} s of silence, or "
-        f"{rig.safety.following_error_rad:g} rad from a set-point"
+        f"  a stop takes up to {stop_s:.2g} s, then the drives hold for {HOLD_SAMPLES / sample_rate_hz:.2g} s before "
+        "their torque is taken away"
+    )
+    lines.append(
+        f"  stopped after {rig.safety.watchdog_s:g} s of silence, or {rig.safety.following_error_rad:g} rad from a "
+        "set-point"
     )
     console.err.print("\n".join(lines), markup=False, soft_wrap=True)
     _ask("Is everybody ready, and the emergency stop at hand?", f"run {run.name}")

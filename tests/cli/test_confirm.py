@@ -129,7 +129,8 @@ def test_what_will_be_moved_and_the_limits_in_force_are_shown_before_the_questio
     for words in (
         "Run one moves somebody on the rig real_time along", "trajectory.toml for 10 s",
         "limits -0.35 to +1.75 rad, 2.2 rad/s, 100 N·m", "limits -2.1 to +0.35 rad, 2.2 rad/s, 60 N·m",
-        "a stop takes up to 0.28 s; stopped after", "of silence, or 0.1 rad from a set-point",
+        "a stop takes up to 0.28 s, then the drives hold for 0.1 s before their torque is taken away",
+        "stopped after", "of silence, or 0.1 rad from a set-point",
         "force 250 N on 4 cuff sensors", "Ctrl-C stops it", "the emergency stop at hand?",
     ):  # fmt: skip
         assert words in shown
