@@ -1,6 +1,7 @@
 """``exoid rig serve``: a virtual rig on this machine, to be recorded like a real one."""
 
-from contextlib import suppress
+import socket
+from contextlib import ExitStack
 from ipaddress import ip_address
 from pathlib import Path
 from typing import Annotated, Literal
@@ -33,30 +34,43 @@ def rig(
     Example:
       exoid rig serve rigs/real_time.toml --run exo_alone --port 5020
     """
-    _refuse_anyone(bind, anyone)
-    from pipelines.rig.server import serve_file
-
-    told = False
+    bind = _address(bind, anyone)
+    told, starting = False, ExitStack()
 
     def announce(place: str, line: str | None) -> None:
         nonlocal told
+        starting.close()
         if not told and not until_input_ends:
             console.say(f"{file}: a virtual rig, {run}; Ctrl-C ends it")
             told = True
         # Not through the console: whoever started the rig waits for this line.
         print(f"{line} {place}" if line else place, flush=True)
 
-    serve_file(file, run, seed, port, sample_rate_hz, announce, until_input_ends=until_input_ends, bind=bind)
+    with starting:
+        starting.enter_context(console.working(f"starting {file.name}; the first start compiles"))
+        from pipelines.rig.server import serve_file  # compiles already
+
+        serve_file(file, run, seed, port, sample_rate_hz, announce, until_input_ends=until_input_ends, bind=bind)
 
 
-def _refuse_anyone(bind: str, anyone: bool) -> None:
-    """Refuse an address that other computers can reach, unless that is wanted; then warn."""
-    with suppress(ValueError):  # a name may lead anywhere
-        if ip_address(bind).is_loopback:
-            return
+def _address(bind: str, anyone: bool) -> str:
+    """Return the address to listen on; refuse one that other computers can reach, unless that is wanted; then warn."""
+    found = _addresses(bind)
+    if found and all(ip_address(address).is_loopback for address in found):
+        return found[0]  # not the name, which may lead elsewhere the next time
     if not anyone:
         raise SettingsError(
             f"--bind: found {bind}, expected an address of this computer's own, such as {LOOPBACK}: Modbus has no "
             "authentication, whoever reaches the rig can move it; add --anyone if that is wanted"
         )
     console.warn(f"the rig listens on {bind}, and Modbus has no authentication: whoever reaches it can move it")
+    return bind
+
+
+def _addresses(bind: str) -> list[str]:
+    """Return where a name or an address leads, those of IPv4 first as in rig files; empty where nobody knows it."""
+    try:
+        found = socket.getaddrinfo(bind, None, type=socket.SOCK_STREAM)
+    except (OSError, UnicodeError):
+        return []
+    return [str(place[0]) for family, *_, place in sorted(found, key=lambda one: one[0] != socket.AF_INET)]

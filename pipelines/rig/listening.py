@@ -93,6 +93,8 @@ def _linked(wanted: str, port: str) -> Iterator[str]:
         link.unlink()  # what a killed rig left
     try:
         link.symlink_to(port)
+    except FileExistsError as error:
+        raise DeviceError(f"{link}: {_what_is_there(link)}, or name another path in serial_port") from error
     except OSError as error:
         raise DeviceError(
             f"{link}: cannot become the link to the virtual rig's pseudo-terminal ({error.strerror}); name another "
@@ -102,6 +104,16 @@ def _linked(wanted: str, port: str) -> Iterator[str]:
         yield wanted
     finally:
         link.unlink(missing_ok=True)
+
+
+def _what_is_there(link: Path) -> str:
+    # The system gives the number of a killed rig's port to others, so a link that leads somewhere may be its leftover.
+    if link.is_symlink():
+        return (
+            f"is a link to {link.readlink()} already, as a virtual rig makes one; end the rig that is served there or, "
+            "if none is and a killed one left it, delete the link"
+        )
+    return "is there already, where the link to the virtual rig's pseudo-terminal was to be; remove it"
 
 
 def _tls_context(line: TlsLine) -> ssl.SSLContext:

@@ -1,0 +1,41 @@
+"""The link to a served rig's pseudo-terminal."""
+
+import os
+import sys
+
+import pytest
+
+from pipelines.errors import DeviceError
+from pipelines.rig.listening import _linked
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs pseudo-terminals")
+
+
+@pytest.fixture
+def link(tmp_path):
+    return tmp_path / "port"
+
+
+def test_a_link_that_leads_nowhere_any_more_is_replaced_and_removed_at_the_end(link, tmp_path):
+    link.symlink_to(tmp_path / "gone")
+    with _linked(str(link), "/dev/null") as place:
+        assert (place, os.readlink(link)) == (str(link), "/dev/null")
+    assert not link.is_symlink()
+
+
+def test_a_link_whose_port_is_somebody_elses_by_now_is_said_to_be_a_leftover_perhaps(link):
+    link.symlink_to("/dev/null")
+    with pytest.raises(DeviceError) as refused, _linked(str(link), "/dev/zero"):
+        raise AssertionError("the link is taken")
+    assert str(refused.value) == (
+        f"{link}: is a link to /dev/null already, as a virtual rig makes one; end the rig that is served there or, if "
+        "none is and a killed one left it, delete the link, or name another path in serial_port"
+    )
+    assert os.readlink(link) == "/dev/null"
+
+
+def test_a_file_in_the_place_of_the_link_stays(link):
+    link.write_text("a month of work")
+    with pytest.raises(DeviceError, match="is there already, where the link"), _linked(str(link), "/dev/null"):
+        raise AssertionError("the place is taken")
+    assert link.read_text() == "a month of work"
