@@ -179,12 +179,15 @@ async def _ready(machine: Machine, reset_faults: bool) -> NDArray:
 async def _heeding(work: Coroutine[Any, Any, NDArray], stopped_by: Sequence[str]) -> NDArray:
     """Return what work comes to that moves nothing, and leave off at a signal however long a device is waited for."""
     task = asyncio.ensure_future(work)
-    while not task.done():
-        await asyncio.wait([task], timeout=HEED_S)
-        if stopped_by and not task.done():
-            task.cancel()
-            await asyncio.wait([task])
-            raise DeviceError(f"stopped by {stopped_by[0]} before the drives were enabled; nothing was moved")
+    try:
+        while not task.done():
+            await asyncio.wait([task], timeout=HEED_S)
+            if stopped_by and not task.done():
+                raise DeviceError(f"stopped by {stopped_by[0]} before the drives were enabled; nothing was moved")
+    except BaseException:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        raise
     return task.result()
 
 

@@ -191,6 +191,7 @@ class Loop:
                 await self._find(joint)
             if self.supervisor.sent_at[joint] == told:
                 reading = await drive.exchange(self.supervisor.tend(joint, time.monotonic()))
+                self.supervisor.hear(joint, time.monotonic())
                 self.supervisor.judge_tended(joint, reading)
         except Unanswered:  # whoever follows the plan finds out for how long
             pass
@@ -307,8 +308,10 @@ class Loop:
                     if not (due := self.supervisor.stop(joint, time.monotonic())):
                         break
                     reference, halt = due
-                    self.supervisor.feel(joint, await drive.exchange(reference, halt=halt))
+                    reading = await drive.exchange(reference, halt=halt)
                     answered = time.monotonic()
+                    self.supervisor.hear(joint, answered)
+                    self.supervisor.feel(joint, reading)
                 except Unanswered:  # a lost reply alone is no reason to take a moving leg's torque away
                     if time.monotonic() - answered > self.machine.rig.safety.watchdog_s:
                         raise

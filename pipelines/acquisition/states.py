@@ -81,6 +81,8 @@ class Supervisor:
         """(J,) set-points, rad, from which the next ones step: the last ones, or what drives made of a silence."""
         self.sent_at = np.zeros_like(self.sent)
         """(J,) when they were sent, host's clock, s."""
+        self._heard_at = np.zeros_like(self.sent)
+        """(J,) when each drive answered last, host's clock, s: what it was sent since may not have arrived."""
         self.pressing = False
         """Whether slowing down would go on pressing: the drives are then disabled without it."""
         self._limits = Limits(rig, sample_rate_hz, sensors)
@@ -159,16 +161,20 @@ class Supervisor:
         self.refuse_after_abort()
         self._first = self._found = row.sequence
         self._found_at = now
+        self._heard_at[:] = now
         for j, found in enumerate(row.drives):
             self._streams[j].begin(found, now)
             self._told[j].tell(found.sequence, float(self.sent[j]))
         self._go(State.RAMP)
 
     def missed(self, found: int, now: float) -> bool:
-        """Tell whether drives were told nothing for longer than a sample, now that sample ``found`` is latched."""
+        """Tell whether a drive may have been told nothing for longer than a sample by the time a sample is ``found``.
+
+        What was sent and not answered may never have arrived, and a counter may have been set back.
+        """
         self.refuse_after_abort()
         self._look(found, now)
-        return found - self._found > 1
+        return found - self._found > 1 or any(self.is_stale(joint, now) for joint in range(len(self.sent)))
 
     def _look(self, found: int, now: float) -> None:
         """Refuse to go on after too long a silence, or with a counter that runs backwards or leaps."""
@@ -177,11 +183,15 @@ class Supervisor:
         cycle = self.rig.samples_per_cycle(self.rate)
         self._streams[0].refuse_count((found + 1) * cycle - 1)
 
+    def hear(self, joint: int, now: float) -> None:
+        """Note that a drive has answered, so that what it was sent has arrived."""
+        self._heard_at[joint] = now
+
     def is_stale(self, joint: int, now: float) -> bool:
         """Tell whether a drive's set-point is so old that nobody knows what it has made of it."""
         if self.rig.clock == "lockstep" or self._speed[joint] == 0.0:  # one that is held has nowhere to go on to
             return False
-        return bool(now - self.sent_at[joint] > SLACK_SAMPLES / self.rate)
+        return bool(now - self._heard_at[joint] > SLACK_SAMPLES / self.rate)
 
     def resume(self, joint: int, reading: Reading, now: float) -> None:
         """Go on from where a drive is that was told nothing for a while: some hold meanwhile, others go on.
@@ -192,6 +202,7 @@ class Supervisor:
             The drive is no longer enabled.
         """
         self.heed(joint, reading)
+        self.hear(joint, now)
         drive, sent, silent_s = self.rig.drive[joint], self.sent[joint], now - self.sent_at[joint]
         if self.rig.map.drive[drive.map].read.reference is not None:
             reach = drive.speed_rad_s * silent_s
@@ -257,7 +268,7 @@ class Supervisor:
         self._refuse_to_lag(due, reference)
         # A step back to the plan is no motion to be slowed down from: it may be far faster than the plan.
         speed = np.clip(reference - self.base, np.minimum(planned, 0.0), np.maximum(planned, 0.0)) * self.rate
-        self._send(reference, speed, now)
+        self._send(reference, speed if found > self._found else self._speed, now)
         self._found_at = now
         self._found = found
         return self.sent.copy()
@@ -271,6 +282,9 @@ class Supervisor:
             Where anything that came, whole or not, is reason to stop.
         """
         self.refuse_after_abort()
+        for joint, found in enumerate(answers.drives):
+            if isinstance(found, Reading):
+                self.hear(joint, now)
         if why := self._dropped(answers):
             raise DeviceError(why)
         new = [self._is_new(j, found, now) for j, found in enumerate(answers.drives)]

@@ -289,6 +289,11 @@ relaxed = dict(deadline=None, suppress_health_check=list(HealthCheck))
     clock="real_time", reads_back=False, count_rad=FINE_RAD, line="tcp", goes_on=False, human=True,
     happens=[Event(at=263, kind="dead", what=5), Event(at=280, kind="cancel", what=None)], plan=None, own=None,
 )  # fmt: skip
+@example(
+    clock="real_time", reads_back=False, count_rad=FINE_RAD, line="tcp", goes_on=True, human=True,
+    happens=[Event(at=197, kind="late", what=0.0), Event(at=204, kind="counter", what=-2),
+             Event(at=204, kind="late", what=0.0), Event(at=246, kind="lost", what=None)], plan=None, own=None,
+)  # fmt: skip
 @sequences
 @settings(max_examples=60, derandomize=True, **relaxed)
 def test_whatever_happens_the_leg_is_stopped_within_its_limits_and_it_is_said_why(
