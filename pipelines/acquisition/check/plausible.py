@@ -43,10 +43,13 @@ class Expectation:
         """Mark the values (n,) that can be true."""
         return natural(values) & (values >= self.low) & (values <= self.high)
 
-    def leaps(self, values: NDArray, seconds: NDArray) -> bool:
-        """Tell whether values (n,) at instants (n,) change faster than anything that moves."""
+    def leaps(self, values: NDArray, seconds: NDArray, period_s: float) -> bool:
+        """Tell whether values (n,) change faster than anything that moves, asked for at instants (n,) s.
+
+        Two answers that come soon after each other may be of neighbouring samples, a ``period_s`` apart.
+        """
         with np.errstate(invalid="ignore", over="ignore"):
-            return bool((np.abs(np.diff(values)) > self.fastest * np.diff(seconds) + STEP_RAD).any())
+            return bool((np.abs(np.diff(values)) > self.fastest * (np.diff(seconds) + period_s) + STEP_RAD).any())
 
 
 def check_registers(probe: Probe, series: Series, rig: RigSettings) -> Iterator[Finding]:
@@ -100,7 +103,9 @@ def _of_sensor(rig: RigSettings) -> dict[str, Expectation]:
 
 def _judged(probe: Probe, name: str, series: Series, expected: Expectation) -> Iterator[Finding]:
     values, seconds = series.of(name), series.answered
-    good, leaps = expected.holds(values), expected.leaps(values, seconds)
+    came = np.diff(seconds[series.fresh])
+    period_s = float(np.median(came)) if len(came) else 0.0
+    good, leaps = expected.holds(values), expected.leaps(values, seconds, period_s)
     if good.all() and not leaps:
         return
     value = float(values[~good][0]) if not good.all() else float(values[-1])
@@ -113,7 +118,11 @@ def _judged(probe: Probe, name: str, series: Series, expected: Expectation) -> I
     mended = None
     if misread:
         mended = remedy(
-            name, unit, where, series, lambda v: bool(expected.holds(v).all() and not expected.leaps(v, seconds))
+            name,
+            unit,
+            where,
+            series,
+            lambda v: bool(expected.holds(v).all() and not expected.leaps(v, seconds, period_s)),
         )
     todo = mended or expected.otherwise.format(where=where)
     yield Finding(probe.name, f"{name} reads {value:.4g}{unit}, {why}; {todo}", name)
