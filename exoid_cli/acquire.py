@@ -104,8 +104,11 @@ def _record(
     with ExitStack() as shown:
 
         def begin(rig: "RigSettings", motion: "Trajectory") -> None:
-            if settings.run == "with_human" and not rig.embedded and not yes:
-                confirm(rig, settings, trajectory, motion, rate)
+            if settings.run == "with_human" and not rig.embedded:
+                if not rig.sensor:
+                    console.warn("the rig file has no [[sensor]]: nobody watches how hard the cuffs press")
+                if not yes:
+                    confirm(rig, settings, trajectory, motion, rate)
             reports.append(shown.enter_context(_watching(rig, run)))
 
         outcome = record(

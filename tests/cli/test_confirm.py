@@ -2,6 +2,7 @@
 
 import io
 import os
+import re
 import subprocess
 import sys
 
@@ -152,6 +153,15 @@ def test_scripts_and_runs_with_nobody_are_not_asked(exoid, experiment, run, more
     outcome = exoid(*experiment(run), *more)
     assert outcome.code == 3
     assert outcome.err.startswith(f"exoid: {WENT_ON}")
+
+
+def test_who_says_yes_beforehand_is_told_that_nobody_watches_the_cuffs(exoid, experiment, tmp_path):
+    arguments = experiment()
+    text = (tmp_path / "rig.toml").read_text()
+    without = re.sub(r"\[\[sensor\]\][^\[]*", "", text)
+    (tmp_path / "rig.toml").write_text(without)
+    outcome = exoid(*arguments, "--yes")
+    assert outcome.err.startswith("warning: the rig file has no [[sensor]]: nobody watches how hard the cuffs press\n")
 
 
 def test_nobody_is_strapped_into_an_embedded_rig(exoid, experiment, monkeypatch):
