@@ -81,9 +81,10 @@ def diagnose(
             write_text(made / f"{name}.json", f"{text}\n")
         if figures:
             draw(found, said, made)
-        for old in (f"{name}.{kind}" for name in FIGURES for kind in ("png", "pdf")):
-            if not (made / old).exists():
-                (output / old).unlink(missing_ok=True)
+        drawn = {path.name for path in made.iterdir()}
+    for old in (f"{name}.{kind}" for name in FIGURES for kind in ("png", "pdf")):
+        if old not in drawn:
+            (output / old).unlink(missing_ok=True)
     console.emit(said)
     show_verdict(said, motions[0].machine.joints)
     console.wrote(

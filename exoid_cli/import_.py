@@ -101,19 +101,20 @@ def _import(files: list[Path], map_: Path, output: Path) -> None:
 
 def _say_in_short(told: list[dict[str, Any]]) -> None:
     """Say of many logs a line each, and then once what was seen in several, but for its numbers."""
-    seen: dict[str, list[tuple[Finding, str]]] = {}
+    seen: dict[tuple[str, str], list[tuple[Finding, str]]] = {}
     for one in told:
         for made in one["recordings"]:
             _say_what_was_made(made)
         for finding in _findings(one):
             # As in "2 rows left out": of another file the numbers are others.
-            kind = re.sub(r"\d[\d.,  ]*", "#", str(finding))
+            kind = finding.where, re.sub(r"\d[\d.,  ]*", "#", str(finding).removeprefix(finding.where))
             seen.setdefault(kind, []).append((finding, one["file"].name))
     if seen:
         console.say("\nSeen, with the numbers of the first file; `exoid show` tells those of each:")
     for found in seen.values():
         finding, first = found[0]
-        more = f" and {len(found) - 1} more" if len(found) > 1 else ""
+        files = len({name for _, name in found})
+        more = f" and {files - 1} more" if files > 1 else ""
         console.note(f"- {finding} ({first}{more})")
     console.say("")
 

@@ -79,7 +79,7 @@ def _compare(folders: tuple[Path, Path], output: Path) -> None:
     apart = [{"name": one.name, "first": one.first, "second": one.second} for one in page.settings]
     console.emit({"path": str(output), "changed": page.changed, "judged": page.judged, "headline": page.headline,
                   "settings": apart})  # fmt: skip
-    console.say(f"{page.headline} (95 %).")
+    console.say(f"{page.headline}{' (95 %)' if page.judged else ''}.")
     for line in page.errors:
         console.say(line)
     for one in page.settings:

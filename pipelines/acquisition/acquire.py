@@ -8,7 +8,7 @@ from collections.abc import Callable, Coroutine, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,7 @@ from pipelines.settings.mechanism import MechanismSettings
 from pipelines.settings.rig import RigSettings, load_rig
 
 Begin = Callable[[RigSettings, Trajectory], None]
+T = TypeVar("T")
 HEED_S = 0.05
 """How often it is looked for signals while devices are waited for before anything moves."""
 
@@ -100,10 +101,10 @@ def acquire(
     if rig.clock == "real_time":
         with about(rig_path):
             refuse_slow_lines(rig, sample_rate_hz, with_sensors=run.run == "with_human")
-    begin(rig, trajectory)
     RECORDING.refuse_place(output)
     journal = journal_of(output)
     refuse_leftover(journal)
+    begin(rig, trajectory)
     open_folder(output.parent)
     with about(rig_path):
         recorded_hz = sample_rate_hz * rig.samples_per_cycle(sample_rate_hz)
@@ -145,7 +146,7 @@ async def _record(
     report(Progress(duration_s=run.duration_s))
     try:
         supervisor.check()
-        start = await _heeding(_ready(machine, reset_faults), stopped_by)
+        start = await _ready(machine, reset_faults, stopped_by)
         plan = make_plan(rig, trajectory, start, run.duration_s, supervisor.rate)
         supervisor.take(plan, start)
         sampling = sampling_of(machine, supervisor.rate, supervisor.judge_records)
@@ -163,26 +164,27 @@ async def _record(
         machine.close()
 
 
-async def _ready(machine: Machine, reset_faults: bool) -> NDArray:
+async def _ready(machine: Machine, reset_faults: bool, stopped_by: Sequence[str]) -> NDArray:
     """Connect, make sure that every drive is idle, and return where the leg stands, (J,) rad."""
-    await machine.connect()
-    await machine.refuse_driven()
+    await _heeding(machine.connect(), stopped_by)
+    await _heeding(machine.refuse_driven(), stopped_by)
+    # Whatever comes meanwhile: each drive is to hear that it shall be idle, and no fault reset is left half way.
     if reset_faults:
         await machine.reset_faults()
     await machine.make_idle()
-    start = np.array((await machine.look()).angle)
+    start = np.array((await _heeding(machine.look(), stopped_by)).angle)
     if why := check_start(machine.rig, start):
         raise DeviceError(why)
     return start
 
 
-async def _heeding(work: Coroutine[Any, Any, NDArray], stopped_by: Sequence[str]) -> NDArray:
-    """Return what work comes to that moves nothing, and leave off at a signal however long a device is waited for."""
+async def _heeding(work: Coroutine[Any, Any, T], stopped_by: Sequence[str]) -> T:
+    """Return what work comes to that only asks, and leave off at a signal however long a device is waited for."""
     task = asyncio.ensure_future(work)
     try:
         while not task.done():
             await asyncio.wait([task], timeout=HEED_S)
-            if stopped_by and not task.done():
+            if stopped_by:
                 raise DeviceError(f"stopped by {stopped_by[0]} before the drives were enabled; nothing was moved")
     except BaseException:
         task.cancel()

@@ -1,6 +1,6 @@
-"""The head of a journal, which names its columns and holds its metadata, kept twice: without it no sample can be read.
+"""The head of a journal, with columns and metadata, kept more than once: without it no sample can be read.
 
-An Arrow stream has one head, at its beginning. The copy is text among the metadata of a batch without rows, where
+An Arrow stream has one head, at its beginning. Each copy is text among the metadata of a batch without rows, where
 other readers of Arrow pass over it.
 """
 

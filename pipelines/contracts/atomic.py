@@ -54,7 +54,7 @@ def all_or_none(folder: Path, vouching: str | None = None) -> Iterator[Path]:
     """Yield a temporary folder within ``folder``; the files written there move up once the block ends well.
 
     On any failure, Ctrl-C included, they go and ``folder`` stays as it was. The one whose name is ``vouching`` moves
-    last, and never stands beside others than those it was made with, not even after a loss of power.
+    last, and never stands beside others than those it was made with.
     """
     with tempfile.TemporaryDirectory(prefix=".", suffix=".tmp", dir=folder) as temporary:
         try:
@@ -68,7 +68,7 @@ def all_or_none(folder: Path, vouching: str | None = None) -> Iterator[Path]:
         for path in made.values():
             refuse_what_is_no_file(path)
         if vouching and not all(same_but_for_the_time(path, file) for file, path in made.items()):
-            (folder / vouching).unlink(missing_ok=True)
+            made[Path(temporary) / vouching].unlink(missing_ok=True)
         for file in sorted(made, key=lambda file: file.name == vouching):
             _put(file, made[file])
 
