@@ -400,6 +400,8 @@ class Answers:
     """(4, 3) N; NaN where a sensor was not read or had nothing new."""
     row: Row | None
     """The sample of the whole machine; None where a drive's is missing."""
+    earlier: tuple[tuple[int, Reading], ...] = ()
+    """What drives, by their number, told before they were asked again for the others' sample."""
 
 
 class Machine:
@@ -523,11 +525,12 @@ class Machine:
             told = await self._exchange(reference)
             forces = await self.felt(number)
         readings = [answer for answer in told if isinstance(answer, Reading)]
-        whole = len(readings) == len(told)
+        whole, earlier = len(readings) == len(told), list[tuple[int, Reading]]()
         if whole and self._latches:
-            whole = await self._latch(readings)
+            whole = await self._latch(readings, earlier)
             told = list(readings)
-        return Answers(tuple(told), forces, Row(tuple(readings), forces, self.samples_per_cycle) if whole else None)
+        row = Row(tuple(readings), forces, self.samples_per_cycle) if whole else None
+        return Answers(tuple(told), forces, row, tuple(earlier))
 
     async def felt(self, number: int) -> NDArray:
         """Return the forces (4, 3) N of those sensors that are due in a cycle."""
@@ -545,8 +548,8 @@ class Machine:
         pairs = zip(self.drives, reference.tolist(), strict=True)
         return await answers_or_silence(drive.exchange(angle) for drive, angle in pairs)
 
-    async def _latch(self, readings: list[Reading]) -> bool:
-        """Ask those drives again that have not latched the others' sample yet, in place of what they told.
+    async def _latch(self, readings: list[Reading], earlier: list[tuple[int, Reading]]) -> bool:
+        """Ask those drives again that have not latched the others' sample yet, in place of what they told ``earlier``.
 
         Returns whether all have latched it in the end; not, where one does not answer.
         """
@@ -562,6 +565,7 @@ class Machine:
             await asyncio.sleep(LAG_PAUSE_S)
             for j in late:
                 # Not told again: what is due by then is another set-point.
+                earlier.append((j, readings[j]))
                 try:
                     readings[j] = await self.drives[j].look(in_motion=True)
                 except Unanswered:

@@ -503,7 +503,10 @@ class Supervisor:
 
     def _dropped(self, told: Row | Answers) -> str | None:
         """Return why to stop where a drive is no longer enabled; note what each of them says."""
-        found = [self._heed_enabled(j, one) for j, one in enumerate(told.drives) if isinstance(one, Reading)]
+        earlier = told.earlier if isinstance(told, Answers) else ()  # nothing that a drive says of it goes unheard
+        found = [
+            self._heed_enabled(j, one) for j, one in (*earlier, *enumerate(told.drives)) if isinstance(one, Reading)
+        ]
         return next(filter(None, found), None)
 
     def _refuse_to_lag(self, due: NDArray, reference: NDArray) -> None:

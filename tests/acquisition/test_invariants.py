@@ -294,6 +294,10 @@ relaxed = dict(deadline=None, suppress_health_check=list(HealthCheck))
     happens=[Event(at=197, kind="late", what=0.0), Event(at=204, kind="counter", what=-2),
              Event(at=204, kind="late", what=0.0), Event(at=246, kind="lost", what=None)], plan=None, own=None,
 )  # fmt: skip
+@example(
+    clock="real_time", reads_back=True, count_rad=FINE_RAD, line=None, goes_on=False, human=False,
+    happens=[Event(at=40, kind="counter", what=1), Event(at=47, kind="status", what=None)], plan=None, own=None,
+)  # fmt: skip
 @sequences
 @settings(max_examples=60, derandomize=True, **relaxed)
 def test_whatever_happens_the_leg_is_stopped_within_its_limits_and_it_is_said_why(
