@@ -83,8 +83,6 @@ class Supervisor:
         """(J,) when they were sent, host's clock, s."""
         self._heard_at = np.zeros_like(self.sent)
         """(J,) when each drive answered last, host's clock, s: what it was sent since may not have arrived."""
-        self._heard = np.zeros_like(self.sent)
-        """(J,) set-points, rad, that the drives held then."""
         self.pressing = False
         """Whether slowing down would go on pressing: the drives are then disabled without it."""
         self._limits = Limits(rig, sample_rate_hz, sensors)
@@ -163,7 +161,7 @@ class Supervisor:
         self.refuse_after_abort()
         self._first = self._found = row.sequence
         self._found_at = now
-        self._heard_at[:], self._heard = now, self.sent.copy()
+        self._heard_at[:] = now
         for j, found in enumerate(row.drives):
             self._streams[j].begin(found, now)
             self._told[j].tell(found.sequence, float(self.sent[j]))
@@ -187,12 +185,11 @@ class Supervisor:
 
     def hear(self, joint: int, now: float) -> None:
         """Note that a drive has answered, so that what it was sent has arrived."""
-        self._heard_at[joint], self._heard[joint] = now, self.sent[joint]
+        self._heard_at[joint] = now
 
     def is_stale(self, joint: int, now: float) -> bool:
         """Tell whether a drive's set-point is so old that nobody knows what it has made of it."""
-        is_held = self._speed[joint] == 0.0 and self.sent[joint] == self._heard[joint]
-        if self.rig.clock == "lockstep" or is_held:  # one that is held has nowhere to go on to
+        if self.rig.clock == "lockstep" or self._speed[joint] == 0.0:  # one that is held has nowhere to go on to
             return False
         return bool(now - self._heard_at[joint] > SLACK_SAMPLES / self.rate)
 
@@ -205,17 +202,14 @@ class Supervisor:
             The drive is no longer enabled.
         """
         self.heed(joint, reading)
-        drive, sent = self.rig.drive[joint], self.sent[joint]
-        # From what it is known to have heard, as what was sent since may not have arrived.
-        heard, silent_s = self._heard[joint], now - self._heard_at[joint]
+        self.hear(joint, now)
+        drive, sent, silent_s = self.rig.drive[joint], self.sent[joint], now - self.sent_at[joint]
         if self.rig.map.drive[drive.map].read.reference is not None:
             reach = drive.speed_rad_s * silent_s
-            place = np.clip(reading.reference, heard - reach, heard + reach)
+            place = np.clip(reading.reference, sent - reach, sent + reach)
         else:  # its leg lags behind one that holds, and is ahead with one that goes on
-            led = (heard, sent, heard + self._speed[joint] * silent_s)
-            place = np.clip(reading.angle, min(led), max(led))
-        speed = (place - heard) / silent_s if np.isnan(reading.velocity) else reading.velocity
-        self.hear(joint, now)
+            place = np.clip(reading.angle, *sorted((sent, sent + self._speed[joint] * silent_s)))
+        speed = (place - sent) / silent_s if np.isnan(reading.velocity) else reading.velocity
         self.base[joint] = place
         self._speed[joint] = np.clip(speed, *sorted((0.0, self._speed[joint])))
 

@@ -125,9 +125,8 @@ def follow(supervisor, k):
     """Send what is due at a sample, and take the sample; return the hip's set-point."""
     now = 10.0 + (k - 100) / RATE
     sent = float(supervisor.next(k, now)[0])
-    for joint, (stream, reading) in enumerate(zip(supervisor._streams, row(k).drives, strict=True)):
+    for stream, reading in zip(supervisor._streams, row(k).drives, strict=True):
         stream.begin(reading, now)
-        supervisor.hear(joint, now)
     return sent
 
 
@@ -166,22 +165,6 @@ def test_a_set_point_that_comes_soon_after_a_late_one_leads_back_to_the_plan_no_
     assert soon - first == pytest.approx(2.0 / RATE)  # the plan's own
 
 
-def test_a_drive_that_did_not_answer_what_leads_it_back_to_a_standing_plan_is_asked_where_it_is(supervisor):
-    """The plan stands, so that nothing is left to be slowed down; what was sent may have arrived or not."""
-    supervisor.take(Plan(np.full((128, 2), [0.2, 0.0]), 50, 100), np.array([0.2, 0.0]))
-    supervisor.rest(10.0)
-    supervisor.begin(row(100), 10.0)
-    supervisor.base[0] = supervisor.sent[0] = 0.1
-    supervisor.hear(0, 10.0)
-    for k in (101, 102, 103):
-        supervisor.next(k, 10.0 + (k - 100) / RATE)
-    assert supervisor._speed[0] == 0.0
-    assert not supervisor.is_stale(0, 10.0 + 2 / RATE)
-    assert supervisor.is_stale(0, 10.0 + 3 / RATE)
-    supervisor.resume(0, told(0.1), 10.0 + 3 / RATE)
-    assert supervisor.base[0] == pytest.approx(0.1), "as it says, not as it was sent"
-
-
 def test_a_run_that_lags_too_far_behind_its_plan_is_stopped(supervisor):
     supervisor.take(Plan(np.arange(1, 129)[:, np.newaxis] * [2.9 / RATE, 0.0], 50, 100), np.zeros(2))
     supervisor.rest(10.0)
@@ -196,7 +179,6 @@ def test_a_stop_after_a_silence_begins_where_the_drive_is_and_as_fast_as_it_is(s
     supervisor.rest(10.0)
     supervisor.begin(row(100), 10.0)
     supervisor.sent[:], supervisor.base[:], supervisor._speed = 0.2, 0.2, np.array([2.0, 0.0])
-    supervisor.hear(0, 10.0)
     supervisor.abort(DeviceError("silent"))
     supervisor.resume(0, told(0.4, velocity), 10.25)
     path = []
