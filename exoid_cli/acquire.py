@@ -90,14 +90,12 @@ def _record(
     reset_faults: bool,
 ) -> None:
     from pipelines.acquisition.acquire import acquire as record
-    from pipelines.contracts import RECORDING
     from pipelines.workflow.imported import refuse_imported
     from pipelines.workflow.kept import refuse_recorded
 
     refuse_imported(output)
     if not overwrite:
         refuse_recorded(output)
-    RECORDING.refuse_place(output)
     experiment.mechanism.refuse_all_but_the_leg("`exoid acquire`")
     settings, rate = experiment.run_named(run), experiment.acquire.sample_rate_hz
     reports: list[Callable[[Progress], None]] = []

@@ -92,6 +92,7 @@ def _track(table: "Table", run: str, reference: Path | None, settings: "Experime
     from pipelines.mechanics.read import geometry_from
     from pipelines.mechanics.trajectory import read_trajectory
     from pipelines.simulation.sweep import sweep
+    from pipelines.workflow.graph import LOOP, SWEEP
 
     chosen = settings.simulate
     plant = plant_from_table(table, run, geometry_from(settings.mechanism))
@@ -120,9 +121,9 @@ def _track(table: "Table", run: str, reference: Path | None, settings: "Experime
         "noise": {"counts_per_turn": chosen.encoder_counts_per_turn, "angle_rad": chosen.encoder_noise_rad},
         "seed": chosen.seed,
     }
-    SIMULATION.write(output / "rbf.parquet", frame, described)
+    SIMULATION.write(output / LOOP, frame, described)
     if len(gains):
-        write_text(output / "kv-sweep.csv", gains.to_csv(index=False))
+        write_text(output / SWEEP, gains.to_csv(index=False))
     if chosen.figures:
         from pipelines.simulation.figures import draw_sweep, draw_tracking
 
@@ -148,7 +149,7 @@ def _track(table: "Table", run: str, reference: Path | None, settings: "Experime
         [(name, f"{e:.4f}", f"{t:.1f}") for name, e, t in zip(names, worst, peak, strict=True)],
         numbers=f"{settled}, {strongest}",
     )
-    tables = ["rbf.parquet", *(["kv-sweep.csv"] if len(gains) else [])]
+    tables = [LOOP, *([SWEEP] if len(gains) else [])]
     drawn = ["tracking.png", "error.png", "torque.png", *(["kv-sweep.png"] if len(gains) else [])]
     console.wrote(output, *tables, *(drawn if chosen.figures else []))
 

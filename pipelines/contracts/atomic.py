@@ -26,7 +26,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     try:
         yield temporary
         _sync(temporary, os.O_RDWR)  # Windows brings to disk only what could be written to
-        _put(temporary, path)
+        _put(temporary, path, is_same=same_but_for_the_time(path, temporary))
     except BaseException as error:
         temporary.unlink(missing_ok=True)
         if isinstance(error, OSError) and str(error.filename) == str(temporary):
@@ -67,15 +67,17 @@ def all_or_none(folder: Path, vouching: str | None = None) -> Iterator[Path]:
         made = {file: Path(os.path.realpath(folder / file.name)) for file in sorted(Path(temporary).iterdir())}
         for path in made.values():
             refuse_what_is_no_file(path)
-        if vouching and not all(same_but_for_the_time(path, file) for file, path in made.items()):
+        same = {file: same_but_for_the_time(path, file) for file, path in made.items()}
+        if vouching and not all(same.values()):
             made[Path(temporary) / vouching].unlink(missing_ok=True)
+            same[Path(temporary) / vouching] = False
         for file in sorted(made, key=lambda file: file.name == vouching):
-            _put(file, made[file])
+            _put(file, made[file], is_same=same[file])
 
 
-def _put(made: Path, path: Path) -> None:
+def _put(made: Path, path: Path, *, is_same: bool) -> None:
     """Put a file in its place, unless it says what the one there says, of which others may know the hash."""
-    if same_but_for_the_time(path, made):
+    if is_same:
         os.utime(path)  # make goes by times
         made.unlink()
     else:

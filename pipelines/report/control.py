@@ -9,7 +9,8 @@ import pandas as pd
 from pipelines.contracts import Joint
 from pipelines.report.chart import Chart, Mark, Panel, Role, Series
 from pipelines.report.measured import MODELS, models_of
-from pipelines.report.session import SWEEP, Artifact, Session
+from pipelines.report.session import Artifact, Session
+from pipelines.workflow.graph import SWEEP
 
 GAIN = "feedback_gain_nm_s_rad"
 LIMIT = 4.0

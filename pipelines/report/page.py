@@ -21,7 +21,8 @@ from pipelines.contracts.provenance import sha256
 from pipelines.report.animation import Animation
 from pipelines.report.chart import Chart
 from pipelines.report.numbers import beside, digits
-from pipelines.report.session import SWEEP, Artifact
+from pipelines.report.session import Artifact
+from pipelines.workflow.graph import SWEEP
 
 LARGEST_BYTES = 5_000_000
 """Of a page."""

@@ -12,8 +12,6 @@ from pipelines.contracts import verdict as verdicts
 from pipelines.contracts.provenance import sha256
 from pipelines.errors import ContractError, InputError
 
-SWEEP = "kv-sweep.csv"
-"""A table of a loop's, beside it, that has no metadata."""
 DOCUMENTS = ("verdict/1", "detectability/1")
 OURS = re.compile(r'"contract"\s*:\s*"(?:verdict|detectability)/')
 """What a damaged document of exoid's still says of itself."""

@@ -135,11 +135,13 @@ async def _connect(probes: Sequence[Probe]) -> dict[Line, DeviceError]:
     """Open all lines at once, as each may take its time to fail; return why those are not there that are not."""
     lines = list({probe.part.device.line: None for probe in probes})
     ended = await asyncio.gather(*(line.connect() for line in lines), return_exceptions=True)
-    lost = {line: error for line, error in zip(lines, ended, strict=True) if isinstance(error, BaseException)}
-    for error in lost.values():
-        if not isinstance(error, DeviceError):
+    lost = {}
+    for line, error in zip(lines, ended, strict=True):
+        if isinstance(error, DeviceError):
+            lost[line] = error
+        elif error is not None:
             raise error
-    return {line: error for line, error in lost.items() if isinstance(error, DeviceError)}
+    return lost
 
 
 async def _meet(probe: Probe, report: DeviceReport) -> None:
