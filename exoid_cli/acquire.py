@@ -90,6 +90,7 @@ def _record(
     reset_faults: bool,
 ) -> None:
     from pipelines.acquisition.acquire import acquire as record
+    from pipelines.acquisition.somebody import unnoticed
     from pipelines.workflow.imported import refuse_imported
     from pipelines.workflow.kept import refuse_recorded
 
@@ -103,8 +104,8 @@ def _record(
 
         def begin(rig: "RigSettings", motion: "Trajectory") -> None:
             if settings.run == "with_human" and not rig.embedded:
-                if not rig.sensor:
-                    console.warn("the rig file has no [[sensor]]: nobody watches how hard the cuffs press")
+                for warning in unnoticed(rig):
+                    console.warn(warning)
                 if not yes:
                     confirm(rig, settings, trajectory, motion, rate)
             reports.append(shown.enter_context(_watching(rig, run)))

@@ -185,8 +185,7 @@ class Loop:
         """Tell one drive where to go, from where it is."""
         drive, told = self.machine.drives[joint], self.supervisor.sent_at[joint]
         try:
-            if drive.latest is not None:  # it came beside what is awaited, perhaps, and nobody has judged it
-                self.supervisor.heed(joint, drive.latest)
+            self._heed(joint)
             if self.supervisor.is_stale(joint, time.monotonic()):
                 await self._find(joint)
             if self.supervisor.sent_at[joint] == told:
@@ -218,7 +217,14 @@ class Loop:
         asked = time.perf_counter()
         answers = await self.machine.cycle(reference, self._cycle)
         self._latencies.add(time.perf_counter() - asked)
+        for joint in range(len(self.machine.drives)):
+            self._heed(joint)
         return answers
+
+    def _heed(self, joint: int) -> None:
+        """Heed what a drive has told, though it came beside what is awaited, or ended the run, or was asked again."""
+        for condition in self.machine.drives[joint].conditions:
+            self.supervisor.heed(joint, condition)
 
     def _keep(self, row: Row) -> None:
         """Write a sample, and note those missed before it."""
@@ -295,8 +301,7 @@ class Loop:
                 await tending
             if drive.told_reference is not None:  # what was decided last may not have been sent
                 self.supervisor.begin_stop(joint, drive.told_reference)
-            if drive.latest is not None:  # it came beside what ended the run, perhaps, and nobody has judged it
-                self.supervisor.heed(joint, drive.latest)
+            self._heed(joint)
             while True:
                 # On the host's clock: the device's counter may be what has failed. What is late is not caught up
                 # with, so that set-points never come faster than samples.

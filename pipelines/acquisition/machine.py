@@ -46,8 +46,18 @@ MOST_LOOKS = 200
 Answer = TypeVar("Answer")
 
 
+@dataclass(frozen=True, kw_only=True)
+class Condition:
+    """What a drive's status word tells."""
+
+    enabled: bool | None = None
+    """Whether the drive says that it follows its set-point; None for one that does not say."""
+    fault: str | None = None
+    """The fault that it reports, in words; None for none."""
+
+
 @dataclass(frozen=True)
-class Reading:
+class Reading(Condition):
     """What a drive tells, SI units; NaN for what it does not."""
 
     sequence: int
@@ -58,10 +68,6 @@ class Reading:
     velocity: float
     temperature: float
     reference: float
-    enabled: bool | None = None
-    """Whether the drive says that it follows its set-point; None for one that does not say."""
-    fault: str | None = None
-    """The fault that it reports, in words; None for none."""
 
 
 class Drive:
@@ -92,8 +98,8 @@ class Drive:
         """The last set-point on its way to it, rad; None while it has been told nothing, and need not be disabled."""
         self.told_at = 0.0
         """When it answered the last one, host's clock, s: where others are on its line, that may be late."""
-        self.latest: Reading | None = None
-        """What it told last, though whoever asked may not have come to hear it."""
+        self.conditions: list[Condition] = []
+        """What it has told since it was told where to go, though whoever asked may not have come to hear it."""
 
     def _its_ring(self) -> Ring | Queue:
         settings = self.map.ring
@@ -140,6 +146,7 @@ class Drive:
         control = self.map.enable if self.map.halt is None or not halt else self.map.halt
         words = self.words(control, reference)
         self.told_reference = reference
+        self.conditions.clear()
         # Nobody knows which set-point a drive follows that did not answer.
         before, self._sent = self._sent, np.nan
         sent = time.perf_counter()
@@ -288,10 +295,12 @@ class Drive:
         return told
 
     def _reading(self, words: list[int], sent: float) -> Reading:
-        told = self._decoded(self.told, words)
-        status = int(told.get("status", 0))
+        values = self.told.decode(words)
+        # Heeded whatever else it tells that is no number.
+        self.conditions.append(condition := self._condition(values.get("status", 0.0)))
+        told = self._numbers(values)
         self._temperature = told.get("temperature", np.nan)
-        self.latest = Reading(
+        return Reading(
             sequence=self._newest(told["sequence"], sent),
             time=self._time(told["time"]),
             angle=told["angle"],
@@ -300,10 +309,15 @@ class Drive:
             velocity=told.get("velocity", np.nan),
             temperature=self._temperature,
             reference=told.get("reference", self._sent),
-            enabled=self._is_enabled(status) if self.map.enabled_mask else None,
-            fault=self._fault(status),
+            **vars(condition),
         )
-        return self.latest
+
+    def _condition(self, status: float) -> Condition:
+        """Return what a status word tells; of one that is no number nothing."""
+        if not np.isfinite(status):
+            return Condition()
+        enabled = self._is_enabled(int(status)) if self.map.enabled_mask else None
+        return Condition(enabled=enabled, fault=self._fault(int(status)))
 
     def _fault(self, status: int) -> str | None:
         """Return in words the fault that a status word tells; None where it tells none."""
@@ -400,8 +414,6 @@ class Answers:
     """(4, 3) N; NaN where a sensor was not read or had nothing new."""
     row: Row | None
     """The sample of the whole machine; None where a drive's is missing."""
-    earlier: tuple[tuple[int, Reading], ...] = ()
-    """What drives, by their number, told before they were asked again for the others' sample."""
 
 
 class Machine:
@@ -525,12 +537,12 @@ class Machine:
             told = await self._exchange(reference)
             forces = await self.felt(number)
         readings = [answer for answer in told if isinstance(answer, Reading)]
-        whole, earlier = len(readings) == len(told), list[tuple[int, Reading]]()
+        whole = len(readings) == len(told)
         if whole and self._latches:
-            whole = await self._latch(readings, earlier)
+            whole = await self._latch(readings)
             told = list(readings)
         row = Row(tuple(readings), forces, self.samples_per_cycle) if whole else None
-        return Answers(tuple(told), forces, row, tuple(earlier))
+        return Answers(tuple(told), forces, row)
 
     async def felt(self, number: int) -> NDArray:
         """Return the forces (4, 3) N of those sensors that are due in a cycle."""
@@ -548,8 +560,8 @@ class Machine:
         pairs = zip(self.drives, reference.tolist(), strict=True)
         return await answers_or_silence(drive.exchange(angle) for drive, angle in pairs)
 
-    async def _latch(self, readings: list[Reading], earlier: list[tuple[int, Reading]]) -> bool:
-        """Ask those drives again that have not latched the others' sample yet, in place of what they told ``earlier``.
+    async def _latch(self, readings: list[Reading]) -> bool:
+        """Ask those drives again that have not latched the others' sample yet.
 
         Returns whether all have latched it in the end; not, where one does not answer.
         """
@@ -565,7 +577,6 @@ class Machine:
             await asyncio.sleep(LAG_PAUSE_S)
             for j in late:
                 # Not told again: what is due by then is another set-point.
-                earlier.append((j, readings[j]))
                 try:
                     readings[j] = await self.drives[j].look(in_motion=True)
                 except Unanswered:

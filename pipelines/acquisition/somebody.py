@@ -6,6 +6,20 @@ from pipelines.settings.rig import RigSettings
 LIMITS = ("speed_rad_s", "torque_nm")
 
 
+def unnoticed(rig: RigSettings) -> list[str]:
+    """Return in words what nobody would notice on a rig while it moves somebody."""
+    missing = [] if rig.sensor else ["the rig file has no [[sensor]]: nobody watches how hard the cuffs press"]
+    blind = [drive.joint for drive in rig.drive if not rig.map.drive[drive.map].enabled_mask]
+    if blind:
+        missing.append(
+            f"the rig file has no enabled_mask for the drive of {' and '.join(blind)}: an emergency stop that is "
+            "pressed and released is noticed only once the leg is safety.following_error_rad from its set-point "
+            f"({rig.safety.with_human.following_error_rad or rig.safety.following_error_rad:g} rad), and until then "
+            "the leg leaps back by as much on its release"
+        )
+    return missing
+
+
 def refuse_unguarded(rig: RigSettings, sample_rate_hz: float) -> None:
     """Refuse to move somebody by a rig as its file describes it, whose limits would be those of an empty machine.
 

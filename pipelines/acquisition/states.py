@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pipelines.acquisition.counter import RATE_TOLERANCE
 from pipelines.acquisition.cuffs import Cuffs
 from pipelines.acquisition.frozen import ANSWER_CYCLES, Told
-from pipelines.acquisition.machine import Answers, Reading, Row
+from pipelines.acquisition.machine import Answers, Condition, Reading, Row
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.safety import HOLD_SAMPLES, Limits, refuse_leap, slowed
 from pipelines.acquisition.stream import Stream
@@ -102,6 +102,8 @@ class Supervisor:
         """By how much the set-points are ahead of what the speed limits allow, s; never more than the slack."""
         self._enabled: list[bool | None] = [None for _ in rig.drive]
         """What each drive said last of being enabled."""
+        self._let_go = [False for _ in rig.drive]
+        """Which drives have told a fault, or that they were no longer enabled; by the next word they may be again."""
         self._start = self.sent
         self._first = self._found = 0
         self._found_at = 0.0
@@ -388,7 +390,8 @@ class Supervisor:
         One a sample; None as soon as it has been held for long enough, as holding on would go on pressing, or as the
         drive says that it is not enabled: it must not be told to enable with its leg anywhere.
         """
-        if self._held[joint] >= HOLD_SAMPLES or self.pressing or self._enabled[joint] is False:
+        let_go = self._let_go[joint] or self._enabled[joint] is False
+        if self._held[joint] >= HOLD_SAMPLES or self.pressing or let_go:
             return None
         base = self.base[joint]
         reference = self._slow(joint, now)
@@ -412,9 +415,9 @@ class Supervisor:
         self._note(one, np.array([reference]), now)
         return reference
 
-    def heed(self, joint: int, reading: Reading) -> None:
+    def heed(self, joint: int, condition: Condition) -> None:
         """Note what a drive says of being enabled; raise DeviceError where it no longer is."""
-        if why := self._heed_enabled(joint, reading):
+        if why := self._heed_enabled(joint, condition):
             raise DeviceError(why)
 
     def feel(self, joint: int, reading: Reading, late: int = 0) -> None:
@@ -480,16 +483,17 @@ class Supervisor:
         """Return the set-points (J,) rad of the path, whose first is where the leg stood."""
         return self._plan.reference[index - 1] if index else self._start
 
-    def _heed_enabled(self, joint: int, reading: Reading) -> str | None:
+    def _heed_enabled(self, joint: int, told: Condition) -> str | None:
         """Note what a drive says of being enabled; return why to stop where it no longer is, and was, or has a fault.
 
         A drive with a fault counts as not enabled: it may be again as soon as the fault is cleared.
         """
-        was, now = self._enabled[joint], reading.enabled and reading.fault is None
-        if reading.fault or now is not None:
-            self._enabled[joint] = bool(now)
-        if reading.fault or not was or now is not False:
-            return reading.fault
+        dropped = bool(self._enabled[joint]) and told.enabled is False
+        if told.enabled is not None:
+            self._enabled[joint] = told.enabled
+        self._let_go[joint] |= dropped or told.fault is not None
+        if told.fault or not dropped:
+            return told.fault
         return (
             f"drive {self.rig.drive[joint].joint}: its status word says that it is no longer enabled; was the "
             "emergency stop pressed?"
@@ -497,10 +501,7 @@ class Supervisor:
 
     def _dropped(self, told: Row | Answers) -> str | None:
         """Return why to stop where a drive is no longer enabled; note what each of them says."""
-        earlier = told.earlier if isinstance(told, Answers) else ()  # nothing that a drive says of it goes unheard
-        found = [
-            self._heed_enabled(j, one) for j, one in (*earlier, *enumerate(told.drives)) if isinstance(one, Reading)
-        ]
+        found = [self._heed_enabled(j, one) for j, one in enumerate(told.drives) if isinstance(one, Reading)]
         return next(filter(None, found), None)
 
     def _refuse_to_lag(self, due: NDArray, reference: NDArray) -> None:

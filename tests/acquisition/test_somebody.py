@@ -2,7 +2,7 @@
 
 import pytest
 
-from pipelines.acquisition.somebody import refuse_unguarded
+from pipelines.acquisition.somebody import refuse_unguarded, unnoticed
 from pipelines.errors import SettingsError
 from pipelines.settings import datasets
 from pipelines.settings.rig import load_rig
@@ -47,3 +47,10 @@ def test_a_cuff_that_is_hardly_ever_read_is_refused(lab):
         SettingsError, match=r"sensor\[0\]\.every: found 100, which is 0\.5 s at 200 Hz; expected a force"
     ):
         refuse_unguarded(lab(("every = 4", "every = 100")), 200.0)
+
+
+def test_a_drive_that_does_not_say_whether_it_is_enabled_is_warned_of(lab):
+    assert unnoticed(lab()) == []
+    (warning,) = unnoticed(lab(("enabled_mask = 0x006F", "enabled_mask = 0x0000"), ("enabled_value = 0x0027", "")))
+    assert "no enabled_mask for the drive of hip and knee" in warning
+    assert "0.1 rad" in warning

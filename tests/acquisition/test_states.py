@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.acquisition.machine import Answers, Reading, Row
+from pipelines.acquisition.machine import Answers, Condition, Reading, Row
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.states import TRANSITIONS, State, Supervisor
 from pipelines.errors import DeviceError, Unanswered
@@ -207,6 +207,17 @@ def test_a_drive_that_is_not_enabled_is_told_nothing_on_the_way_to_rest(supervis
     with pytest.raises(DeviceError, match="is no longer enabled"):
         supervisor._enabled = [True, True]
         supervisor.feel(0, told(0.0, 0.0, enabled=False))
+    assert supervisor.stop(0, 10.2) is None
+
+
+@pytest.mark.parametrize("word", [{"enabled": False}, {"enabled": True, "fault": "overheated"}])
+def test_a_drive_that_let_go_of_its_leg_is_told_nothing_though_it_says_that_it_is_enabled_again(supervisor, word):
+    supervisor.rest(10.0)
+    supervisor.begin(row(100), 10.0)
+    supervisor.heed(0, Condition(enabled=True))
+    with pytest.raises(DeviceError, match=r"is no longer enabled|overheated"):
+        supervisor.heed(0, Condition(**word))
+    supervisor.heed(0, Condition(enabled=True))
     assert supervisor.stop(0, 10.2) is None
 
 
