@@ -14,6 +14,8 @@ ALIKE = 0.5
 """Share of the variance that velocity and angle must have in common before their slope is judged."""
 OFF = 0.15
 """By so much the slope between both may be off 1: a filter in the drive, a late sample."""
+STRONGEST = {"torque": 1e3, "force": 1e5}
+"""N·m and N: the drives of legs, arms and robots deliver less at a joint; what is more is mostly in another unit."""
 GIVES_BACK = 0.2
 """Share of the mean magnitude of power that a drive may take out of a motion, on the whole."""
 
@@ -23,6 +25,7 @@ def look_at(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Fin
     for joint in settings.joint:
         yield from _still(columns, joint)
         yield from _velocity(columns, joint)
+        yield from _too_strong(columns, joint)
     yield from _power(columns, settings.joint)
     if len(settings.joint) > 1 and settings.geometry.thigh_length_m is None:
         why = "later stages take that of exoid.toml, or of the paper's leg"
@@ -38,6 +41,15 @@ def _still(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Fin
         name = joint.joint.column(quantity)
         if np.ptp(columns[name]) == 0.0:
             yield Finding(name, f"is {columns[name][0]:.6g} in every row", "nothing can be learnt from it")
+
+
+def _too_strong(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
+    quantity, unit = ("torque", "N·m") if joint.kind == "revolute" else ("force", "N")
+    name = joint.joint.column("torque")
+    reach = float(np.quantile(np.abs(columns[name]), 0.99))
+    if reach > STRONGEST[quantity]:
+        seen = f"reaches {reach:.4g} {unit}, and drives of legs, arms and robots at most some {STRONGEST[quantity]:g}"
+        yield Finding(name, seen, f"kept; check its unit (is it m{unit}?), scale, gear_ratio and torque constant")
 
 
 def _velocity(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:

@@ -29,7 +29,8 @@ UNITS: dict[str, Unit] = {
     "rpm": Unit("angular velocity", _TURN / 60.0),
     "m/s": Unit("velocity", 1.0), "cm/s": Unit("velocity", 1e-2), "mm/s": Unit("velocity", 1e-3),
     "in/s": Unit("velocity", _INCH),
-    "N·m": Unit("torque", 1.0), "mN·m": Unit("torque", 1e-3), "kgf·cm": Unit("torque", 0.01 * _KILOGRAM_FORCE),
+    "N·m": Unit("torque", 1.0), "mN·m": Unit("torque", 1e-3), "N·cm": Unit("torque", 1e-2),
+    "kN·m": Unit("torque", 1e3), "kgf·cm": Unit("torque", 0.01 * _KILOGRAM_FORCE),
     "lbf·in": Unit("torque", _INCH * _POUND_FORCE), "lbf·ft": Unit("torque", 12.0 * _INCH * _POUND_FORCE),
     "N": Unit("force", 1.0), "mN": Unit("force", 1e-3), "kN": Unit("force", 1e3), "kgf": Unit("force", _KILOGRAM_FORCE),
     "lbf": Unit("force", _POUND_FORCE),
@@ -41,11 +42,18 @@ UNITS: dict[str, Unit] = {
 }  # fmt: skip
 
 ALIASES = {
-    "sec": "s", "µs": "us", "μs": "us", "°": "deg", "degree": "deg", "degrees": "deg", "turn": "rev", "turns": "rev",
-    "count": "counts", "ticks": "counts", "rps": "rev/s", "RPM": "rpm", "1/min": "rpm", "°/s": "deg/s", "dps": "deg/s",
-    "Nm": "N·m", "N*m": "N·m", "N.m": "N·m", "N m": "N·m", "mNm": "mN·m", "mN*m": "mN·m", "kgf*cm": "kgf·cm",
-    "in-lb": "lbf·in", "ft-lb": "lbf·ft", "degC": "°C", "C": "°C", "degF": "°F", "‰": "permille",
-    "µm": "um", "μm": "um",
+    "sec": "s", "seconds": "s", "msec": "ms", "usec": "us", "µs": "us", "μs": "us", "°": "deg", "degree": "deg",
+    "degrees": "deg", "Grad": "deg", "radians": "rad", "turn": "rev", "turns": "rev", "count": "counts",
+    "cnt": "counts", "cts": "counts", "ticks": "counts", "inc": "counts", "Inkr": "counts", "Inkr.": "counts",
+    "Inkremente": "counts", "points": "counts", "counts/sec": "counts/s", "cnt/s": "counts/s", "ticks/s": "counts/s",
+    "inc/s": "counts/s", "Inkr/s": "counts/s", "Inkr./s": "counts/s", "rps": "rev/s", "U/s": "rev/s", "tr/s": "rev/s",
+    "RPM": "rpm", "1/min": "rpm", "min^-1": "rpm", "min-1": "rpm", "min⁻¹": "rpm", "U/min": "rpm", "tr/min": "rpm",
+    "rev/min": "rpm", "rad/sec": "rad/s", "radps": "rad/s", "°/s": "deg/s", "°/sec": "deg/s", "deg/sec": "deg/s",
+    "Grad/s": "deg/s", "dps": "deg/s", "mm/sec": "mm/s", "Nm": "N·m", "N*m": "N·m", "N.m": "N·m", "N m": "N·m",
+    "mNm": "mN·m", "mN*m": "mN·m", "mN.m": "mN·m", "Nmm": "mN·m", "Ncm": "N·cm", "kNm": "kN·m", "kgf*cm": "kgf·cm",
+    "in-lb": "lbf·in", "ft-lb": "lbf·ft", "amps": "A", "ampere": "A", "volts": "V", "volt": "V", "newton": "N",
+    "degC": "°C", "deg C": "°C", "Grad C": "°C", "C": "°C", "celsius": "°C", "degF": "°F", "pct": "%", "percent": "%",
+    "‰": "permille", "µm": "um", "μm": "um",
 }  # fmt: skip
 """Other ways to write them."""
 

@@ -239,6 +239,37 @@ def test_a_log_in_which_nothing_moves_gets_no_guess(pendulum, write_csv, capsys)
         ("tau_con1", "torque", "1", None),
         ("Motor Speed [1/min]", "velocity", "", "rpm"),
         ("q[1]", "angle", "1", None),
+        ("torque_mNm", "torque", "", "mN·m"),
+        ("Iq_mA", "current", "", "mA"),
+        ("I_q (mA)", "current", "", "mA"),
+        ("I_q", "current", "", None),
+        ("I_d [A]", "", "", None),
+        ("Lage Motor (Inkr.)", "angle", "", "counts"),
+        ("Drehzahl Motor [1/min]", "velocity", "", "rpm"),
+        ("n / (1/min)", "velocity", "", "rpm"),
+        ("Strom Hüfte [mA]", "current", "huefte", "mA"),
+        ("Motorstrom in A", "current", "", "A"),
+        ("Kniewinkel (°)", "angle", "knie", "deg"),
+        ("Drehzahlistwert_U/min", "velocity", "", "rpm"),
+        ("Sollwinkel [Grad]", "reference", "", "deg"),
+        ("Schleppfehler [Inkr]", "", "", None),
+        ("Zwischenkreisspannung [V]", "", "", None),
+        ("Kraft [N]", "force", "", "N"),
+        ("Weg [mm]", "angle", "", "mm"),
+        ("vitesse moteur (tr/min)", "velocity", "", "rpm"),
+        ("Couple_mesuré_N.m", "torque", "", "N·m"),
+        ("Courant [mA]", "current", "", "mA"),
+        ("hip_velocity_rad_s", "velocity", "hip", "rad/s"),
+        ("accel_rad_s2", "", "", None),
+        ("motor_torque_pct", "torque", "", "%"),
+        ("encoder_ticks", "angle", "", "counts"),
+        ("sys_ticks", "", "", None),
+        ("T_C", "temperature", "", "°C"),
+        ("theta_m", "angle", "", None),
+        ("q_min", "angle", "min", None),
+        ("speed_ms", "velocity", "ms", None),
+        ("current_position", "angle", "", None),
+        ("Current Position [deg]", "angle", "", "deg"),
     ],
 )
 def test_names_tell_quantity_joint_and_unit(name, quantity, joint, unit):
@@ -289,6 +320,109 @@ def test_joint_states_of_ros_are_guessed_too(imported, guessed, pendulum, bag):
     frame = outcome.recording("bag_train").frame
     assert_allclose(frame["pivot_torque_nm"], pendulum.torque[: len(frame)], atol=1e-12)
     assert_allclose(frame["time_s"], pendulum.time[: len(frame)], atol=1e-9)
+
+
+HEADERS = {
+    "deg_s": ("t_s", "angle_deg", "speed_deg/s", "torque_mNm"),
+    "German": ("Zeit [s]", "Lage Gelenk (Grad)", "Drehzahl [Grad/s]", "Moment [mNm]"),
+    "French": ("Temps (s)", "Position angulaire [°]", "Vitesse [°/s]", "Couple (mN.m)"),
+}
+
+
+@pytest.mark.parametrize("names", HEADERS.values(), ids=HEADERS)
+def test_a_unit_in_a_header_is_believed_and_imports_the_truth(imported, guessed, pendulum, write_csv, names):
+    factors = (1.0, 180.0 / np.pi, 180.0 / np.pi, 1e3)
+    columns = zip(names, factors, swinging(pendulum).values(), strict=True)
+    path = write_csv({name: factor * values for name, factor, values in columns})
+    text, doubts = guessed(path)
+    assert doubts.keys() == {"geometry.gravity_m_s2"}
+    (torque,) = (
+        values for name, values in imported(path, map_text=text).recording("log_train").frame.items()
+        if name.endswith("_torque_nm")
+    )  # fmt: skip
+    assert_allclose(torque, swinging(pendulum)["torque"][: len(torque)], rtol=1e-9, atol=1e-9)
+
+
+def test_a_drives_log_of_a_motor_before_its_gear_leads_to_the_joint(imported, guessed, pendulum, write_csv):
+    """Counts, revolutions and milliamperes of a motor: what its log cannot tell is asked for, the rest is right."""
+    columns = swinging(pendulum)
+    counts = np.round(columns["angle"] / (2.0 * np.pi) * 50 * 4096).astype(int)
+    path = write_csv(
+        {
+            "Zeit [ms]": np.round(1e3 * pendulum.time).astype(int),
+            "Lage Motor (Inkr.)": counts,
+            "Drehzahl Motor [1/min]": columns["velocity"] * 50 * 30.0 / np.pi,
+            "I_q (mA)": columns["torque"] / (0.08 * 50) * 1e3,
+        },
+        delimiter=";",
+        decimal=",",
+    )
+    text, doubts = guessed(path)
+    assert "by the velocity 4096 in a turn" in doubts["joint[0].angle.counts_per_turn"]
+    assert {f"joint[0].{what}.gear_ratio" for what in ("angle", "velocity", "torque")} <= doubts.keys()
+    assert "joint[0].torque.unit" not in doubts
+    filled = text.replace("# counts_per_turn =", "counts_per_turn = 4096 #").replace(
+        "gear_ratio = 1.0", "gear_ratio = 50"
+    )
+    outcome = imported(path, map_text=filled.replace("# torque_constant_nm_a =", "torque_constant_nm_a = 0.08 #"))
+    assert (outcome.code, outcome.err) == (0, "")
+    frame = outcome.recording("log_train").frame
+    assert_allclose(frame["joint_torque_nm"], columns["torque"][: len(frame)], atol=1e-9)
+    assert_allclose(frame["joint_angle_rad"], columns["angle"][: len(frame)], atol=1e-4)
+    assert "integrates to" not in outcome.told
+
+
+def test_a_current_without_a_unit_is_doubtful_for_the_reason_that_is_given(guessed, pendulum, write_csv):
+    columns = swinging(pendulum)
+    torque = columns.pop("torque")
+    whole = guessed(write_csv(columns | {"motor current": np.round(100.0 * torque)}))
+    (write_csv(columns).parent / "guess.toml").unlink()
+    broken = guessed(write_csv(columns | {"motor current": torque}))
+    assert [tomllib.loads(text)["joint"][0]["torque"]["unit"] for text, _ in (whole, broken)] == ["mA", "A"]
+    assert "whole numbers, as drives tell mA" in whole[1]["joint[0].torque.unit"]
+    assert "no name says its unit" in broken[1]["joint[0].torque.unit"]
+
+
+def test_a_torque_that_no_joints_drive_delivers_is_doubted_by_the_guess_and_told_by_the_import(
+    imported, guessed, pendulum, write_csv
+):
+    columns = swinging(pendulum)
+    columns["Torque (Nm)"] = 1e4 * columns.pop("torque")
+    path = write_csv(columns)
+    text, doubts = guessed(path)
+    assert re.search(r"no joint's drive delivers \d+(\.\d+)?e\+04 N·m: is it mN·m\?", doubts["joint[0].torque.unit"])
+    told = imported(path, map_text=text).told
+    assert "N·m, and drives of legs, arms and robots at most some 1000; kept; check its unit (is it mN·m?)" in told
+    right = imported(path, map_text=text.replace('unit = "N·m"', 'unit = "mN·m"'))
+    assert "drives of legs" not in right.told
+
+
+def test_an_angle_that_no_joint_reaches_is_doubted_whatever_its_name_says(guessed, pendulum, write_csv):
+    columns = swinging(pendulum)
+    columns["angle_rad"] = np.degrees(columns.pop("angle"))
+    _, doubts = guessed(write_csv(columns))
+    assert "no joint does: check its unit and gear_ratio" in doubts["joint[0].angle.unit"]
+
+
+def test_a_share_of_what_a_drive_can_asks_for_what_that_is(imported, guessed, pendulum, write_csv):
+    columns = swinging(pendulum)
+    columns["Moment [%]"] = 100.0 * columns.pop("torque") / 4.0
+    path = write_csv(columns)
+    text, doubts = guessed(path)
+    assert "what 100 % are" in doubts["joint[0].torque.rated_torque_nm"]
+    frame = (
+        imported(path, map_text=text.replace("# rated_torque_nm =", "rated_torque_nm = 4.0 #"))
+        .recording("log_train")
+        .frame
+    )
+    assert_allclose(frame["joint_torque_nm"], swinging(pendulum)["torque"][: len(frame)], atol=1e-9)
+
+
+def test_a_force_on_a_joint_that_turns_asks_for_another_column(guessed, pendulum, write_csv):
+    columns = swinging(pendulum)
+    columns["Kraft [N]"] = columns.pop("torque")
+    _, doubts = guessed(write_csv(columns))
+    assert "N are of a force" in doubts["joint[0].torque.unit"]
 
 
 @pytest.mark.parametrize(("unit", "turn"), [("deg", 360.0), ("rad", 2.0 * np.pi), ("rev", 1.0)])

@@ -7,13 +7,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.contracts.checks import LARGEST_ANGLE_RAD
 from pipelines.contracts.joints import Kind
 from pipelines.importing.counter import full_at, signed, unwrapped
-from pipelines.importing.guess.joints import DRIVES, JointColumns
-from pipelines.importing.guess.motion import TURNS, Units, guess_units
+from pipelines.importing.guess.joints import JointColumns
+from pipelines.importing.guess.motion import TURNS, Units, counts_in_a_turn, guess_units
 from pipelines.importing.guess.proposal import Proposal
-from pipelines.importing.guess.register import lost_sign
+from pipelines.importing.guess.register import are_whole, lost_sign
 from pipelines.importing.guess.torque import TorqueFit, fit_torque
+from pipelines.importing.plausible import STRONGEST
 from pipelines.importing.sources.source import Columns
 from pipelines.settings.units import UNITS
 
@@ -67,15 +69,19 @@ def write_joint(
         proposal.key("enabled", joint.enabled, _when_off(columns[joint.enabled]))
     fit = None
     if units.angle in TURNS:
-        drive = next((quantity for quantity in DRIVES if quantity in logged), None)
         angle_rad = logged["angle"] * UNITS[units.angle].factor
-        fit = fit_torque(time_s, angle_rad, logged[drive]) if drive else None
-    used = [_write_angle(proposal, where, joint, units, bits["angle"], fit if alone else None)]
+        fit = fit_torque(time_s, angle_rad, logged[joint.drive]) if joint.drive else None
+    of_a_motor = _write_angle(proposal, where, joint, units, logged, time_s)
+    if bits["angle"]:
+        why = f"whole numbers up to 2^{bits['angle']}, none in the middle: its sign was lost"
+        proposal.key("signed_bits", bits["angle"], why)
+    _write_zero(proposal, fit if alone else None, units)
+    used = [angle.column]
     if full is not None:
         proposal.key("wraps_at", full, "steps by so much from one row to the next: its counter was full")
     if velocity is not None:
-        used.append(_write_velocity(proposal, where, joint, units))
-    used.append(_write_torque(proposal, where, joint, kind, bits, fit if alone else None, constants))
+        used.append(_write_velocity(proposal, where, joint, units, of_a_motor))
+    used.append(_write_torque(proposal, where, joint, kind, bits, logged, fit if alone else None, constants))
     used += _write_others(proposal, where, joint, units)
     return [*used, joint.enabled] if joint.enabled else used
 
@@ -86,13 +92,18 @@ def _if_it_slides(joint: JointColumns, units: Units) -> str:
         return "no unit of length; prismatic where it slides"
     metric = {"angle": "m", "velocity": "m/s", "reference": "m"}
     keys = [f'{quantity}.unit = "{unit}"' for quantity, unit in metric.items() if quantity in joint.columns]
-    drive = next((quantity for quantity in DRIVES if quantity in joint.columns), None)
     named = {
         "torque": 'torque.unit = "N"',
+        "force": 'torque.unit = "N"',
         "current": "force_constant_n_a in place of torque_constant_nm_a",
         "voltage": "gain_n_v in place of gain_nm_v",
     }
-    changed = ['kind = "prismatic"', *keys, *([named[drive]] if drive else []), "gravity_m_s2 = 0 if it lies level"]
+    changed = [
+        'kind = "prismatic"',
+        *keys,
+        *([named[joint.drive]] if joint.drive else []),
+        "gravity_m_s2 = 0 if it lies level",
+    ]
     return f"no unit of length; where it slides and the log is in metres: {', '.join(changed)}"
 
 
@@ -103,18 +114,28 @@ def _when_off(switch: NDArray) -> str:
 
 
 def _write_angle(
-    proposal: Proposal, where: str, joint: JointColumns, units: Units, bits: int | None, fit: TorqueFit | None
-) -> str:
-    column = joint.columns["angle"].column
+    proposal: Proposal, where: str, joint: JointColumns, units: Units, logged: Mapping[str, NDArray], time_s: NDArray
+) -> bool:
+    """Write an angle's table; return whether it may be that of a motor before its gear."""
     proposal.table("[joint.angle]", f"{where}.angle")
-    proposal.key("column", column, joint.why.get("angle", ""), "no name" not in joint.why.get("angle", ""))
-    proposal.key("unit", units.angle, units.why, units.sure)
+    why = joint.why.get("angle", "")
+    proposal.key("column", joint.columns["angle"].column, why, "no name" not in why)
+    turns = np.ptp(logged["angle"][np.isfinite(logged["angle"])]) / TURNS.get(units.angle, np.inf)
+    far = f"it goes over {turns:.4g} turns, and no joint does: check its unit and gear_ratio"
+    too_far = 2.0 * np.pi * turns > 2.0 * LARGEST_ANGLE_RAD
+    proposal.key("unit", units.angle, f"{units.why}; {far}" if too_far else units.why, units.sure and not too_far)
     if units.angle == "counts":
-        proposal.unknown("counts_per_turn", "counts in a turn of the joint, from the encoder's data sheet")
-    if bits:
-        proposal.key("signed_bits", bits, f"whole numbers up to 2^{bits}, none in the middle: its sign was lost")
-    _write_zero(proposal, fit, units)
-    return column
+        of = units.velocity and counts_in_a_turn(time_s, logged["angle"], logged["velocity"], units.velocity)
+        hint = f"; by the velocity {of:.4g} in a turn of what that is of" if of else ""
+        proposal.unknown("counts_per_turn", f"counts in a turn of what the encoder sits on, from its data sheet{hint}")
+    of_a_motor = units.angle == "counts" or too_far
+    if of_a_motor:
+        _write_gear(proposal, "where the encoder sits on the motor")
+    return of_a_motor
+
+
+def _write_gear(proposal: Proposal, where: str = "from its data sheet") -> None:
+    proposal.key("gear_ratio", 1.0, f"turns of the motor for one of the joint, {where}", sure=False)
 
 
 def _write_zero(proposal: Proposal, fit: TorqueFit | None, units: Units) -> None:
@@ -131,13 +152,15 @@ def _write_zero(proposal: Proposal, fit: TorqueFit | None, units: Units) -> None
         )
 
 
-def _write_velocity(proposal: Proposal, where: str, joint: JointColumns, units: Units) -> str:
+def _write_velocity(proposal: Proposal, where: str, joint: JointColumns, units: Units, of_a_motor: bool) -> str:
     column = joint.columns["velocity"].column
     proposal.table("[joint.velocity]", f"{where}.velocity")
     proposal.key("column", column, joint.why.get("velocity", ""), "no name" not in joint.why.get("velocity", ""))
     proposal.key("unit", units.velocity, units.velocity_why, units.velocity_sure)
     if units.velocity_sign < 0:
         proposal.key("sign", -1, "it counts the other way than the angle", sure=False)
+    if of_a_motor:
+        _write_gear(proposal, "where it is the motor's")
     return column
 
 
@@ -147,10 +170,11 @@ def _write_torque(
     joint: JointColumns,
     kind: Kind,
     bits: Mapping[str, int | None],
+    logged: Mapping[str, NDArray],
     fit: TorqueFit | None,
     constants: Mapping[str, float],
 ) -> str:
-    drive = next((quantity for quantity in DRIVES if quantity in joint.columns), None)
+    drive = joint.drive
     proposal.table("[joint.torque]", f"{where}.torque")
     if drive is None:
         proposal.unknown("column", "no column's name says torque, current or voltage")
@@ -163,7 +187,8 @@ def _write_torque(
     )
     if bits[drive]:
         proposal.key("signed_bits", bits[drive], f"whole numbers up to 2^{bits[drive]}: its sign was lost")
-    _write_torque_unit(proposal, drive, found.unit, kind, bits[drive] is not None, constants)
+    whole = are_whole(logged[drive]) if drive == "current" else bits[drive] is not None
+    _write_torque_unit(proposal, drive, found.unit, kind, logged[drive], whole, constants)
     _write_torque_sign(proposal, fit)
     return found.column
 
@@ -175,21 +200,55 @@ def _what_torque(commanded: bool, rather: str) -> str:
 
 
 def _write_torque_unit(
-    proposal: Proposal, drive: str, named: str | None, kind: Kind, whole: bool, constants: Mapping[str, float]
+    proposal: Proposal,
+    drive: str,
+    named: str | None,
+    kind: Kind,
+    values: NDArray,
+    whole: bool,
+    constants: Mapping[str, float],
 ) -> None:
     dimension = UNITS[named].dimension if named else ""
-    if drive == "voltage":
-        proposal.key("unit", named if dimension == "voltage" else "V", "a voltage, by its name", dimension == "voltage")
-        proposal.unknown("gain_n_v" if kind == "prismatic" else "gain_nm_v", _what_a_volt_does(kind, constants))
-    elif drive == "current" or dimension == "current" or whole:
-        why = "its name says so" if dimension == "current" else "whole numbers, as drives tell mA"
-        proposal.key("unit", named if dimension == "current" else "mA" if whole else "A", why, dimension == "current")
-        proposal.unknown("torque_constant_nm_a", "of the motor, from its data sheet")
-        proposal.key("gear_ratio", 1.0, "turns of the motor for one of the joint, from its data sheet", sure=False)
-    elif dimension in ("torque", "force"):
+    if named and dimension == "share":
         proposal.key("unit", named, "its name says so")
+        proposal.unknown(
+            "rated_force_n" if kind == "prismatic" else "rated_torque_nm",
+            f"what {1.0 / UNITS[named].factor:g} {named} are, from the drive's settings",
+        )
+        _write_gear(proposal)
+    elif drive == "voltage":
+        proposal.key("unit", named or "V", "a voltage, by its name", named is not None)
+        proposal.unknown("gain_n_v" if kind == "prismatic" else "gain_nm_v", _what_a_volt_does(kind, constants))
+    elif dimension == "current" or (not named and (drive == "current" or whole)):
+        proposal.key("unit", *((named, "its name says so") if named else _unit_of_current(whole)))
+        proposal.unknown("torque_constant_nm_a", "of the motor, from its data sheet")
+        _write_gear(proposal)
+    elif dimension == "force" and kind == "revolute":
+        proposal.unknown("unit", f"{named} are of a force, and what turns a joint is a torque: is it another column?")
     else:
-        proposal.key("unit", "N·m" if kind == "revolute" else "N", "no name says its unit; SI assumed", sure=False)
+        proposal.key("unit", *_unit_of_torque(named, kind, values))
+        if dimension == "torque" and kind == "prismatic":
+            proposal.unknown("lead_m", "travel for a turn of the screw, from its data sheet")
+
+
+def _unit_of_current(whole: bool) -> tuple[str, str, bool]:
+    """Return the unit of a current whose name tells none, why, and that it is not sure."""
+    return (
+        ("mA", "whole numbers, as drives tell mA", False)
+        if whole
+        else ("A", "no name says its unit; SI assumed", False)
+    )
+
+
+def _unit_of_torque(named: str | None, kind: Kind, values: NDArray) -> tuple[str, str, bool]:
+    """Return the unit of a torque or force, why, and whether it is sure; doubt one in which no drive is so strong."""
+    quantity, unit = ("torque", "N·m") if kind == "revolute" else ("force", "N")
+    unit, why = (named, "its name says so") if named else (unit, "no name says its unit; SI assumed")
+    reach = float(np.nanquantile(np.abs(values), 0.99)) * UNITS[unit].factor
+    if reach <= STRONGEST[quantity]:
+        return unit, why, named is not None
+    si = "N·m" if quantity == "torque" else "N"
+    return unit, f"{why}, but no joint's drive delivers {reach:.4g} {si}: is it m{si}?", False
 
 
 def _what_a_volt_does(kind: Kind, constants: Mapping[str, float]) -> str:

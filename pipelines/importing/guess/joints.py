@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from pipelines.importing.consistency import integral_agreement
 from pipelines.importing.guess.names import Meaning
 from pipelines.importing.guess.torque import fit_torque
+from pipelines.settings.units import UNITS
 
-DRIVES = ("torque", "current", "voltage")
-"""What may tell of the torque, the best first."""
+TURNING, SLIDING = ("torque", "current", "force", "voltage"), ("force", "torque", "current", "voltage")
+"""What may tell what the drive of a joint delivers, the best first."""
 OBVIOUS = 0.9
 """Share of the variance by which a velocity is known whatever its name."""
 
@@ -26,6 +27,13 @@ class JointColumns:
     """Of what was not found by its name alone."""
     enabled: str | None = None
     """Column of 0 and 1 that says whether its drive is on."""
+
+    @property
+    def drive(self) -> str | None:
+        """The quantity that tells best what its drive delivers; None where none does."""
+        unit = self.columns["angle"].unit
+        slides = unit is not None and UNITS[unit].dimension == "length"
+        return next((quantity for quantity in (SLIDING if slides else TURNING) if quantity in self.columns), None)
 
 
 def group_joints(
@@ -74,13 +82,17 @@ def _switch(switches: Sequence[Meaning], joint: str, alone: bool) -> str | None:
 
 
 def _moves(values: NDArray, rows: int) -> bool:
-    return values.dtype.kind in "iuf" and len(values) == rows and bool(np.nanstd(values.astype(float)) > 0.0)
+    """Tell whether a column holds numbers that change, but do not merely count the rows."""
+    if values.dtype.kind not in "iuf" or len(values) != rows:
+        return False
+    known = values[np.isfinite(values)].astype(float)
+    return bool(len(known)) and bool(np.ptp(known) > 0.0) and not bool(np.all(np.diff(known) == 1.0))
 
 
 def _joint(key: str, members: Sequence[Meaning], number: int, joints: int) -> JointColumns:
     chosen: dict[str, Meaning] = {}
     why: dict[str, str] = {}
-    for quantity in ("angle", "velocity", "reference", "temperature", *DRIVES):
+    for quantity in ("angle", "velocity", "reference", "temperature", *TURNING):
         candidates = sorted((m for m in members if m.quantity == quantity), key=lambda m: m.rank)
         if not candidates:
             continue
@@ -100,6 +112,8 @@ def _by_behaviour(usable: Sequence[Meaning], columns: Mapping[str, NDArray], tim
         for angle in usable
         for velocity in usable
         if angle is not velocity
+        and not angle.quantity
+        and velocity.quantity in ("", "velocity")
         and (agreement := integral_agreement(time_s, _float(columns, angle), _float(columns, velocity))) is not None
         and agreement.slope > 0.0
     ]
@@ -107,22 +121,27 @@ def _by_behaviour(usable: Sequence[Meaning], columns: Mapping[str, NDArray], tim
     if best is None or best[0] < OBVIOUS:
         return []
     share, angle, velocity = best
-    found = {"angle": angle, "velocity": velocity}
+    rest = [m for m in usable if m not in (angle, velocity)]
+    found = _joint("", [m for m in rest if m.quantity not in ("", "velocity")], 1, 1)
     why = {
         "angle": f"no name says so, but {velocity.column} integrates to it ({share:.0%} of its variance)",
         "velocity": f"no name says so, but it integrates to {angle.column}",
     }
-    fits = [
-        (fit.explained, m)
-        for m in usable
-        if m not in (angle, velocity)
-        and (fit := fit_torque(time_s, _float(columns, angle), _float(columns, m))) is not None
-    ]
-    if fits:
-        share, torque = max(fits, key=lambda one: one[0])
-        found["torque"] = torque
-        why["torque"] = f"no name says so, but it follows the motion best ({share:.0%} of its variance)"
-    return [JointColumns("joint", found, why)]
+    joint = replace(found, columns={**found.columns, "angle": angle, "velocity": velocity}, why={**found.why, **why})
+    return [joint if joint.drive else _with_a_torque(joint, [m for m in rest if not m.quantity], columns, time_s)]
+
+
+def _with_a_torque(
+    joint: JointColumns, nameless: Sequence[Meaning], columns: Mapping[str, NDArray], time_s: NDArray
+) -> JointColumns:
+    """Return a joint with the column for its torque that follows the motion best, where one does at all."""
+    angle = _float(columns, joint.columns["angle"])
+    fits = [(fit.explained, m) for m in nameless if (fit := fit_torque(time_s, angle, _float(columns, m))) is not None]
+    if not fits:
+        return joint
+    share, torque = max(fits, key=lambda one: one[0])
+    why = f"no name says so, but it follows the motion best ({share:.0%} of its variance)"
+    return replace(joint, columns={**joint.columns, "torque": torque}, why={**joint.why, "torque": why})
 
 
 def _float(columns: Mapping[str, NDArray], meaning: Meaning) -> NDArray:

@@ -16,13 +16,12 @@ MANY = 100.0
 """So many counts are no degrees."""
 CLEAR = 0.7
 """Share of the variance that has to be in common for a slope to count."""
-VELOCITY_OF = {"rad": "rad/s", "deg": "deg/s", "rev": "rev/s", "m": "m/s", "mm": "mm/s", "counts": "counts/s"}
-PAIRS = [
-    (angle, velocity)
-    for angle in ("rad", "deg", "rev", "m", "mm")
-    for velocity in ("rad/s", "deg/s", "rpm", "rev/s", "m/s", "mm/s")
-    if (UNITS[angle].dimension == "angle") == (UNITS[velocity].dimension == "angular velocity")
-]
+VELOCITY_OF = {
+    "rad": "rad/s", "mrad": "mrad/s", "deg": "deg/s", "rev": "rev/s", "m": "m/s", "cm": "cm/s", "mm": "mm/s",
+    "um": "mm/s", "in": "in/s", "counts": "counts/s",
+}  # fmt: skip
+ANGLES, VELOCITIES = ("rad", "deg", "rev", "m", "mm"), ("rad/s", "deg/s", "rpm", "rev/s", "m/s", "mm/s")
+"""Units that a log may be in without saying so."""
 TURNS = {"rad": 2.0 * np.pi, "deg": 360.0, "rev": 1.0}
 """A full turn in each unit."""
 
@@ -53,26 +52,31 @@ def guess_units(
         doubt = f"does not integrate to the angle ({share:.0%} of its variance): is it of this joint?"
         return Units(unit, why, sure, velocity_named or VELOCITY_OF[unit], doubt, False)
     if unit == "counts":
-        return Units(unit, why, sure, *_velocity_of_counts(velocity_named))
+        return Units(unit, why, sure, *_velocity_of_counts(velocity_named, agreement.slope))
     return _from_slope(agreement, unit, why, sure, velocity_named)
 
 
-def _velocity_of_counts(named: str | None) -> tuple[str, str, bool]:
-    why = (
-        "its name says so"
-        if named
-        else "the angle is in counts; in what the velocity is, their slope alone does not say"
-    )
-    return named or "counts/s", why, named is not None
+def _velocity_of_counts(named: str | None, slope: float) -> tuple[str, str, bool, int]:
+    sign = int(np.sign(slope))
+    if named:
+        return named, "its name says so", True, sign
+    if abs(abs(slope) - 1.0) < NEAR:
+        return "counts/s", f"integrates to {slope:.4g} of the angle", True, sign
+    why = "the angle is in counts; in what the velocity is, their slope alone does not say"
+    return "counts/s", why, False, sign
 
 
 def _from_slope(agreement: Agreement, unit: str, why: str, sure: bool, velocity_named: str | None) -> Units:
     """Return the pair of units that explains how much velocity integrates to a unit of angle."""
     slope, sign = abs(agreement.slope), int(np.sign(agreement.slope))
     said = f"integrates to {agreement.slope:.4g} of the angle ({agreement.explained:.0%} of its variance)"
-    fitting = [pair for pair in PAIRS if abs(slope * UNITS[pair[1]].factor / UNITS[pair[0]].factor - 1.0) < NEAR]
-    if velocity_named:
-        fitting = [pair for pair in fitting if pair[1] == velocity_named]
+    fitting = [
+        (one, other)
+        for one in dict.fromkeys((*ANGLES, unit))
+        for other in ([velocity_named] if velocity_named else VELOCITIES)
+        if (UNITS[one].dimension == "angle") == (UNITS[other].dimension == "angular velocity")
+        and abs(slope * UNITS[other].factor / UNITS[one].factor - 1.0) < NEAR
+    ]
     same = [pair for pair in fitting if pair[0] == unit]
     if same:
         return Units(unit, why, sure, same[0][1], said, True, sign)
@@ -82,8 +86,18 @@ def _from_slope(agreement: Agreement, unit: str, why: str, sure: bool, velocity_
     return Units(unit, why, sure, velocity_named or VELOCITY_OF[unit], f"{said}, which no units explain", False, sign)
 
 
+def counts_in_a_turn(time_s: NDArray, angle: NDArray, velocity: NDArray, velocity_unit: str) -> float | None:
+    """Return the counts in a turn of what the velocity is of, an angle (n,) being in counts; None where none says."""
+    if UNITS[velocity_unit].dimension != "angular velocity":
+        return None
+    agreement = integral_agreement(time_s, angle, velocity)
+    if agreement is None or agreement.explained < CLEAR:
+        return None
+    return 2.0 * np.pi / abs(agreement.slope * UNITS[velocity_unit].factor)
+
+
 def _angle_unit(angle: NDArray, named: str | None) -> tuple[str, str, bool]:
-    if named is not None and UNITS[named].dimension in ("angle", "length", "counts"):
+    if named is not None:
         return named, "its name says so", True
     known = angle[np.isfinite(angle)]
     reach = float(np.max(np.abs(known)))

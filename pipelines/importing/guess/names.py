@@ -1,10 +1,12 @@
 """What the name of a column says: its quantity, its joint, its unit, and whether it was measured."""
 
 import re
+import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from pipelines.settings.units import ALIASES, UNITS
+from pipelines.importing.guess.unit_in_name import QUANTITIES, UnitInName, unit_in
+from pipelines.settings.units import UNITS
 
 
 def _words(text: str) -> frozenset[str]:
@@ -14,32 +16,54 @@ def _words(text: str) -> frozenset[str]:
 WORDS: dict[str, frozenset[str]] = {
     quantity: _words(words)
     for quantity, words in {
-        "time": "time t stamp timestamp timestamps clock zeit",
-        "velocity": "vel velocity speed omega dq qd qdot dtheta thetadot rpm",
-        "torque": "tau torque trq tq effort moment force load",
-        "current": "cur current amp amps iq",
-        "voltage": "volt volts voltage vir u",
-        "temperature": "temp temperature",
-        "acceleration": "acc accel acceleration ddq qdd",
-        "angle": "pos position angle ang theta th q qm phi enc encoder winkel",
+        "time": "time t stamp timestamp timestamps clock zeit zeitstempel temps horodatage",
+        "acceleration": "acc accel acceleration ddq qdd beschleunigung",
+        "velocity": "vel velocity speed omega dq qd qdot dtheta thetadot drehzahl geschwindigkeit vitesse",
+        "torque": "tau torque trq tq effort moment drehmoment couple",
+        "temperature": "temp temperature temperatur",
+        "current": "cur current amp iq isq i strom courant intensite",
+        "voltage": "vir u voltage spannung",
+        "angle": (
+            "pos position angle ang theta th q qm phi enc encoder winkel drehwinkel lage stellung geber weg hub "
+            "displacement travel stroke codeur course"
+        ),
+        "force": "force load kraft last",
     }.items()
 }
-"""Words for each quantity."""
-COMMANDED = _words("ref reference goal des desired cmd command commanded con target set setpoint sp qg soll")
-FILTERED = _words("filt filtered lp smooth smoothed")
-MEASURED = _words("meas measured act actual msr fb feedback ist")
+"""Words for each quantity, English, German and French; the first that has one of a name's is meant."""
+COMMANDED = _words(
+    "ref reference goal des desired cmd command commanded con target set setpoint sp qg soll sollwert consigne"
+)
+FILTERED = _words("filt filtered lp smooth smoothed gefiltert filtre")
+MEASURED = _words("meas measured act actual msr fb feedback ist istwert mesure mesuree reel reelle")
 ENABLED = _words("enable enabled servoon")
 """Words of a switch of the drive; ``servo_on`` and the like are two."""
 SWITCHED = _words("servo drive motor torque power")
-SOMETHING_ELSE = _words("cell fric friction error err count number status state mode id flag")
+SOMETHING_ELSE = _words(
+    "cell fric friction error err count number status state mode id isd ia ib ic iu iv iw flag bus supply battery "
+    "fehler schleppfehler schleppabstand abweichung nummer zustand modus zwischenkreis batterie versorgung "
+    "ecart erreur etat"
+)
 """Words that make of a torque or a position something else."""
-NOISE = _words("joint joints axis motor drive epos j m data value values log state states")
+NOISE = _words(
+    "joint joints axis motor drive epos j m data value values log state states of in raw abs absolute wrapped "
+    "gelenk achse antrieb abtrieb wert mot moteur axe articulation de du la le en"
+)
 """Words that tell nothing of which joint it is."""
-UNIT_WORDS = {
-    "rad": "rad", "deg": "deg", "rpm": "rpm", "ms": "ms", "us": "us", "ns": "ns", "nm": "N·m", "mnm": "mN·m",
-    "ma": "mA", "amps": "A", "volts": "V", "mm": "mm", "rev": "rev", "counts": "counts", "sec": "s", "seconds": "s",
-}  # fmt: skip
-"""Units as they stand in names without brackets."""
+SLIDES = _words("position displacement travel stroke weg hub course")
+"""Words of what may be in metres; the m of ``theta_m`` is a motor's."""
+UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"})
+SYMBOLS = _words("q qm th phi")
+"""Of an angle, but also of an axis of a motor's current, ``i_q``."""
+SIGNS = _words("n v w s f")
+"""Formula signs, which are no joint's name where a unit says what they stand for: ``n (1/min)``."""
+DIMENSIONS = {
+    **{quantity: {dimension for dimension, of in QUANTITIES.items() if of == quantity} for quantity in WORDS},
+    "reference": {"angle", "length", "counts"},
+    "torque": {"torque", "force", "current", "voltage", "share"},
+}
+"""Dimensions of the units that each quantity may be told in."""
+KNOWN = frozenset().union(*WORDS.values(), COMMANDED, FILTERED, MEASURED, NOISE, SOMETHING_ELSE)
 
 
 @dataclass(frozen=True)
@@ -69,32 +93,69 @@ def meanings(names: Iterable[str]) -> list[Meaning]:
 
 def meaning(name: str) -> Meaning:
     """Return what a name says."""
-    plain, unit = _unit(name)
-    words = [word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+", plain)]
-    unit = (
-        unit
-        or ("deg" if "°" in plain else None)
-        or next((UNIT_WORDS[word] for word in reversed(words) if word in UNIT_WORDS), None)
-    )
-    commanded = any(word in COMMANDED for word in words)
-    quantity = next((quantity for quantity, known in WORDS.items() if known & set(words)), "")
-    if set(words) & SOMETHING_ELSE:
+    told = unit_in(name)
+    words = _split(told.rest if told else name)
+    quantity = _quantity(set(words))
+    if told is not None and not (told.decides or _confirms(told, quantity, set(words))):
+        told, words = None, _split(name)
+        quantity = _quantity(set(words))
+    said = set(words)
+    if told is not None:
+        quantity = told.quantity or (quantity if told.unit else "")
+        words = [word for word in words if word not in SIGNS]
+    commanded = bool(said & COMMANDED)
+    if said & SOMETHING_ELSE or {"i", "d"} <= said:
         quantity = ""
-    elif set(words) & ENABLED or ("on" in words and set(words) & SWITCHED):
+    elif said & ENABLED or ("on" in said and said & SWITCHED):
         quantity, words = "enabled", [word for word in words if word not in ENABLED | SWITCHED | {"on"}]
     elif commanded and quantity in ("angle", ""):
         quantity = "reference"
-    known = set().union(*WORDS.values()) | COMMANDED | FILTERED | MEASURED | NOISE | set(UNIT_WORDS) | {"s"}
-    joint = "_".join(word for word in words if word not in known)
-    return Meaning(
-        name, quantity, joint, unit, commanded, bool(set(words) & FILTERED), bool(set(words) & MEASURED)
-    )  # fmt: skip
+    unit = told.unit if told and told.unit and UNITS[told.unit].dimension in DIMENSIONS.get(quantity, ()) else None
+    joint = "_".join(word for word in words if word not in KNOWN)
+    return Meaning(name, quantity, joint, unit, commanded, bool(said & FILTERED), bool(said & MEASURED))
 
 
-def _unit(name: str) -> tuple[str, str | None]:
-    """Return a name without the unit in brackets at its end, and that unit where it is one."""
-    found = re.fullmatch(r"(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]\s*", name)
-    if found is None or found[2].isdigit():
-        return name, None
-    unit = ALIASES.get(found[2].strip(), found[2].strip())
-    return found[1], unit if unit in UNITS else None
+def _quantity(words: set[str]) -> str:
+    """Return what words say, empty where they say nothing."""
+    found = [quantity for quantity, known in WORDS.items() if known & words]
+    if not found:
+        return ""
+    # The current position is where it is now.
+    proper = [quantity for quantity in found if WORDS[quantity] & words - SYMBOLS - {"current"}]
+    return proper[0] if "current" in words and proper else found[0]
+
+
+def _confirms(told: UnitInName, quantity: str, words: set[str]) -> bool:
+    """Tell whether a letter or a word that may be a unit fits what the other words say."""
+    if told.unit == "m":
+        return bool(words & SLIDES)
+    if told.quantity == "temperature":
+        return quantity == "temperature" or "t" in words
+    if told.quantity == "time":
+        return quantity == "time" or (not quantity and told.unit != "s")
+    if not told.quantity:
+        return quantity in ("torque", "current")
+    if told.quantity == "force" and "f" in words:
+        return True
+    return told.quantity == ("angle" if words & COMMANDED and not quantity else quantity)
+
+
+def _split(name: str) -> list[str]:
+    """Return the words of a name in plain small letters, compounds like Motordrehzahl apart."""
+    plain = name.translate(UMLAUTS)
+    plain = "".join(letter for letter in unicodedata.normalize("NFKD", plain) if not unicodedata.combining(letter))
+    words = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+", plain)
+    return [part for word in words for part in _apart(word.lower())]
+
+
+def _apart(word: str) -> list[str]:
+    """Return the parts of a compound whose last is known, and whose first is or leaves no doubt about the last."""
+    if word in KNOWN or len(word) < 6:
+        return [word]
+    if word.endswith("s") and word[:-1] in KNOWN:
+        return [word[:-1]]
+    for cut in range(2, len(word) - 2):
+        head, tail = word[:cut], word[cut:]
+        if tail in KNOWN and (len(tail) >= 5 or head in KNOWN):
+            return [*_apart(head), tail]
+    return [word]

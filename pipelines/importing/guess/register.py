@@ -7,8 +7,9 @@ FEW = 0.001
 """Share of rows in the upper half of a register that make it a signed one; a single one may be a slip."""
 
 
-def are_whole(known: NDArray) -> bool:
+def are_whole(values: NDArray) -> bool:
     """Tell whether values (n,) are whole numbers, but for a slip here and there."""
+    known = values[np.isfinite(values)]
     return bool(len(known)) and bool(np.mean(known == np.round(known)) > 0.99)
 
 
