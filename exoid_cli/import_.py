@@ -66,17 +66,19 @@ def _propose(files: list[Path], place: Path | None) -> None:
 def _import(files: list[Path], map_: Path, output: Path) -> None:
     from pipelines.contracts.atomic import all_or_none, open_folder
     from pipelines.importing.recordings import recordings, refuse_to_overwrite
+    from pipelines.importing.turns import Beginnings
     from pipelines.settings.import_map import load_map
 
     settings = load_map(map_)
     open_folder(output)
     sources: dict[Path, Path] = {}
+    before = Beginnings()
     told: list[dict[str, Any]] = []
     with all_or_none(output) as folder:
         for file in files:
             made: list[dict[str, Any]] = []
             with console.working(f"reading {file.name}"):
-                for recording in recordings(file, settings, map_):
+                for recording in recordings(file, settings, map_, before):
                     path = output / recording.file
                     if path in sources:
                         raise InputError(

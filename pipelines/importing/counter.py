@@ -31,17 +31,26 @@ def signed(values: NDArray, bits: int, where: str, findings: list[Finding]) -> N
     return np.where(impossible, np.nan, found)
 
 
-def unwrapped(values: NDArray, modulus: float, where: str, findings: list[Finding]) -> NDArray:
-    """Return a counter (n,) that starts anew at ``modulus`` counted on: no step is larger than half of it."""
+def unwrapped(values: NDArray, modulus: float, where: str, findings: list[Finding], near: float = 0.0) -> NDArray:
+    """Return a counter (n,) that starts anew at ``modulus`` counted on: no step is larger than half of it.
+
+    Which turn it begins in no counter tells: it is the one in which its first reading lies nearest to ``near``.
+    """
     known = np.isfinite(values)
-    steps = np.diff(values[known])
-    turns = -np.round(steps / modulus)
-    wraps = int(np.count_nonzero(turns))
-    if not wraps:
+    if not known.any():
         return values
-    findings.append(Finding(where, f"wraps at {modulus:g}, {counted(wraps, 'time')}", "counted on"))
+    first = values[known][0]
+    turns = -np.round(np.diff(values[known], prepend=first) / modulus)
+    wraps = int(np.count_nonzero(turns))
+    turns[0] = -np.round((first - near) / modulus)
     found = values.copy()
-    found[known] = values[known] + modulus * np.concatenate([[0.0], np.cumsum(turns)])
+    found[known] = values[known] + modulus * np.cumsum(turns)
+    if wraps:
+        findings.append(Finding(where, f"wraps at {modulus:g}, {counted(wraps, 'time')}", "counted on"))
+    if turns[0]:
+        begins = first + modulus * turns[0]
+        seen = f"begins at {first:.6g} of {modulus:g}"
+        findings.append(Finding(where, seen, f"taken for {begins:.6g}, in the turn nearest to {near:.6g}"))
     return found
 
 

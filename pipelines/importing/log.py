@@ -12,7 +12,7 @@ from pipelines.importing import clock
 from pipelines.importing.clock import Run
 from pipelines.importing.finding import Finding, counted
 from pipelines.importing.numbers import numbers
-from pipelines.importing.reading import columns_of, quantity
+from pipelines.importing.reading import columns_of, quantity, turn_of_its_counter
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.settings import transmission
 from pipelines.settings.import_map import ImportMap, ReadingSettings, TimeSettings
@@ -51,6 +51,12 @@ class Log:
     def required(self) -> list[str]:
         """The recording's columns that must have a value in every row."""
         return [channel.target for channel in self.channels if channel.required]
+
+    @property
+    def turns(self) -> dict[str, float]:
+        """What a turn of its counter is in SI, of each of the recording's columns that has a counter."""
+        found = {channel.target: turn_of_its_counter(channel.reading, channel.gain) for channel in self.channels}
+        return {target: turn for target, turn in found.items() if turn is not None}
 
     def quantities(self, run: Run, findings: list[Finding]) -> Columns:
         """Return every channel in SI at the instants of a run, each (n,), NaN where the log has no value."""

@@ -33,13 +33,21 @@ def quantity(
     if reading.range is not None:
         raw = _believed(raw, reading.range, where, findings)
     if reading.wraps_at is not None:
-        raw = unwrapped(raw, reading.wraps_at, where, findings)
+        near = reading.zero / reading.scale if reading.begins_at is None else reading.begins_at
+        raw = unwrapped(raw, reading.wraps_at, where, findings, near)
     unit = unit_named(reading.unit)
     assert unit is not None, "was looked at with the map"
     if reading.wraps_at is None and (full := full_at(raw, _turns(reading, unit))) is not None:
         seen = f"steps by {full:.6g} from one row to the next, as a counter does that is full"
         findings.append(Finding(where, seen, f"kept; set wraps_at = {full:.10g} at it"))
     return reading.sign * gain * (unit.factor * (reading.scale * raw - reading.zero) + unit.offset)
+
+
+def turn_of_its_counter(reading: ReadingSettings, gain: float) -> float | None:
+    """Return what the quantity is after which the counter starts anew, in SI; None of what does not."""
+    unit = unit_named(reading.unit)
+    assert unit is not None, "was looked at with the map"
+    return None if reading.wraps_at is None else abs(gain * unit.factor * reading.scale * reading.wraps_at)
 
 
 def _turns(reading: ReadingSettings, unit: Unit) -> tuple[float, ...]:

@@ -19,6 +19,7 @@ from pipelines.importing.finding import Finding, counted
 from pipelines.importing.log import Log, read_log
 from pipelines.importing.plausible import look_at
 from pipelines.importing.sources.open import open_source
+from pipelines.importing.turns import Beginnings
 from pipelines.settings.import_map import ImportMap, RecordingSettings
 
 FEWEST = 10
@@ -53,8 +54,8 @@ class Imported:
         return f"{self.name}.parquet"
 
 
-def recordings(path: Path, settings: ImportMap, map_path: Path) -> Iterator[Imported]:
-    """Yield the recordings that a map makes of a log.
+def recordings(path: Path, settings: ImportMap, map_path: Path, before: Beginnings) -> Iterator[Imported]:
+    """Yield the recordings that a map makes of a log; ``before`` tells where those before it began.
 
     Raises
     ------
@@ -75,7 +76,7 @@ def recordings(path: Path, settings: ImportMap, map_path: Path) -> Iterator[Impo
         runs = _chosen(log.runs, settings.time.restarts, log.findings)
         for number, run in enumerate(runs, 1):
             suffix = f"_run{number}" if len(runs) > 1 else ""
-            yield from _recordings_of(run, log, settings, wanted, (path, suffix, provenance, given))
+            yield from _recordings_of(run, log, settings, wanted, before, (path, suffix, provenance, given))
 
 
 def _files(path: Path) -> list[Path]:
@@ -107,7 +108,12 @@ def _chosen(runs: Sequence[Run], restarts: str, findings: list[Finding]) -> list
 
 
 def _recordings_of(
-    run: Run, log: Log, settings: ImportMap, wanted: Sequence[RecordingSettings], origin: tuple[Path, str, dict, dict]
+    run: Run,
+    log: Log,
+    settings: ImportMap,
+    wanted: Sequence[RecordingSettings],
+    before: Beginnings,
+    origin: tuple[Path, str, dict, dict],
 ) -> Iterator[Imported]:
     path, suffix, provenance, given = origin
     findings = [*log.findings, *run.findings]
@@ -119,6 +125,7 @@ def _recordings_of(
     columns = {"time_s": time} | {name: values[whole] for name, values in columns.items()}
     _refuse_absurd_angles(columns, settings)
     findings += look_at(columns, settings)
+    findings += before.look_at(f"{path.name}{suffix}", columns, log.turns)
     spans = [_span(time, float(run.time_s[-1]), recording) for recording in wanted]
     _refuse_overlap(time, wanted, spans)
     for recording, rows in zip(wanted, spans, strict=True):

@@ -86,7 +86,13 @@ class ReadingSettings(Settings):
         None, description="Bits of a signed register that was logged as if it had no sign; 65535 of 16 bits is -1."
     )
     wraps_at: float | None = Field(
-        None, gt=0.0, description="Raw reading at which a counter starts anew at 0 (65536, 360); turns are counted on."
+        None,
+        gt=0.0,
+        description="Raw reading at which a counter starts anew at 0 (65536, 360); turns are counted on, from the "
+        "one in which the log begins nearest to `zero`. `signed_bits` beside it changes nothing.",
+    )
+    begins_at: float | None = Field(
+        None, description="About what raw reading each log begins at, turns counted, where that is not near `zero`."
     )
     range: tuple[float, float] | None = Field(
         None, description="Lowest and highest raw reading to believe; rows with others are left out."
@@ -103,6 +109,8 @@ class ReadingSettings(Settings):
             raise ValueError("scale: found 0, expected any other number")
         if self.range is not None and self.range[0] >= self.range[1]:
             raise ValueError(f"range: found {list(self.range)}, expected the lower limit first")
+        if self.begins_at is not None and self.wraps_at is None:
+            raise ValueError("begins_at: found without wraps_at; set wraps_at, or remove it")
         return self
 
 

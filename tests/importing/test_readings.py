@@ -208,6 +208,58 @@ def test_a_counter_that_starts_anew_is_told_with_what_counts_it_on(imported, pen
     assert_allclose(np.ptp(outcome.recording().frame["pivot_angle_rad"]), np.ptp(pendulum.angle), atol=0.002)
 
 
+COUNTER = 'unit = "counts", counts_per_turn = 4096, gear_ratio = 50, zero = 1000, wraps_at = 65536'
+WITH_A_COUNTER = MAP.replace('column = "angle", unit = "rad"', f'column = "angle", {COUNTER}').replace(
+    'name = "whole"', 'name = "{file}"'
+)
+
+
+def motor_counts(angle, zero=1000):
+    """What a motor's counter of 16 bits says, 50 motor turns of 4096 counts for one of the joint."""
+    return (np.round(angle / (2.0 * np.pi) * 50 * 4096).astype(int) + zero) % 65536
+
+
+@pytest.mark.parametrize("signed", [False, True])
+def test_a_counter_begins_in_the_turn_nearest_to_zero_whatever_turn_it_is_logged_in(
+    imported, pendulum, write_csv, signed
+):
+    """Both logs are of one joint; the first begins below zero, where the counter is nearly full."""
+    files = []
+    for name, shift in (("below", -0.05), ("above", 0.05)):
+        columns = pendulum.columns() | {"angle": motor_counts(pendulum.angle + shift)}
+        files.append(write_csv(columns, f"{name}.csv"))
+    text = WITH_A_COUNTER.replace("wraps_at", "signed_bits = 16, wraps_at") if signed else WITH_A_COUNTER
+    outcome = imported(*files, map_text=text)
+    for name, shift in (("below", -0.05), ("above", 0.05)):
+        found = outcome.recording(name).frame["pivot_angle_rad"]
+        assert_allclose(found, pendulum.angle + shift, atol=2e-5)
+    assert ("begins at 64906 of 65536; taken for -630, in the turn nearest to 1000" in outcome.told) is not signed
+    assert "turns apart" not in outcome.told
+
+
+def test_logs_that_begin_more_than_half_a_turn_apart_are_told_and_begins_at_settles_it(imported, pendulum, write_csv):
+    """A joint that hangs upright begins half a turn from zero, once to this side of it and once to that."""
+    files = [
+        write_csv(pendulum.columns() | {"angle": np.degrees(pendulum.angle + np.pi + shift) % 360.0}, f"{name}.csv")
+        for name, shift in (("a", -0.02), ("b", 0.02))
+    ]
+    text = MAP.replace('column = "angle", unit = "rad"', 'column = "angle", unit = "deg", wraps_at = 360')
+    text = text.replace('name = "whole"', 'name = "{file}"')
+    outcome = imported(*files, map_text=text)
+    assert "begins at -3.122 and in a.csv at 3.122, about 1 of its counter's turns apart; kept" in outcome.told
+    findings = outcome.recording("b").metadata["imported"]["findings"]
+    assert any("turns apart" in finding["found"] for finding in findings)
+    settled = imported(*files, map_text=text.replace("wraps_at", "begins_at = 180, wraps_at"))
+    assert "turns apart" not in settled.told
+    assert_allclose(settled.recording("b").frame["pivot_angle_rad"], pendulum.angle + np.pi + 0.02, atol=1e-12)
+
+
+def test_where_a_counter_begins_is_asked_only_of_one_that_starts_anew(imported, pendulum, write_csv):
+    text = MAP.replace('column = "angle", unit = "rad"', 'column = "angle", unit = "rad", begins_at = 3.0')
+    outcome = imported(write_csv(pendulum.columns()), map_text=text)
+    assert (outcome.code, "begins_at: found without wraps_at" in outcome.err) == (2, True)
+
+
 def test_what_jumps_otherwise_is_no_full_counter(imported, pendulum, write_csv):
     """Neither a spike, nor steps that a motion asks for, nor one that an encoder lost."""
     for jump in (np.where(np.arange(2000) == 700, 4.0, 0.0), np.where(np.arange(2000) > 700, 2.5, 0.0)):
