@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 import traceback
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, NoReturn
@@ -104,6 +105,8 @@ INTERRUPTED, TERMINATED, UNHEARD = 128 + signal.SIGINT, 128 + signal.SIGTERM, 12
 
 def main() -> NoReturn:
     """Run exoid as the shell's command."""
+    if not (sys.warnoptions or os.environ.get("EXOID_DEBUG")):
+        warnings.simplefilter("ignore")  # of Python's libraries, about exoid's own lines: the tests heed them
     # As an exception: what is half written is cleared away, as it is after Ctrl-C.
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(TERMINATED))
     for stream in (sys.stdout, sys.stderr):

@@ -13,6 +13,9 @@ from pipelines.errors import ContractError
 
 # No joint of a leg turns one and a half times; a hip that swings through 20 degrees "reaches" 20.
 LARGEST_ANGLE_RAD = 3 * np.pi
+# In SI no joint, drive or sensor has as much of anything, whatever unit it was taken for; the squares of a file's
+# rows still have a sum.
+LARGEST = 1e12
 
 
 @dataclass(frozen=True)
@@ -109,6 +112,17 @@ def refuse_unknown_values(column: pa.ChunkedArray, choices: Sequence[str], where
         row = int(np.argmax(strange))
         raise ContractError(
             f"{where.row(row)}: found {column[row].as_py()!r}, expected one of {', '.join(choices)}; mend the value"
+        )
+
+
+def refuse_absurd(column: pa.ChunkedArray, where: Place) -> None:
+    """Refuse numbers that no machine's quantity reaches."""
+    size = np.nan_to_num(np.abs(column.to_numpy()))
+    row = int(np.argmax(size > LARGEST))
+    if size[row] > LARGEST:
+        raise ContractError(
+            f"{where.row(row)}: found {column[row].as_py():.6g}, expected at most {LARGEST:g}; "
+            "correct the unit or scale of the column, or drop the row"
         )
 
 

@@ -32,5 +32,5 @@ SIMULATION = Contract(
     ),
     metadata=SimulationKeys,
     time="time_s",
-    angles_are_bounded=False,
+    is_bounded=False,
 )

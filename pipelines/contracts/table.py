@@ -121,8 +121,9 @@ class Contract:
     """The column that must strictly increase."""
     restarts_with: tuple[str, ...] = ()
     """Columns that start time anew when they change from one row to the next."""
-    angles_are_bounded: bool = True
-    """Is an angle of more than 1.5 turns taken for degrees? Not where a loop may diverge."""
+    is_bounded: bool = True
+    """Is an angle of more than 1.5 turns taken for degrees, and any quantity refused that no machine reaches? Not where
+    a loop may diverge."""
     rules: tuple[Rule, ...] = ()
     """Further checks: rule(frame, metadata, source) raises ContractError."""
 
@@ -260,8 +261,10 @@ class Contract:
         checks.refuse_missing(values, column.nullable, where)
         if column.choices:
             checks.refuse_unknown_values(values, column.choices, where)
-        if column.unit == "rad" and self.angles_are_bounded:
-            checks.refuse_degrees(values, where)
+        if self.is_bounded and column.dtype == FLOAT and column.unit and column.name != self.time:
+            checks.refuse_absurd(values, where)
+            if column.unit == "rad":
+                checks.refuse_degrees(values, where)
         field = pa.field(column.name, column.dtype, metadata={"unit": column.unit, "meaning": column.meaning})
         return table.set_column(index, field, values)
 

@@ -35,6 +35,20 @@ def test_help_loads_nothing_heavy():
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
 
 
+def test_what_python_warns_of_reaches_who_changes_exoid_and_no_user():
+    code = (
+        "import warnings; from exoid_cli import app; "
+        "app._command_line = lambda words: warnings.warn('overflow', RuntimeWarning); app.main()"
+    )
+
+    def told(**more):
+        environment = {name: value for name, value in os.environ.items() if name != "EXOID_DEBUG"} | more
+        return subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True).stderr
+
+    assert told() == ""
+    assert "overflow" in told(EXOID_DEBUG="1")
+
+
 @pytest.mark.parametrize(
     ("error", "code", "line"),
     [

@@ -220,6 +220,11 @@ REFUSED_FRAMES = {
         "column time_s, row 40: found 0.195 after 0.195, expected strictly increasing time; sort the rows and drop "
         "repeated ones",
     ),
+    "more than any machine has": (
+        _set("hip_torque_nm", 7, -1e300),
+        "column hip_torque_nm, row 7: found -1e+300, expected at most 1e+12; correct the unit or scale of the column, "
+        "or drop the row",
+    ),
     "degrees": (
         lambda frame: frame.assign(knee_angle_rad=np.linspace(-5, -60, 100)),
         "column knee_angle_rad, row 8: found -9.44444, which looks like degrees; expected radians, multiply by pi/180",
@@ -301,12 +306,12 @@ def test_time_starts_anew_with_each_file_of_residuals(swinging_leg):
     )
 
 
-def test_a_diverging_simulation_is_not_taken_for_degrees(swinging_leg):
+def test_a_diverging_simulation_is_not_taken_for_a_wrong_unit(swinging_leg):
     quantities = ("reference_rad", "velocity_rad_s", "error_rad", "network_nm")
     frame = swinging_leg.assign(
         **{f"{joint}_{quantity}": 100.0 for joint in ("hip", "knee") for quantity in quantities}
     )
-    SIMULATION.check(frame.assign(hip_angle_rad=500.0, hip_network_nm=np.nan), {})
+    SIMULATION.check(frame.assign(hip_angle_rad=500.0, knee_torque_nm=1e20, hip_network_nm=np.nan), {})
 
 
 def test_the_covariance_has_a_row_for_each_parameter():
