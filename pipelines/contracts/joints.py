@@ -37,6 +37,11 @@ QUANTITIES: dict[str, Quantity] = {
 }
 
 
+def the(joint: str) -> str:
+    """Return a joint's name as a sentence has it: ``the hip``, but ``joint2`` and ``q``, which are names already."""
+    return joint if joint[-1:].isdigit() or len(joint) == 1 else f"the {joint}"
+
+
 @dataclass(frozen=True)
 class Joint:
     """One joint of the machine."""

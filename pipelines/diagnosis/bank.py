@@ -71,6 +71,8 @@ def fill(
         report(number / len(effects), effect.label)
         for candidate in worth_a_look(effect, scan):
             made = expanded(signatures(candidate, runs, baseline, untouched, weights), candidate, runs)
+            if not all(np.isfinite(column).all() for column in made):  # a shape that tears the motion apart
+                continue
             candidates.append(candidate)
             where.append(slice(at, at + made[0].shape[2]))
             columns.append(made)

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipelines.contracts.joints import the
 from pipelines.diagnosis import tables
 from pipelines.diagnosis.bank import Bank, fill, silent
 from pipelines.diagnosis.choice import (
@@ -39,6 +40,7 @@ from pipelines.estimation.angle_noise import CUTOFF_HZ, is_loud
 from pipelines.estimation.collinearity import collinearities, profiled
 from pipelines.label import effect_labelled
 from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.origin import giving
 from pipelines.mechanics.scale import on_one_scale
 from pipelines.mechanics.slow_motion import below
 from pipelines.model import unrealizable
@@ -214,8 +216,7 @@ def _dealt(motions: Sequence[Motion]) -> tuple[tuple[Run, ...], tuple[Run, ...]]
     for purpose, why in (("train", "causes are searched there"), ("validate", "the gain is measured there")):
         if not any(m.purpose == purpose for m in motions):
             raise InputError(
-                f"found no run to {purpose} on among: {listed}; {why}: record one with `exoid acquire`, "
-                "or set `purpose` in a recording's metadata"
+                f"found no run to {purpose} on among: {listed}; {why}: {giving(purpose, motions)}"
             )
     trained = {m.run for m in motions if m.purpose == "train"}
     strangers = [m.file for m in motions if m.purpose == "validate" and m.run not in trained]
@@ -241,8 +242,8 @@ def _refuse_without_floor(validate: Sequence[Run]) -> None:
         if not np.isfinite(floor[j]):
             usable = sum(int(run.usable[:, j].sum()) for run in validate)
             raise InputError(
-                f"{', '.join(run.motion.file for run in validate)}: {usable} blocks away from the {joint}'s reversals, "
-                "too few in a row to tell noise from error; validate on longer runs"
+                f"{', '.join(run.motion.file for run in validate)}: {usable} blocks away from {the(joint)}'s "
+                "reversals, too few in a row to tell noise from error; validate on longer runs"
             )
 
 

@@ -6,12 +6,16 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.contracts.joints import the
 from pipelines.errors import InputError
 from pipelines.estimation.regression import away_from_reversals, reversal_speeds
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.one_machine import refuse_several_machines
+from pipelines.mechanics.origin import settings_of
 
 MOST_NM = 10_000.0
+COPIED = 1e-12
+"""Up to which a correlation falls short of 1 by rounding alone: two encoders differ by more than their last count."""
 LEAST_S = 5.0
 """Of an exoskeleton's motion, all runs of a kind and purpose together; below, gravity, inertia and friction are not
 told apart."""
@@ -23,6 +27,7 @@ def refuse_unfit(motions: Sequence[Motion]) -> None:
     for motion in motions:
         if motion.machine.is_exoskeleton:
             _refuse_monsters(motion)
+        _refuse_one_angle_twice(motion)
     _refuse_twins(motions)
     for purpose, run in sorted({(m.purpose, m.run) for m in motions}):
         _refuse_standstill([m for m in motions if (m.purpose, m.run) == (purpose, run)])
@@ -35,7 +40,26 @@ def _refuse_monsters(motion: Motion) -> None:
         if largest > MOST_NM:
             raise InputError(
                 f"{motion.file}: the {joint} torque reaches {largest:.3g} N·m, expected at most {MOST_NM:g} N·m; "
-                "correct torque constant, gear ratio or the unit of the current in the rig file, or the recording"
+                f"correct torque constant, gear ratio or the unit of the current in {settings_of(motion)}, "
+                "or the recording"
+            )
+
+
+def _refuse_one_angle_twice(motion: Motion) -> None:
+    """Refuse joints of which one only repeats the other's angle: no motion then tells their torques apart."""
+    if motion.measured_angle is None or not motion.valid.any():
+        return
+    q = motion.measured_angle[motion.valid]
+    moving = np.flatnonzero(np.ptp(q, axis=0) > 0.0)
+    for one, other in combinations(moving, 2):
+        alike = float(np.corrcoef(q[:, one], q[:, other])[0, 1])
+        if abs(alike) > 1.0 - COPIED:
+            times = alike * np.ptp(q[:, other]) / np.ptp(q[:, one])
+            first, second = motion.joints[one], motion.joints[other]
+            raise InputError(
+                f"{motion.file}: {first} and {second} hold the same angles ({second}'s are {times:.4g} times {first}'s "
+                "throughout, but for their zeros), expected a measurement of its own of each joint; "
+                f"correct their columns in {settings_of(motion)}"
             )
 
 
@@ -57,18 +81,32 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
     machine = motions[0].machine
     least = machine.lasting(LEAST_S)
     for j, joint in enumerate(machine.joints):
+        _refuse_dead_angle(motions, j)
         if (lasts := _seconds(motions, [m[:, j] for m in moving])) < least:
             raise InputError(
-                f"{files}: the {joint.name} moves for {lasts:.1f} s (faster than {reversal_speeds(machine)[j]:.2g} "
+                f"{files}: {the(joint.name)} moves for {lasts:.1f} s (faster than {reversal_speeds(machine)[j]:.2g} "
                 f"{joint.unit('velocity')} and away from reversals), expected {least:.2g} s {together}; "
                 f"excite {'both joints' if len(machine.joints) == 2 else 'it'}, or record longer; "
-                "if it did move, check its encoder"
+                f"if it did move, check its encoder, and the units of angle and time in {settings_of(motions[0])}"
             )
     if (lasts := _seconds(motions, [m.all(axis=1) for m in moving])) < least:
         raise InputError(
             f"{files}: {' and '.join(machine.names)} move at once for {lasts:.1f} s, "
             f"expected {least:.2g} s {together}: errors are scored there; "
             "excite both joints at the same time, or record longer"
+        )
+
+
+def _refuse_dead_angle(motions: Sequence[Motion], joint: int) -> None:
+    """Refuse an angle that is one number all along: what a filter leaves of it only seems to move."""
+    measured = [m.measured_angle[m.valid, joint] for m in motions if m.measured_angle is not None]
+    values = np.concatenate(measured) if measured else np.zeros(0)
+    if len(values) and np.ptp(values) == 0.0:
+        here = motions[0].machine.joints[joint]
+        raise InputError(
+            f"{', '.join(m.file for m in motions)}: the angle of {the(here.name)} is {values[0]:.4g} "
+            f"{here.unit('angle')} in every row, expected a joint that moves; check its encoder, and which channel "
+            f"{settings_of(motions[0])} reads"
         )
 
 

@@ -119,6 +119,10 @@ SWING_SUBSTEPS = 4
 WIDEST_TWIST = 1.0
 """rad within which a swinging load begins at rest."""
 
+TORN = np.pi
+"""rad that no transmission twists by. A load that a fit has made of too little, whose gravity pushes up or whose mass
+is negative, would run away from its spring within a second: here it stays."""
+
 NUDGE = 1e-7
 """rad and rad/s of the difference quotients of a spring."""
 
@@ -264,4 +268,6 @@ def swing_along(kernel, values, ratio, least, h, torque, inertia, damping, stiff
             change = s * push / (mass + 0.5 * s * (drag + per_rate) + 0.25 * s * s * (slope + per_twist))
             twist += s * (rate + 0.5 * change)
             rate += change
+            if not abs(twist) < TORN:
+                twist, rate = TORN if twist > 0.0 else -TORN, 0.0
         out[n] = twist

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 from pipelines.errors import InputError
 from pipelines.mechanics.one_machine import refuse_several_machines
+from pipelines.mechanics.origin import giving
 from pipelines.mechanics.run import Run
-
-REMEDY = "record it with `exoid acquire`, or correct the metadata of the file"
 
 
 @dataclass(frozen=True)
@@ -33,11 +32,12 @@ def checked(motions: Sequence[Run]) -> Runs:
     if not runs.of("train", "exo_alone"):
         raise InputError(
             f"found no exo_alone run to train on among: {listed}; friction is fitted with nobody in the machine: "
-            f"{REMEDY}"
+            f"{giving('train', motions)}"
         )
     if not runs.of("validate"):
         raise InputError(
-            f"found no run to validate on among: {listed}; a fit is judged on data it has not seen: {REMEDY}"
+            f"found no run to validate on among: {listed}; a fit is judged on data it has not seen: "
+            f"{giving('validate', motions)}"
         )
     refuse_several_machines(motions)
     return runs

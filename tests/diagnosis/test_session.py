@@ -17,10 +17,14 @@ def motions():
     return session(seed=11)
 
 
-def standing_knee(motion):
+def standing_knee(motion, measured):
     q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
-    q[:, 1], dq[:, 1], ddq[:, 1] = -0.5, 0.0, 0.0
+    q[:, 1], dq[:, 1], ddq[:, 1] = measured, 0.0, 0.0
     return replace(motion, q=q, dq=dq, ddq=ddq, measured_angle=q)
+
+
+def imported(motion):
+    return replace(motion, metadata=motion.metadata | {"imported": {"source": "log.csv"}})
 
 
 @pytest.mark.parametrize("work", [diagnose, detectability_of_recorded])
@@ -28,7 +32,43 @@ def test_a_joint_that_never_moves_is_named(motions, work):
     with pytest.raises(
         InputError, match=r"run_0.parquet: the knee moves for 0.0 s .* expected 5 s in the exo_alone runs to train"
     ):
-        work([standing_knee(m) for m in motions])
+        work([standing_knee(m, -0.5 + 1e-6 * (np.arange(len(m)) % 2)) for m in motions])
+
+
+def test_who_moved_a_joint_that_seems_to_stand_is_told_to_look_at_its_units(motions):
+    standing = [standing_knee(m, -0.5 + 1e-6 * (np.arange(len(m)) % 2)) for m in motions]
+    with pytest.raises(InputError, match=r"its encoder, and the units of angle and time in the rig file$"):
+        diagnose(standing)
+    with pytest.raises(InputError, match=r"its encoder, and the units of angle and time in the map$"):
+        diagnose([imported(m) for m in standing])
+
+
+def test_an_angle_that_is_one_number_all_along_is_told_as_that(motions):
+    with pytest.raises(InputError) as refused:
+        diagnose([imported(standing_knee(m, -0.5)) for m in motions])
+    assert str(refused.value) == (
+        "run_0.parquet: the angle of the knee is -0.5 rad in every row, expected a joint that moves; check its "
+        "encoder, and which channel the map reads"
+    )
+
+
+@pytest.mark.parametrize("times", [1.0, -1.0, 57.3])
+def test_joints_that_hold_one_angle_between_them_are_refused(motions, times):
+    def copied(motion):
+        q = motion.measured_angle
+        return replace(motion, measured_angle=np.column_stack([q[:, 0], 0.3 + times * q[:, 0]]))
+
+    with pytest.raises(InputError) as refused:
+        diagnose([imported(copied(m)) for m in motions])
+    assert str(refused.value) == (
+        f"run_0.parquet: hip and knee hold the same angles (knee's are {times:g} times hip's throughout, but for their "
+        "zeros), expected a measurement of its own of each joint; correct their columns in the map"
+    )
+
+
+def test_a_session_of_imported_recordings_lacks_a_purpose_in_their_map(motions):
+    with pytest.raises(InputError, match=r'give one of them purpose = "validate" in a \[\[recording\]\] of the map'):
+        diagnose([imported(m) for m in motions if m.purpose == "train"])
 
 
 def test_two_seconds_with_the_human_are_not_made_up_for_by_a_long_run_without(motions):

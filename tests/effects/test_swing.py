@@ -46,6 +46,15 @@ def test_a_slow_load_is_followed_at_once_by_any_spring():
         assert_allclose(swung(stiffness, torque, 0.5), torque / stiffness, atol=0.02 * 20.0 / stiffness)
 
 
+def test_a_load_that_a_fit_has_made_of_nothing_does_not_run_away():
+    """Gravity that pushes up harder than the spring holds: undisturbed it would be beyond any number in seconds."""
+    twist, ones = np.empty(20_000), np.ones(20_000)
+    spring = JointElasticity("hip").spring
+    swing_along(spring, np.array([100.0]), 0.0, 0.02, 0.005, ones, -ones, -ones, -1e4 * ones, twist)
+    assert np.isfinite(twist).all()
+    assert np.abs(twist).max() <= np.pi
+
+
 def test_a_copy_that_is_damped_more_forgets_an_error_of_the_load_sooner():
     steady, wrong = np.full(1000, 5.0), np.full(1000, 5.0)
     wrong[:20] = 25.0
