@@ -36,9 +36,10 @@ def show_verdict(said: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
 
 
 def _show_cause(cause: Mapping[str, Any]) -> None:
+    from pipelines.contracts.joints import the
     from pipelines.label import cause_label
 
-    where = f" at the {cause['joint']}" if cause["joint"] else ""
+    where = f" at {the(cause['joint'])}" if cause["joint"] else ""
     console.say(f"\n{cause['effect']}{where} ({cause['side']}), probability {cause['probability']:.2f}")
     for p in cause["parameters"]:
         console.note(_in_words(p))

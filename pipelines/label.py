@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from pipelines.contracts.joints import the
 from pipelines.effects import Effect
 from pipelines.mechanics.machine import Machine
 from pipelines.model import effect_named
@@ -48,4 +49,4 @@ def title_in_words(effect: Effect) -> str:
 def in_words(effect: Effect) -> str:
     """Return an effect and where it is: ``cogging at the knee``."""
     title = title_in_words(effect)
-    return f"{title} at the {effect.joint}" if effect.joint else title
+    return f"{title} at {the(effect.joint)}" if effect.joint else title

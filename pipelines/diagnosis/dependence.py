@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.contracts.joints import the
 from pipelines.diagnosis.floor import Floor
 from pipelines.diagnosis.observations import FOLDS, Run
 from pipelines.diagnosis.spline import Curve, fold_products, held_out_error
@@ -88,19 +89,19 @@ def _phase(run: Run, j: int) -> NDArray | None:
 
 
 VARIABLES = (
-    Variable("angle", "the {joint}'s angle", "rad", lambda run, j: run.state[0][:, j]),
+    Variable("angle", "{joint}'s angle", "rad", lambda run, j: run.state[0][:, j]),
     # What friction does has a jump where the joint reverses.
-    Variable("speed", "the {joint}'s speed", "rad/s", lambda run, j: run.state[1][:, j], by_direction=True),
-    Variable("acceleration", "the {joint}'s acceleration", "rad/s²", lambda run, j: run.state[2][:, j]),
+    Variable("speed", "{joint}'s speed", "rad/s", lambda run, j: run.state[1][:, j], by_direction=True),
+    Variable("acceleration", "{joint}'s acceleration", "rad/s²", lambda run, j: run.state[2][:, j]),
     Variable(
-        "reversals", "the {joint}'s direction and the time since it reversed", "s", _since_reversal, by_direction=True
+        "reversals", "{joint}'s direction and the time since it reversed", "s", _since_reversal, by_direction=True
     ),
-    Variable("load", "the torque that the {joint} passes on", "N·m", _load, by_direction=True),
-    Variable("other_angle", "the {other}'s angle", "rad", lambda run, j: _of_other(run, 0, j)),
-    Variable("other_speed", "the {other}'s speed", "rad/s", lambda run, j: _of_other(run, 1, j)),
-    Variable("other_load", "the torque that the {other} passes on", "N·m", _load_of_other),
-    Variable("cuff_force", "the cuffs' torque about the {joint}", "N·m", _cuff),
-    Variable("temperature", "the {joint} motor's temperature", "°C", _temperature),
+    Variable("load", "the torque that {joint} passes on", "N·m", _load, by_direction=True),
+    Variable("other_angle", "{other}'s angle", "rad", lambda run, j: _of_other(run, 0, j)),
+    Variable("other_speed", "{other}'s speed", "rad/s", lambda run, j: _of_other(run, 1, j)),
+    Variable("other_load", "the torque that {other} passes on", "N·m", _load_of_other),
+    Variable("cuff_force", "the cuffs' torque about {joint}", "N·m", _cuff),
+    Variable("temperature", "the temperature of {joint}'s motor", "°C", _temperature),
     Variable("time", "the time since the run began", "s", lambda run, j: run.time, lasting=False, knots=2),
     Variable("phase", "the phase of the excitation and no single variable of the motion", "s", _phase, lasting=False),
 )
@@ -166,12 +167,12 @@ def knows(variable: Variable, runs: Iterable[Run], j: int) -> bool:
 
 
 def _sentence(joint: str, joints: Sequence[str], words: str, share: float) -> str:
-    return f"{100 * share:.0f} % of what is left at the {joint} goes with {_words(joint, joints, words)}"
+    return f"{100 * share:.0f} % of what is left at {the(joint)} goes with {_words(joint, joints, words)}"
 
 
 def _words(joint: str, joints: Sequence[str], words: str) -> str:
     others = [name for name in joints if name != joint]
-    return words.format(joint=joint, other=" and ".join(others))
+    return words.format(joint=the(joint), other=" and ".join(map(the, others)))
 
 
 def by_kind(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Iterable[tuple[list[Run], list[NDArray]]]:
@@ -295,10 +296,10 @@ def describe(found: Sequence[Dependence], above: Sequence[Excess], together: Seq
     pair = max((t for t in together if t.joint == joint), key=lambda t: t.share, default=None)
     if pair and pair.share > MUCH_MORE * max(_rank(own[0]), LITTLE):
         words = " together with ".join(_words(joint, list(squares), variable.words) for variable in pair.variables)
-        return f"{100 * pair.share:.0f} % of what is left at the {joint} goes with {words}{where}."
+        return f"{100 * pair.share:.0f} % of what is left at {the(joint)} goes with {words}{where}."
     if own[0].share < LITTLE:
         return (
-            f"What is left at the {joint}{where}{',' * bool(where)} depends on nothing that was measured: neither "
+            f"What is left at {the(joint)}{where}{',' * bool(where)} depends on nothing that was measured: neither "
             f"motion, load and time nor a steady tone foretells {100 * LITTLE:.0f} % of it."
         )
     second = next((d for d in own[1:] if d.variable != "phase" and d.share > max(0.5 * own[0].share, LITTLE)), None)

@@ -215,9 +215,7 @@ def _dealt(motions: Sequence[Motion]) -> tuple[tuple[Run, ...], tuple[Run, ...]]
     listed = ", ".join(f"{m.file} ({m.run}, {m.purpose})" for m in motions) or "none"
     for purpose, why in (("train", "causes are searched there"), ("validate", "the gain is measured there")):
         if not any(m.purpose == purpose for m in motions):
-            raise InputError(
-                f"found no run to {purpose} on among: {listed}; {why}: {giving(purpose, motions)}"
-            )
+            raise InputError(f"found no run to {purpose} on among: {listed}; {why}: {giving(purpose, motions)}")
     trained = {m.run for m in motions if m.purpose == "train"}
     strangers = [m.file for m in motions if m.purpose == "validate" and m.run not in trained]
     if strangers:

@@ -20,20 +20,20 @@ STRUCTURAL: dict[frozenset[str], Tie] = {
         "hold the joint still and read the torque with the drive off: an offset of the sensor stays",
     ),
     frozenset({"base_tilt", "encoder_offset"}): Tie(
-        "a tilted base turns gravity just as a hip encoder with a shifted zero does",
-        "put a spirit level on the base, or let the leg hang freely and read the hip angle",
+        "a tilted base turns gravity just as a first encoder with a shifted zero does",
+        "put a spirit level on the base, or let the machine hang freely and read its first angle",
     ),
     frozenset({"encoder_offset", "mass_off_axis"}): Tie(
-        "with one kind of run a shifted zero and a mass beside the axis turn gravity alike",
-        "record the other kind of run as well: an offset is one angle in both, a mass is not",
+        "under one load a shifted zero and a mass beside the axis turn gravity alike",
+        "record with another load as well, a person or a known weight: an offset is one angle in both, a mass is not",
     ),
     frozenset({"base_tilt", "mass_off_axis"}): Tie(
-        "with one kind of run a tilted base and a mass beside the axis turn gravity alike",
-        "record the other kind of run as well, or put a spirit level on the base",
+        "under one load a tilted base and a mass beside the axis turn gravity alike",
+        "record with another load as well, a person or a known weight, or put a spirit level on the base",
     ),
     frozenset({"torque_gain"}): Tie(
         "without cuff forces only the ratio of the two joints' gains shows: one too high is the other too low",
-        "hang a known weight on each joint in turn, or record the cuff forces",
+        "hang a known weight on each joint in turn; on an exoskeleton, record the cuff forces",
     ),
     frozenset({"backlash", "encoder_offset"}): Tie(
         "while the load pushes to one side only, play shifts the angle by a constant half of it",

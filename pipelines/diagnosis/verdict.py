@@ -5,6 +5,7 @@ from typing import Any
 
 import pandas as pd
 
+from pipelines.contracts.joints import the
 from pipelines.diagnosis.control import control
 from pipelines.diagnosis.dependence import Dependence, dependences
 from pipelines.diagnosis.diagnose import Diagnosis, summary_numbers
@@ -157,7 +158,7 @@ def _evidence(d: Diagnosis, label: str, effect: Effect, worth: float, joint: str
     machine = d.baseline.machine
     sentences = [
         f"it takes {number(machine, worth)} of {amount(machine, joint, before)} of {machine.joint(joint).effort} error "
-        f"at the {joint} on runs no fit has seen"
+        f"at {the(joint)} on runs no fit has seen"
     ]
     if label in d.perceived:
         sentences.append(PERCEIVED[effect.name])
@@ -229,19 +230,21 @@ def _finding(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -
     machine, exerted = d.baseline.machine, d.baseline.machine.joint(joint).effort
     size = f"{amount(machine, joint, before[worst])}, {before[worst] / floor[worst]:.2f} times the noise floor"
     if d.status == "nothing_missing":
-        return f"Nothing is missing that these data could show: the largest {exerted} error, at the {joint}, is {size}."
+        return (
+            f"Nothing is missing that these data could show: the largest {exerted} error, at {the(joint)}, is {size}."
+        )
     if d.status == "unknown_cause":
         described = f" {left.description}" if left else ""
         return (
             "Something is missing, and no cause that exoid knows explains it well enough to be named: "
-            f"the {joint}'s {exerted} error is {size}.{described}"
+            f"{the(joint)}'s {exerted} error is {size}.{described}"
         )
     named = "; and ".join(_in_words(cause) for cause in causes)
     most = int(((before**2 - after**2) / floor**2).argmax())
     joint = d.baseline.joints[most]
     return (
-        f"Missing from the simulation: {named}. With {'it' if len(causes) == 1 else 'them'} the "
-        f"{joint}'s {machine.joint(joint).effort} error falls from {amount(machine, joint, before[most])}, "
+        f"Missing from the simulation: {named}. With {'it' if len(causes) == 1 else 'them'} "
+        f"{the(joint)}'s {machine.joint(joint).effort} error falls from {amount(machine, joint, before[most])}, "
         f"{before[most] / floor[most]:.2f} times the noise floor, to {amount(machine, joint, after[most])}, "
         f"{_remains(d, most)}."
     )
@@ -254,7 +257,7 @@ def _remains(d: Diagnosis, told: int) -> str:
     said = f"{'still ' if left[told] else ''}{ratio[told]:.2f} times the floor"
     machine = d.baseline.machine
     others = [
-        f"; the {joint}'s is then {amount(machine, joint, d.standing.extended[j])}, {times:.2f} times its floor"
+        f"; {the(joint)}'s is then {amount(machine, joint, d.standing.extended[j])}, {times:.2f} times its floor"
         for j, (joint, times) in enumerate(zip(d.baseline.joints, ratio, strict=True))
         if left[j] and j != told
     ]

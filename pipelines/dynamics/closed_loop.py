@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.contracts.joints import the
 from pipelines.dynamics.assembly import Assembly, assemble
 from pipelines.dynamics.forward import DQ, DTHETA
 from pipelines.dynamics.mobility import masses
@@ -59,7 +60,7 @@ def _set_points(motion: Motion) -> NDArray:
     for joint, column in zip(motion.joints, told.T, strict=True):
         if not np.isfinite(column).any():
             raise InputError(
-                f"{motion.file or 'the motion'}: has no set-points of the {joint}, which a simulation of its closed "
+                f"{motion.file or 'the motion'}: has no set-points of {the(joint)}, which a simulation of its closed "
                 "loop follows; record them with the run, or choose a --method that needs none"
             )
     known = (np.isfinite(column) for column in told.T)

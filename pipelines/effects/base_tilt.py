@@ -19,11 +19,11 @@ class BaseTilt(Effect):
     side = Side.STRUCTURE
     equation = "hip angle from the vertical = hip angle from the base + tilt"
     source = "Hollerbach, Khalil, Gautier (2016), Springer Handbook of Robotics, ch. 6 (gravity in the base's frame)"
-    looks_like = "gravity torque that leads or lags the hip's angle in every run, with and without the human"
-    confirm = "put a spirit level on the base, or let the leg hang freely and read the hip's angle"
+    looks_like = "gravity torque that leads or lags the first joint's angle in every run alike"
+    confirm = "put a spirit level on the base, or let the machine hang freely and read its first angle"
     by_angle = True
     whole_leg = True
-    shape = (Parameter("tilt", "rad", "adds to the hip's absolute angle", "t", (-0.15, 0.15)),)
+    shape = (Parameter("tilt", "rad", "adds to the first joint's absolute angle", "t", (-0.15, 0.15)),)
 
     @reading
     def reading(angle, values, joint):

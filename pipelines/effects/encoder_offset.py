@@ -16,8 +16,8 @@ class EncoderOffset(Effect):
     side = Side.SENSOR
     equation = "measured angle = true angle + offset"
     source = "Hollerbach, Khalil, Gautier (2016), Springer Handbook of Robotics, ch. 6 (joint offset calibration)"
-    looks_like = "gravity torque that leads or lags the angle: a residual like the cosine of the segment's angle"
-    confirm = "hang the leg freely and read the angles: both should be zero with the knee straight"
+    looks_like = "gravity torque that leads or lags the angle: a residual like the cosine of the link's angle"
+    confirm = "let the machine hang freely, its links in line, and read its angles: each should be zero"
     by_angle = True
     shape = (Parameter("offset", "rad", "measured less true angle", "q_o", (-0.15, 0.15)),)
 

@@ -17,7 +17,7 @@ class MassOffAxis(Effect):
     side = Side.STRUCTURE
     equation = "tau = Y3 dA3 (shank) or Y4 dA4 (thigh): columns X3, X4 with the segment a right angle ahead"
     source = "Khalil, Dombre (2002), Modeling, Identification and Control of Robots, ch. 9 (first moments MX, MY)"
-    looks_like = "gravity torque like the cosine of the segment's angle: largest where the segment hangs"
+    looks_like = "gravity torque like the cosine of the link's angle: largest where the link hangs"
     confirm = "let the joint hang freely: it rests off the vertical, towards the mass"
     by_angle = True
     linear = (Parameter("mass_moment", "kg·m", "mass times distance forward of the axis", "Y", (-0.6, 0.6)),)

@@ -15,7 +15,7 @@ class ParallelSpring(Effect):
     side = Side.STRUCTURE
     equation = "tau = k (q - q0) = k q - b"
     source = "Wang, van Dijk, van der Kooij (2011), ICORR: spring uses in exoskeleton actuation design"
-    looks_like = "residual against angle: a straight line, the same both ways; partly hidden in X3, X4 and friction"
+    looks_like = "residual against angle: a straight line, the same both ways; partly hidden in gravity and friction"
     confirm = "lay the machine on its side, so that gravity is out, and hold the joint at several angles"
     linear = (
         Parameter("stiffness", "N·m/rad", "torque per angle", "k", (2.0, 40.0)),

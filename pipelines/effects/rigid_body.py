@@ -18,7 +18,7 @@ class RigidBody(Effect):
     equation = "tau = M(q) ddq + C(q, dq) dq + G(q) = A(q, dq, ddq) (X1, X2, X3, X4)"
     source = "Lagrange's equations of a planar double pendulum, docs/errata.md"
     looks_like = "what every fit starts with: torque in step with acceleration and with gravity"
-    confirm = "weigh the segments, or hold the leg still at several angles and read the torque"
+    confirm = "weigh the links, or hold the machine still at several angles and read the torque"
     whole_leg = True
     inertial = True
     parity = Parity.EVEN

@@ -22,7 +22,7 @@ class RotorCoupling(Effect):
     side = Side.STRUCTURE
     equation = "tau1 = c ddq2, tau2 = c ddq1; c = N Ir"
     source = "Sciavicco, Siciliano, Villani (1996), Advanced Robotics 10(3): motor inertia in gear-driven manipulators"
-    looks_like = "nothing of its own: a knee's rotor inertia smaller by c beside an X2 larger by c"
+    looks_like = "nothing of its own: the second rotor's inertia smaller by c beside an X2 larger by c"
     confirm = "look up rotor inertia and gear ratio, and which way the gear turns: c is their product"
     joints = ("knee",)
     absorbed: ClassVar = {"knee": "X2 and rotor_inertia together"}

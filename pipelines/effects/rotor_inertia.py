@@ -14,7 +14,7 @@ class RotorInertia(Effect):
     side = Side.DRIVE
     equation = "tau = J ddq, at its own joint only"
     source = "Sciavicco, Siciliano, Villani (1996), Advanced Robotics 10(3): motor inertia in gear-driven manipulators"
-    looks_like = "residual in step with the knee's own acceleration; X2 too large for a shank of that weight"
+    looks_like = "residual in step with its joint's own acceleration; X2 too large for a link of that weight"
     confirm = "look up the rotor's inertia and the gear ratio: J is the one times the square of the other"
     joints = ("knee",)
     absorbed: ClassVar = {"hip": "X1"}

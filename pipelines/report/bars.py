@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from pipelines.contracts.joints import the
 from pipelines.errors import InputError
 from pipelines.label import SHARES, cause_label, effect_labelled, in_words
 
@@ -134,7 +135,7 @@ def label_in_words(label: str) -> str:
         return in_words(effect_labelled(label))
     except InputError:
         name, _, joint = label.partition("@")
-        return name.replace("_", " ") + (f" at the {joint}" if joint else "")
+        return name.replace("_", " ") + (f" at {the(joint)}" if joint else "")
 
 
 def labels_in_words(text: str, labels: Iterable[str]) -> str:
@@ -157,7 +158,7 @@ def tied_in_words(cause: dict[str, Any]) -> str:
         return words
     if len(ties) > 1:
         return f"{words} or {len(ties)} others that these data cannot tell apart"
-    other, where = label_in_words(cause_label(ties[0])), f" at the {cause['joint']}"
+    other, where = label_in_words(cause_label(ties[0])), f" at {the(cause['joint'])}"
     return f"{words.removesuffix(where) if other.endswith(where) else words} or {other}"
 
 

@@ -8,6 +8,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
+from pipelines.contracts.joints import the
 from pipelines.model import BY_NAME
 from pipelines.report.numbers import digits
 from pipelines.report.session import Session
@@ -63,7 +64,7 @@ def _at(joint: Joint, verdict: dict[str, Any]) -> Iterator[str]:
     grew = torque_error_grew(all_before, all_after, floor=verdict["noise_floor_nm"][name])
     if grew:
         yield (
-            f"Reversals included, the {name}'s {push} error is {digits(all_before)} → {digits(all_after)} "
+            f"Reversals included, {the(name)}'s {push} error is {digits(all_before)} → {digits(all_after)} "
             f"{joint.unit('torque')} with the causes, and {digits(before)} → {digits(after)} away from them: a joint "
             f"that stands is held by any {push} up to the one that breaks it free, and no model of speed can tell which"
             + (". What is named raises the most that can hold it" if holds else "")
@@ -74,7 +75,7 @@ def _at(joint: Joint, verdict: dict[str, Any]) -> Iterator[str]:
             "free; the table of each run tells apart the seconds in which it never stands"
         )
         yield (
-            f"Simulated for 1 s by the recorded {push}, the {name} strays {digits(1e3 * strayed)} → "
+            f"Simulated for 1 s by the recorded {push}, {the(name)} strays {digits(1e3 * strayed)} → "
             f"{digits(1e3 * strays)} m{joint.unit('angle')} with the causes: "
             + (why if grew or holds else "these files do not tell why")
         )

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pipelines.contracts import Joint
+from pipelines.contracts.joints import the
 from pipelines.label import cause_label
 from pipelines.report.bars import falls, label_in_words, ties_of, torque_unit
 from pipelines.report.measured import replayed
@@ -65,7 +66,7 @@ def _cause_tiles(verdict: dict[str, Any], cause: dict[str, Any]) -> list[Tile]:
             f"gain of {words}",
             digits(-gain),
             unit,
-            f"of {digits(verdict['baseline_rmse_nm'][joint])} {unit} at the {joint}; 95 %: "
+            f"of {digits(verdict['baseline_rmse_nm'][joint])} {unit} at {the(joint)}; 95 %: "
             f"{digits(-high)} … {digits(-low)}",
         ),
     ]

@@ -7,6 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
+from pipelines.contracts.joints import the
 from pipelines.dynamics.pd_loop import Drives, LoopState, follow, loop_at_rest, make_drives, read_encoders
 from pipelines.dynamics.plant import Plant
 from pipelines.dynamics.replay import EVERY_S, WINDOW_S, ReplayResult
@@ -36,7 +37,7 @@ def why_no_closed_loop(motion: Motion) -> str:
     for joint in motion.joints:
         about = controller.get(joint)
         if about is None:
-            return f"its metadata names no controller of the {joint}"
+            return f"its metadata names no controller of {the(joint)}"
         if about["type"].lower() != "pd":
             return f"the controller of its {joint} is of type {about['type']}, and exoid simulates pd only"
         if about.get("kp_nm_rad") is None or about.get("kd_nm_s_rad") is None:

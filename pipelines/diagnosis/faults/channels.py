@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.contracts.joints import the
 from pipelines.diagnosis.faults.fault import (
     WHOLE_ROW,
     Fault,
@@ -64,7 +65,7 @@ def _repeated(motion: Motion) -> Iterator[Fault]:
     for j in stale[:1] if together else stale:
         samples = same[:, j]
         share, found = samples.mean(), stretches(samples)
-        who = "every device" if together else f"the {motion.joints[j]}'s drive"
+        who = "every device" if together else f"{the(motion.joints[j])}'s drive"
         yield Fault(
             motion.file,
             WHOLE_ROW if together else column(motion, j, "angle"),
@@ -99,8 +100,9 @@ def _stuck_angle(motion: Motion, joint: int) -> Iterator[Fault]:
         yield Fault(
             motion.file,
             column(motion, joint, "angle"),
-            f"the {motion.joints[joint]}'s angle is stuck: constant for {samples.sum() / motion.sample_rate_hz:.2f} s, "
-            f"{when(motion, found)}, while the leg moved on; check the encoder's cable and the drive's status",
+            f"{the(motion.joints[joint])}'s angle is stuck: constant for "
+            f"{samples.sum() / motion.sample_rate_hz:.2f} s, {when(motion, found)}, while the rest moved on; "
+            "check the encoder's cable and the drive's status",
             dilate(samples, reach),
         )
 
@@ -144,7 +146,7 @@ def _torque(motion: Motion, joint: int) -> Iterator[Fault]:
         yield Fault(
             motion.file,
             channel,
-            f"the {name}'s torque is saturated: clipped at {limits} in {samples.sum()} samples "
+            f"{the(name)}'s torque is saturated: clipped at {limits} in {samples.sum()} samples "
             f"({100 * samples.mean():.2g} %), {when(motion, tops)}; "
             "raise the sensor's range or the drive's limit, or move more gently",
             samples,
@@ -156,7 +158,7 @@ def _torque(motion: Motion, joint: int) -> Iterator[Fault]:
         yield Fault(
             motion.file,
             channel,
-            f"the {name}'s torque is stuck: constant for {samples.sum() / motion.sample_rate_hz:.2f} s, "
+            f"{the(name)}'s torque is stuck: constant for {samples.sum() / motion.sample_rate_hz:.2f} s, "
             f"{when(motion, stuck)}, while the joint moved; check the current sensor and the drive's status",
             samples,
         )

@@ -9,9 +9,11 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.contracts.joints import the
 from pipelines.diagnosis.faults.body import Averages, fit
 from pipelines.diagnosis.faults.fault import Fault, column
 from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.origin import settings_of
 
 WRONG = 3.0
 """Factor that is no gain, where it is well measured."""
@@ -50,13 +52,13 @@ def angle_unit_faults(motion: Motion) -> Iterator[Fault]:
                 motion.file,
                 channel,
                 f"{channel} is in {unit}: it moves {factor:.3g} times as far as its set-point, all along; "
-                "set the channel's scale in the rig file",
+                f"set the channel's scale in {settings_of(motion)}",
             )
         elif len(q) and motion.machine.is_exoskeleton and np.abs(q).max() > LARGEST_ANGLE_RAD:
             yield Fault(
                 motion.file,
                 channel,
-                f"{channel} is not in radians, or its zero is lost: the {name} would reach {np.abs(q).max():.3g} rad; "
+                f"{channel} is not in radians, or its zero is lost: {the(name)} would reach {np.abs(q).max():.3g} rad; "
                 "if these are degrees, multiply by pi/180",
             )
 
@@ -97,7 +99,7 @@ def _against_the_drives(run: Averages) -> dict[int, tuple[float, str]] | None:
     """Return the joints whose torque is not what their position loops ask for; None where not both loops are known."""
     laws = [drive_law(run.motion, j) for j in range(2)]
     wrong = {
-        j: (law, f"the {name}'s position loop")
+        j: (law, f"{the(name)}'s position loop")
         for j, (name, law) in enumerate(zip(run.motion.joints, laws, strict=True))
         if law and not 1 / WRONG < law < WRONG
     }
@@ -144,8 +146,8 @@ def _against_the_other_joint(run: Averages) -> dict[int, tuple[float, str]]:
     first, second = run.motion.joints
     link = "shank" if of_a_leg else "link"
     if abs(np.log(by_knee)) > abs(np.log(by_hip)):
-        return {1: (1 / scale, f"the {first}, which carries the same {link}")}
-    return {0: (scale, f"the {second}, which carries the same {link}")}
+        return {1: (1 / scale, f"{the(first)}, which carries the same {link}")}
+    return {0: (scale, f"{the(second)}, which carries the same {link}")}
 
 
 def shank(run: Averages) -> tuple[float, float]:
@@ -197,5 +199,5 @@ def _torque_fault(run: Averages, joint: int, factor: float, witness: str) -> Fau
         run.motion.file,
         channel,
         f"{channel} is in another unit than N·m{guess}: a factor of {factor:.3g} against {witness}, all along; "
-        "set the channel's scale in the rig file",
+        f"set the channel's scale in {settings_of(run.motion)}",
     )

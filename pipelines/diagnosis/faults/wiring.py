@@ -10,6 +10,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.contracts.joints import the
 from pipelines.diagnosis.faults.body import (
     AS_RECORDED,
     EXCHANGED,
@@ -21,6 +22,7 @@ from pipelines.diagnosis.faults.body import (
 )
 from pipelines.diagnosis.faults.fault import WHOLE_ROW, Fault, column
 from pipelines.mechanics.motion import CUFFS, Motion
+from pipelines.mechanics.origin import settings_of
 
 FAR_BETTER = 0.5
 """By which the power left unexplained must fall for each channel said to be wrong: the more channels, the less
@@ -98,7 +100,7 @@ def wiring_faults(run: Averages) -> Iterator[Fault]:
         f"{_percent(misfit(as_recorded))} as recorded"
     )
     if best[4] == SIGN and (mirror := MIRROR_IMAGES.get(best[3])):
-        mirror = mirror.replace("hip", run.motion.joints[HIP])
+        mirror = mirror.replace("the hip", the(run.motion.joints[HIP]))
         why += f" (so they would with {mirror} reversed instead: a mirror image)"
     say = _reversed if best[4] == SIGN else _exchanged
     yield say(run.motion, best[3], why)
@@ -135,16 +137,17 @@ def _names(motion: Motion, channels: tuple[tuple[int, str], ...]) -> tuple[str, 
 
 def _reversed(motion: Motion, channels: tuple[tuple[int, str], ...], why: str) -> Fault:
     channel, names = _names(motion, channels)
+    mend = f"in {settings_of(motion)}, if every run has it, and in this recording"
     return Fault(
-        motion.file, channel,
-        f"the sign of {names} is reversed, all along: {why}; turn it round in this recording, and in the rig file if "
-        "every run has it",
+        motion.file, channel, f"the sign of {names} is reversed, all along: {why}; turn it round {mend}"
     )  # fmt: skip
 
 
 def _exchanged(motion: Motion, channels: tuple[tuple[int, str], ...], why: str) -> Fault:
     channel, names = _names(motion, channels)
-    return Fault(motion.file, channel, f"{names} are swapped, all along: {why}; exchange the joints in the rig file")
+    return Fault(
+        motion.file, channel, f"{names} are swapped, all along: {why}; exchange the joints in {settings_of(motion)}"
+    )  # fmt: skip
 
 
 def _percent(share: float) -> str:

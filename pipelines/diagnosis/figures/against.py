@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from pipelines.contracts.joints import the
 from pipelines.diagnosis.dependence import VARIABLES, Variable, knows, pooled, tone
 from pipelines.diagnosis.diagnose import Diagnosis
 from pipelines.diagnosis.figures.palette import AFTER, BEFORE
@@ -74,7 +75,7 @@ def _parts(variable: Variable | None, runs: Sequence[Run], j: int) -> tuple[NDAr
 def _title(variable: Variable, joints: Sequence[str], j: int) -> str:
     joint = joints[1 - j if variable.name.startswith("other_") else j]
     titles = {
-        "reversals": f"time since the {joint} reversed",
+        "reversals": f"time since {the(joint)} reversed",
         "cuff_force": f"{joint} cuff torque",
         "temperature": f"{joint} motor's temperature",
         "time": "time since the run began",
