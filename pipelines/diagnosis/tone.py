@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.observations import Run
 
 LOWEST_HZ = 1.2
-"""Below it the motion itself has its lines."""
+"""Below it the motion itself has its lines, however slow it is."""
+HARMONICS, MOVING = 2.0, 0.99
+"""Harmonics of the motion's own band that its misfit has lines up to, and share of the speed's power in that band."""
 SHORTEST = 256
 """Blocks in which a line stands out."""
 WIDTH = 2
@@ -19,6 +21,7 @@ def strongest_tone(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray
     """Return the rms (N·m) of the strongest line in any run's residual (m, O), for each output, (O,).
 
     A line is the power within ``WIDTH`` bins of the highest; of noise alone that is some 0.1 of its rms over a run.
+    Only where the motion has none of its own.
     """
     tones = np.zeros(residuals[0].shape[1])
     for run, residual in zip(runs, residuals, strict=True):
@@ -32,8 +35,16 @@ def strongest_tone(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray
         window = np.hanning(len(filled))
         power = np.abs(np.fft.rfft(filled * window[:, np.newaxis], axis=0)) ** 2
         power *= 2.0 / (np.sum(window**2) * len(filled)) / there**2
-        power[np.fft.rfftfreq(len(filled), spacing) < LOWEST_HZ] = 0.0
+        power[np.fft.rfftfreq(len(filled), spacing) < max(LOWEST_HZ, HARMONICS * _band_hz(run))] = 0.0
         peak = np.argmax(power, axis=0)
         for o, at in enumerate(peak):
             tones[o] = max(tones[o], np.sqrt(power[max(at - WIDTH, 0) : at + WIDTH + 1, o].sum()))
     return tones
+
+
+def _band_hz(run: Run) -> float:
+    """Return the frequency below which the joints' speeds have nearly all of their power."""
+    speed = run.motion.dq[run.motion.valid]
+    power = np.sum(np.abs(np.fft.rfft(speed - speed.mean(axis=0), axis=0)) ** 2, axis=1)
+    share = np.cumsum(power) / max(power.sum(), np.finfo(float).tiny)
+    return float(np.searchsorted(share, MOVING) * run.motion.sample_rate_hz / len(speed))

@@ -62,6 +62,16 @@ def test_a_hum_stands_out_with_its_own_size_wherever_noise_alone_has_no_line(run
     assert alone[0] < 0.3 * NOISE
 
 
+@pytest.mark.parametrize(("frequency", "hums"), [(2.5, False), (4.3, False), (8.9, True)])
+def test_what_a_fast_motion_has_lines_at_itself_is_no_hum(run, frequency, hums):
+    time = np.arange(len(run.motion.dq)) / run.motion.sample_rate_hz
+    swinging = np.column_stack([np.sin(2 * np.pi * 2.5 * time), np.sin(2 * np.pi * 1.1 * time)])
+    fast = replace(run, motion=replace(run.motion, dq=swinging))
+    line = 0.6 * np.sin(2 * np.pi * frequency * run.time)[:, np.newaxis]
+    found = strongest_tone([fast], [noise(run) + line])[0]
+    assert found == pytest.approx(0.6 / np.sqrt(2), rel=0.15) if hums else found < 0.3 * NOISE
+
+
 def test_play_is_heard_where_scatter_follows_the_load_through_zero_and_only_at_its_joint(run):
     load = run.average(run.motion.load)
     loud = noise(run)
