@@ -1,6 +1,7 @@
 """A Modbus device: what can be asked of it, and every way to fail turned into one sentence."""
 
 from collections.abc import Awaitable, Callable, Iterable, Sequence
+from math import inf
 from typing import Any, NamedTuple
 
 from pymodbus.constants import ExcCodes
@@ -99,8 +100,14 @@ class Device:
         request = self._client.write_registers
         await self._ask(what, None, wait, request, address=block.address, values=list(words))
 
-    async def exchange(self, write: Block, words: Sequence[int], read: Block) -> list[int]:
-        """Write one block and read another in one FC23 exchange."""
+    async def exchange(self, write: Block, words: Sequence[int], read: Block, *, fresh_s: float = inf) -> list[int]:
+        """Write one block and read another in one FC23 exchange, unless the line is busy for longer than ``fresh_s``.
+
+        Raises
+        ------
+        Unsent
+            It was; nothing was written.
+        """
         what = f"an exchange (writing registers {_range(write)}, reading {_range(read)})"
         return await self._ask(
             what,
@@ -111,6 +118,7 @@ class Device:
             read_count=read.count,
             write_address=write.address,
             values=list(words),
+            fresh_s=fresh_s,
         )
 
     async def _ask(

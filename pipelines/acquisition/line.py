@@ -7,6 +7,7 @@ import ssl
 import sys
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
+from math import inf
 from pathlib import Path
 from typing import Any, cast
 
@@ -19,7 +20,7 @@ from pymodbus.pdu import DecodePDU, ModbusPDU
 from serial.tools import list_ports
 
 from pipelines.acquisition.reply import check_replies
-from pipelines.errors import DeviceError, SettingsError
+from pipelines.errors import DeviceError, SettingsError, Unsent
 from pipelines.settings.line import LineSettings, NetworkLine, RtuLine, RtuOverTcpLine, TlsLine
 from pipelines.settings.rig import DeviceSettings, RigSettings
 
@@ -118,21 +119,37 @@ class Line:
             self._owed.clear()
 
     async def ask(
-        self, unit: int, within_s: float, request: Callable[..., Awaitable[ModbusPDU]], **arguments: Any
+        self,
+        unit: int,
+        within_s: float,
+        request: Callable[..., Awaitable[ModbusPDU]],
+        *,
+        fresh_s: float = inf,
+        **arguments: Any,
     ) -> ModbusPDU:
         """Send a unit a request of the client's when it is its turn, and return the answer, awaited for ``within_s``.
 
         Raises
         ------
+        Unsent
+            Its turn came only when the request was older than ``fresh_s``.
         DeviceError
             The line is lost.
         ModbusException, OSError
             The device did not answer; the line stands.
         """
-        self._asked.setdefault(unit, asyncio.get_running_loop().time())
+        loop = asyncio.get_running_loop()
+        decided = loop.time()
+        self._asked.setdefault(unit, decided)
         await self._take_turn(unit)
         try:
             await self._quiet()
+            if loop.time() - decided > fresh_s:
+                self._asked.pop(unit, None)
+                raise Unsent(
+                    f"{self._label}: was busy for {loop.time() - decided:.3g} s, too long for what was to be sent to "
+                    f"unit {unit}; see to devices on it that do not answer, or give it fewer of them"
+                )
             # The one place where pymodbus looks for how long to wait, be it for a connection or for an answer.
             self.client.ctx.comm_params.timeout_connect = within_s
             self._asking = self._failed = True
@@ -145,10 +162,11 @@ class Line:
                 raise
             raise DeviceError(f"{self._label}: {self._loss()}") from error
         finally:
+            if self._asking:
+                self._quiet_since = loop.time()
+                if self._failed and (len(self.devices) > 1 or not self.tells_replies_apart):
+                    self._owed[unit] = Owed(within_s)
             self._asking = False
-            self._quiet_since = asyncio.get_running_loop().time()
-            if self._failed and (len(self.devices) > 1 or not self.tells_replies_apart):
-                self._owed[unit] = Owed(within_s)
             self._turn.release()
 
     def awaited_s(self, unit: int) -> float:

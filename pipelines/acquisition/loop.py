@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from pipelines.acquisition.columns import columns_of
 from pipelines.acquisition.journal import Journal
 from pipelines.acquisition.latency import Latencies
-from pipelines.acquisition.machine import Answers, Machine, Row, all_answers
+from pipelines.acquisition.machine import Answers, Machine, Reading, Row, all_answers
 from pipelines.acquisition.pace import Lockstep, PhaseLock
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.sampling import Sampling
 from pipelines.acquisition.states import SLACK_SAMPLES, State, Supervisor
-from pipelines.errors import DeviceError, Unanswered
+from pipelines.errors import DeviceError, Unanswered, Unsent
 
 REPORT_S = 0.1
 DISABLE_TRIES = 3
@@ -129,6 +129,9 @@ class Loop:
                 continue
             answers = await self._exchange(self.supervisor.next(found, time.monotonic()))
             row = self.supervisor.judge(answers, time.monotonic())
+            for joint, told in enumerate(answers.drives):
+                if isinstance(told, Unsent):  # now, rather than after who kept it waiting is asked again
+                    await self._tell_alone(joint)
             if row is None:
                 continue
             last = self._row = row
@@ -183,13 +186,13 @@ class Loop:
 
     async def _tell_alone(self, joint: int) -> None:
         """Tell one drive where to go, from where it is."""
-        drive, told = self.machine.drives[joint], self.supervisor.sent_at[joint]
+        told = self.supervisor.sent_at[joint]
         try:
             self._heed(joint)
             if self.supervisor.is_stale(joint, time.monotonic()):
                 await self._find(joint)
             if self.supervisor.sent_at[joint] == told:
-                reading = await drive.exchange(self.supervisor.tend(joint, time.monotonic()))
+                reading = await self._send(joint, self.supervisor.tend(joint, time.monotonic()))
                 self.supervisor.hear(joint, time.monotonic())
                 self.supervisor.judge_tended(joint, reading)
         except Unanswered:  # whoever follows the plan finds out for how long
@@ -215,11 +218,21 @@ class Loop:
     async def _exchange(self, reference: NDArray) -> Answers:
         self._cycle += 1
         asked = time.perf_counter()
-        answers = await self.machine.cycle(reference, self._cycle)
+        answers = await self.machine.cycle(reference, self._cycle, self.supervisor.fresh_s(time.monotonic()))
         self._latencies.add(time.perf_counter() - asked)
-        for joint in range(len(self.machine.drives)):
+        for joint, drive in enumerate(self.machine.drives):
+            self.supervisor.hear(joint, drive.told_at)
             self._heed(joint)
         return answers
+
+    async def _send(self, joint: int, reference: float, *, halt: bool = False) -> Reading:
+        """Tell one drive a set-point (rad); the supervisor is told where that did not go out."""
+        fresh_s = float(self.supervisor.fresh_s(time.monotonic())[joint])
+        try:
+            return await self.machine.drives[joint].exchange(reference, halt=halt, fresh_s=fresh_s)
+        except Unsent:
+            self.supervisor.unsent(joint)
+            raise
 
     def _heed(self, joint: int) -> None:
         """Heed what a drive has told, though it came beside what is awaited, or ended the run, or was asked again."""
@@ -313,7 +326,7 @@ class Loop:
                     if not (due := self.supervisor.stop(joint, time.monotonic())):
                         break
                     reference, halt = due
-                    reading = await drive.exchange(reference, halt=halt)
+                    reading = await self._send(joint, reference, halt=halt)
                     answered = time.monotonic()
                     self.supervisor.hear(joint, answered)
                     self.supervisor.feel(joint, reading)

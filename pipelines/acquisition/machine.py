@@ -5,6 +5,7 @@ import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from math import inf
 from typing import TypeVar
 
 import numpy as np
@@ -16,7 +17,7 @@ from pipelines.acquisition.device import Device
 from pipelines.acquisition.line import Line, lines_of
 from pipelines.acquisition.patience import Patience
 from pipelines.acquisition.ring import Queue, Ring
-from pipelines.errors import DeviceError, Refused, SettingsError, Unanswered
+from pipelines.errors import DeviceError, Refused, SettingsError, Unanswered, Unsent
 from pipelines.mechanics.motion import CUFFS
 from pipelines.registers import Block
 from pipelines.settings.rig import DriveSettings, RigSettings, SensorSettings, registers_of
@@ -141,16 +142,26 @@ class Drive:
             self._counted = number
         return number
 
-    async def exchange(self, reference: float, *, halt: bool = False) -> Reading:
-        """Send a set-point (rad) and return the sample that is latched; ``halt`` where the leg is to stand there."""
+    async def exchange(self, reference: float, *, halt: bool = False, fresh_s: float = inf) -> Reading:
+        """Send a set-point (rad) and return the sample that is latched; ``halt`` where the leg is to stand there.
+
+        Raises
+        ------
+        Unsent
+            The line was busy until the set-point was older than ``fresh_s``: by then the drive may have gone on.
+        """
         control = self.map.enable if self.map.halt is None or not halt else self.map.halt
         words = self.words(control, reference)
-        self.told_reference = reference
+        held, self.told_reference = self.told_reference, reference
         self.conditions.clear()
         # Nobody knows which set-point a drive follows that did not answer.
         before, self._sent = self._sent, np.nan
         sent = time.perf_counter()
-        answer = await self.device.exchange(self.tell, words, self.told)
+        try:
+            answer = await self.device.exchange(self.tell, words, self.told, fresh_s=fresh_s)
+        except Unsent:
+            self.told_reference, self._sent = held, before
+            raise
         self._sent, self.told_at = before, time.monotonic()
         reading = self._reading(answer, sent)
         self._sent = reference
@@ -523,8 +534,10 @@ class Machine:
         """Return the cycle that the first drive is in."""
         return await self.drives[0].count() // self.samples_per_cycle
 
-    async def cycle(self, reference: NDArray, number: int) -> Answers:
+    async def cycle(self, reference: NDArray, number: int, fresh_s: NDArray) -> Answers:
         """Send set-points (J,) rad and return what came: the sample that all devices latched, or of each its newest.
+
+        Set-points that cannot be sent within ``fresh_s`` (J,) s are not.
 
         In lockstep the drives' exchange ends a sample, so sensors are read before it. In real time the drives
         tell when a new sample begins, so sensors are read after it. Nothing is sent twice, for a set-point that comes
@@ -532,9 +545,9 @@ class Machine:
         """
         if self.rig.clock == "lockstep":
             forces = await self.felt(number)
-            told = await self._exchange(reference)
+            told = await self._exchange(reference, fresh_s)
         else:
-            told = await self._exchange(reference)
+            told = await self._exchange(reference, fresh_s)
             forces = await self.felt(number)
         readings = [answer for answer in told if isinstance(answer, Reading)]
         whole = len(readings) == len(told)
@@ -555,10 +568,10 @@ class Machine:
                 forces[CUFFS.index(sensor.settings.cuff)] = force
         return forces
 
-    async def _exchange(self, reference: NDArray) -> list[Reading | Unanswered]:
+    async def _exchange(self, reference: NDArray, fresh_s: NDArray) -> list[Reading | Unanswered]:
         """Exchange every drive; return what each answers."""
-        pairs = zip(self.drives, reference.tolist(), strict=True)
-        return await answers_or_silence(drive.exchange(angle) for drive, angle in pairs)
+        due = zip(self.drives, reference.tolist(), fresh_s.tolist(), strict=True)
+        return await answers_or_silence(drive.exchange(angle, fresh_s=fresh) for drive, angle, fresh in due)
 
     async def _latch(self, readings: list[Reading]) -> bool:
         """Ask those drives again that have not latched the others' sample yet.

@@ -7,6 +7,7 @@ docs/safety.md draws it.
 from asyncio import CancelledError
 from collections.abc import Sequence
 from enum import StrEnum
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from pipelines.acquisition.machine import Answers, Condition, Reading, Row
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.safety import HOLD_SAMPLES, Limits, refuse_leap, slowed
 from pipelines.acquisition.stream import Stream
-from pipelines.errors import DeviceError, Unanswered
+from pipelines.errors import DeviceError, Unanswered, Unsent
 from pipelines.mechanics.motion import CUFFS
 from pipelines.settings.rig import RigSettings, SensorSettings
 
@@ -30,6 +31,9 @@ break it by what it overshoots, and by a count."""
 SLACK_SAMPLES = 2
 """How far set-points may be ahead of their speed limit for a moment: they come in step with samples, which the host
 sees up to one sample late or early."""
+
+FRESH_SAMPLES = 3
+"""How long after a drive has answered it may be sent a set-point that was decided by that: it may go on by itself."""
 
 
 class State(StrEnum):
@@ -91,15 +95,23 @@ class Supervisor:
         self._streams = [Stream(rig, j, sample_rate_hz, told) for j, told in enumerate(self._told)]
         self._records = [Stream(rig, j, sample_rate_hz, told) for j, told in enumerate(self._told)]
         self._speed = np.zeros_like(self.sent)
+        """(J,) rad/s that a stop slows down from: the plan's, as far as set-points move with it."""
+        self._pace = np.zeros_like(self.sent)
+        """(J,) rad/s at which a drive may go on by itself: as its last set-point did from the one before."""
+        self._fresh_until = np.full_like(self.sent, inf)
+        """(J,) until when the last set-points may be sent, host's clock, s: then a drive may have gone on too far."""
         self._held = [0 for _ in rig.drive]
         """For how many samples each drive has been held at rest in the stop."""
         self._sample_s = np.full(len(rig.drive), 1.0 / sample_rate_hz)
         self._walk = WALK * np.array([drive.speed_rad_s for drive in rig.drive])
         """(J,) how fast set-points walk back to the plan, rad/s."""
-        self._in_force = self.sent
+        self._in_force = self.sent.copy()
         """(J,) set-points, rad, that are reached at the sample which is latched when the last ones are sent."""
         self._lead = np.zeros_like(self.sent)
         """By how much the set-points are ahead of what the speed limits allow, s; never more than the slack."""
+        self._decided = (self.sent, self.base, self.sent_at, self._lead, self._pace)
+        """What a set-point changes, and beside it what that was before."""
+        self._before = [state.copy() for state in self._decided]
         self._enabled: list[bool | None] = [None for _ in rig.drive]
         """What each drive said last of being enabled."""
         self._let_go = [False for _ in rig.drive]
@@ -117,7 +129,7 @@ class Supervisor:
         """Take the plan, and where the leg stood when it was made, (J,) rad."""
         self._plan = plan
         self._start = start
-        self.sent, self.base = start.copy(), start.copy()
+        self.sent[:] = self.base[:] = start
 
     def check_rest(self, row: Row) -> None:
         """Refuse to enable drives whose leg no longer stands where the plan begins, or breaks a limit."""
@@ -185,13 +197,13 @@ class Supervisor:
         cycle = self.rig.samples_per_cycle(self.rate)
         self._streams[0].refuse_count((found + 1) * cycle - 1)
 
-    def hear(self, joint: int, now: float) -> None:
-        """Note that a drive has answered, so that what it was sent has arrived."""
-        self._heard_at[joint] = now
+    def hear(self, joint: int, at: float) -> None:
+        """Note when a drive has answered, so that what it was sent has arrived."""
+        self._heard_at[joint] = max(self._heard_at[joint], at)
 
     def is_stale(self, joint: int, now: float) -> bool:
         """Tell whether a drive's set-point is so old that nobody knows what it has made of it."""
-        if self.rig.clock == "lockstep" or self._speed[joint] == 0.0:  # one that is held has nowhere to go on to
+        if self.rig.clock == "lockstep" or self._pace[joint] == 0.0:  # one that is held has nowhere to go on to
             return False
         return bool(now - self._heard_at[joint] > SLACK_SAMPLES / self.rate)
 
@@ -210,7 +222,7 @@ class Supervisor:
             reach = drive.speed_rad_s * silent_s
             place = np.clip(reading.reference, sent - reach, sent + reach)
         else:  # its leg lags behind one that holds, and is ahead with one that goes on
-            place = np.clip(reading.angle, *sorted((sent, sent + self._speed[joint] * silent_s)))
+            place = np.clip(reading.angle, *sorted((sent, sent + self._pace[joint] * silent_s)))
         speed = (place - sent) / silent_s if np.isnan(reading.velocity) else reading.velocity
         self.base[joint] = place
         self._speed[joint] = np.clip(speed, *sorted((0.0, self._speed[joint])))
@@ -284,9 +296,6 @@ class Supervisor:
             Where anything that came, whole or not, is reason to stop.
         """
         self.refuse_after_abort()
-        for joint, found in enumerate(answers.drives):
-            if isinstance(found, Reading):
-                self.hear(joint, now)
         if why := self._dropped(answers):
             raise DeviceError(why)
         new = [self._is_new(j, found, now) for j, found in enumerate(answers.drives)]
@@ -310,7 +319,10 @@ class Supervisor:
     def _is_new(self, joint: int, found: Reading | Unanswered, now: float) -> bool:
         """Tell whether an answer is a new sample; raise DeviceError where it, or silence, is reason to stop."""
         stream = self._streams[joint]
-        if isinstance(found, Unanswered):
+        if isinstance(found, Unsent):
+            self.unsent(joint)
+            is_new = False
+        elif isinstance(found, Unanswered):
             stream.miss(found)
             is_new = False
         else:
@@ -379,10 +391,19 @@ class Supervisor:
         if State.ABORT in TRANSITIONS[self.state]:
             self._go(State.ABORT)
 
+    def fresh_s(self, now: float) -> NDArray:
+        """Return for how long the last set-points may wait for their turn on a line, (J,) s."""
+        return self._fresh_until - now
+
+    def unsent(self, joint: int) -> None:
+        """Take back the last set-point of a drive: it did not go out."""
+        for state, before in zip(self._decided, self._before, strict=True):
+            state[joint] = before[joint]
+
     def begin_stop(self, joint: int, reference: float) -> None:
         """Begin to stop a drive; ``reference`` is the last set-point, rad, that went out to it."""
         if reference != self.sent[joint]:
-            self.sent[joint] = self.base[joint] = reference
+            self.unsent(joint)
 
     def stop(self, joint: int, now: float) -> tuple[float, bool] | None:
         """Return the set-point, rad, that brings one drive to rest or holds it there, and whether it is to halt there.
@@ -542,9 +563,14 @@ class Supervisor:
 
     def _note(self, which: slice, reference: NDArray, now: float) -> None:
         """Note set-points, rad, of ``which`` joints that are sent now."""
+        for state, before in zip(self._decided, self._before, strict=True):
+            before[which] = state[which]
+        stays = (self.rig.clock == "lockstep") | (self._pace[which] == 0.0)
+        self._fresh_until[which] = np.where(stays, inf, self._heard_at[which] + FRESH_SAMPLES / self.rate)
         taken = np.abs(reference - self.sent[which]) / [drive.speed_rad_s for drive in self.rig.drive[which]]
         ahead = self._lead[which] + taken - self._elapsed_s(now)[which]
         self._lead[which] = np.clip(ahead, 0.0, SLACK_SAMPLES / self.rate)
+        self._pace[which] = (reference - self.sent[which]) / np.maximum(now - self.sent_at[which], 1.0 / self.rate)
         self.sent[which] = self.base[which] = reference
         self.sent_at[which] = now
 

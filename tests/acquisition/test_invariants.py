@@ -312,6 +312,22 @@ relaxed = dict(deadline=None, suppress_health_check=list(HealthCheck))
     happens=[Event(at=47, kind="fault", what=None), Event(at=47, kind="reading", what=("velocity", np.nan))],
     plan=None, own=None,
 )  # fmt: skip
+@example(
+    clock="real_time", reads_back=False, count_rad=FINE_RAD, line="tcp", goes_on=True, human=True,
+    happens=[Event(at=250, kind="late", what=0.0), Event(at=250, kind="late", what=0.0),
+             Event(at=250, kind="lost", what=None), Event(at=255, kind="lost", what=None)], plan=None, own=None,
+)  # fmt: skip
+@example(
+    clock="real_time", reads_back=False, count_rad=FINE_RAD, line="tcp", goes_on=True, human=False,
+    happens=[Event(at=153, kind="late", what=0.046875), Event(at=163, kind="late", what=0.046875),
+             Event(at=164, kind="lost", what=None)], plan=None, own=None,
+)  # fmt: skip
+@example(
+    clock="real_time", reads_back=True, count_rad=FINE_RAD, line="tcp", goes_on=True, human=True,
+    happens=[Event(at=135, kind="late", what=0.0), Event(at=135, kind="counter", what=1),
+             Event(at=138, kind="counter", what=1), Event(at=143, kind="counter", what=1),
+             Event(at=149, kind="lost", what=None)], plan=None, own=None,
+)  # fmt: skip
 @sequences
 @settings(max_examples=60, derandomize=True, **relaxed)
 def test_whatever_happens_the_leg_is_stopped_within_its_limits_and_it_is_said_why(

@@ -17,11 +17,12 @@ from pipelines.acquisition.device import Device
 from pipelines.acquisition.line import Line, _explained
 from pipelines.acquisition.machine import Machine
 from pipelines.contracts import RECORDING
-from pipelines.errors import DeviceError, SettingsError, Unanswered
+from pipelines.errors import DeviceError, SettingsError, Unanswered, Unsent
+from pipelines.registers import Block
 from pipelines.rig.null_modem import null_modem
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.line import RtuLine, RtuOverTcpLine
-from pipelines.settings.rig import SafetySettings, load_rig
+from pipelines.settings.rig import Register, SafetySettings, load_rig
 
 from .conftest import free_port
 
@@ -412,3 +413,21 @@ def test_a_line_is_renewed_only_where_it_failed_and_nobody_is_asked_in_between()
         return opened, found
 
     assert Slow(9.0, 0.0).at_work(ask) == ([False], [1, 1])
+
+
+def test_a_set_point_that_waited_too_long_for_its_turn_is_not_sent():
+    slow = Slow(0.3, 0.0, 0.0)
+
+    async def ask(device):
+        drive = Device("drive knee", 2, device.line, SafetySettings(watchdog_s=5.0, reply_s=0.4))
+        block = Block({"reference": Register(address=200, type="uint16")})
+        found = await asyncio.gather(
+            device.read(100, 1), drive.exchange(block, [7], block, fresh_s=0.1), return_exceptions=True
+        )
+        assert drive.awaited_s == 0.0  # nobody waits for an answer to what was not sent
+        return *found, slow.asked, await drive.exchange(block, [8], block, fresh_s=0.1)
+
+    first, unsent, asked, after = slow.at_work(ask)
+    assert (first, asked, after) == ([0], 1, [1])
+    assert isinstance(unsent, Unsent)
+    assert re.match(r"line leg \(.*\): was busy for 0\.3\d* s, too long for what was to be sent to unit 2", str(unsent))

@@ -165,6 +165,28 @@ def test_a_set_point_that_comes_soon_after_a_late_one_leads_back_to_the_plan_no_
     assert soon - first == pytest.approx(2.0 / RATE)  # the plan's own
 
 
+@pytest.mark.parametrize("tells", [True, False])
+def test_a_drive_that_went_on_while_it_was_led_back_to_a_standing_plan_is_found_where_it_is(tmp_path, tells):
+    """The plan stands, so that nothing is left to be slowed down; the drive moves all the same."""
+    text = (datasets() / "rigs" / "real_time.toml").read_text()
+    register = 'reference = { address = 110, type = "int32", scale = 1e-6, unit = "rad" }'
+    assert register in text
+    (tmp_path / "rig.toml").write_text(text if tells else text.replace(register, ""))
+    supervisor = Supervisor(load_rig(tmp_path / "rig.toml"), RATE)
+    supervisor.check()
+    supervisor.take(Plan(np.full((128, 2), [0.2, 0.0]), 50, 100), np.array([0.2, 0.0]))
+    supervisor.rest(10.0)
+    supervisor.begin(row(100), 10.0)
+    supervisor.base[0] = supervisor.sent[0] = 0.1
+    supervisor.next(101, 10.0 + 1 / RATE)
+    at = 10.0 + 4 / RATE
+    assert supervisor.is_stale(0, at)
+    assert not supervisor.is_stale(1, at), "it is held"
+    sent = supervisor.sent[0]
+    supervisor.resume(0, told(sent + 0.02), at)
+    assert supervisor.base[0] == pytest.approx(sent + 0.02)
+
+
 def test_a_run_that_lags_too_far_behind_its_plan_is_stopped(supervisor):
     supervisor.take(Plan(np.arange(1, 129)[:, np.newaxis] * [2.9 / RATE, 0.0], 50, 100), np.zeros(2))
     supervisor.rest(10.0)
