@@ -38,6 +38,8 @@ def measured(found: dict[str, Diagnosed], data: Path) -> dict[str, str]:
             made[name] = tables.pendulum(name, found, data)
     if any(len(one.motions[0].joints) == 2 for one in found.values()):
         made["timing"] = tables.timing(found)
+    if "A0-fourier" in found:
+        made["A0-orders"] = tables.by_order(found["A0-fourier"])
     for key, one in found.items():
         made |= {f"{key}-depends": tables.depends(one), f"{key}-says": f"> {one.verdict['summary']}"}
     return made

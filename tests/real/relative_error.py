@@ -9,7 +9,7 @@ from scipy.signal import decimate
 
 from pipelines.mechanics.motion import Motion
 from pipelines.model import Model
-from pipelines.signals.low_pass import low_pass
+from pipelines.signals.low_pass import ORDER, low_pass
 
 EDGE = 20
 """Decimated samples at each end of a run where the filter lacks one side."""
@@ -40,24 +40,24 @@ def torque_error(left: NDArray, torque: NDArray) -> TorqueError:
     return TorqueError(size / np.sqrt(len(left)), 100.0 * size / all_of_it)
 
 
-def _slow(x: NDArray, motion: Motion) -> NDArray:
+def _slow(x: NDArray, motion: Motion, order: int) -> NDArray:
     """Put (n, ...) behind a zero-phase low-pass of 5 Hz, on a uniform grid over the samples that are valid."""
     inside = np.flatnonzero(motion.valid)
     grid = np.arange(motion.time[0], motion.time[-1], 1.0 / motion.sample_rate_hz)
     kept = (grid >= motion.time[inside[0]]) & (grid <= motion.time[inside[-1]])
     uniform = np.column_stack([np.interp(grid, motion.time, column) for column in x.reshape(len(x), -1).T])
-    return low_pass(uniform, motion.sample_rate_hz, SLOW_HZ)[kept].reshape(-1, *x.shape[1:])
+    return low_pass(uniform, motion.sample_rate_hz, SLOW_HZ, order)[kept].reshape(-1, *x.shape[1:])
 
 
-def slow_error(predicted: NDArray, motion: Motion) -> TorqueError:
+def slow_error(predicted: NDArray, motion: Motion, order: int = ORDER) -> TorqueError:
     """Return the error below 5 Hz, reversals included, of a predicted torque (n, J)."""
-    return torque_error(_slow(motion.torque - predicted, motion), _slow(motion.torque, motion))
+    return torque_error(_slow(motion.torque - predicted, motion, order), _slow(motion.torque, motion, order))
 
 
-def slow_fit(model: Model, motions: Sequence[Motion]) -> Model:
+def slow_fit(model: Model, motions: Sequence[Motion], order: int = ORDER) -> Model:
     """Return the model by ordinary least squares below 5 Hz, as the README of the data fits it."""
-    A = np.concatenate([_slow(model.regressor(motion), motion) for motion in motions])
-    b = np.concatenate([_slow(motion.torque, motion) for motion in motions])
+    A = np.concatenate([_slow(model.regressor(motion), motion, order) for motion in motions])
+    b = np.concatenate([_slow(motion.torque, motion, order) for motion in motions])
     return model.with_linear(np.linalg.lstsq(A.reshape(-1, A.shape[-1]), b.ravel(), rcond=None)[0])
 
 

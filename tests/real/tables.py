@@ -97,6 +97,17 @@ def pendulum(name: str, found: Mapping[str, Diagnosed], data: Path) -> str:
     return table(headings, rows)
 
 
+def by_order(d: Diagnosed) -> str:
+    """Return the error on the held-out run for each steepness that the low-pass of 5 Hz may have."""
+    trained, (held_out,) = of_purpose(d.motions, "train"), of_purpose(d.motions, "validate")
+    rows = []
+    for order in (1, 2, 3, 4):
+        plain, refitted = (slow_fit(model, trained, order) for model in (with_rotor(trained[0]), d.model))
+        errors = [slow_error(model.torque(held_out), held_out, order).percent for model in (plain, d.model, refitted)]
+        rows.append((str(order), *(" / ".join(f"{e:.1f}" for e in error) for error in errors)))
+    return table(("order of the filter", "least squares, %", "extended, %", "refitted, %"), rows)
+
+
 def _both(error: TorqueError) -> tuple[str, str]:
     return " / ".join(f"{e:.3f}" for e in error.rms), " / ".join(f"{e:.1f}" for e in error.percent)
 

@@ -37,17 +37,20 @@ def test_friction_that_goes_with_the_load_of_a_planetary_gear_is_named_and_foret
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("design", ["A0", "C1"])
-def test_in_free_swings_nothing_is_accused_and_the_shoulder_is_foretold_about_as_well_as_by_its_makers(
-    design, real_data, tmp_path_factory
+@pytest.mark.parametrize(("design", "named"), [("A0", ("rotor_inertia", "elbow")), ("C1", None)])
+def test_in_free_swings_nothing_but_the_rotor_is_accused_first_and_the_shoulder_is_foretold_better_than_by_its_makers(
+    design, named, real_data, tmp_path_factory
 ):
     """Inertia and gravity nearly cancel there: noise of the angles must pass for no cause, nor for a wrong sign."""
     swings = diagnosed(LOGS[f"{design}-swings"], real_data, tmp_path_factory.mktemp(design))
-    assert swings.causes == []
+    assert next(iter(swings.causes), None) == named
     assert not any("reversed" in fault["what"] for fault in swings.verdict["data_faults"])
     assert any("no torque goes with" in caveat for caveat in swings.verdict["caveats"])
     theirs = double_pendulum(real_data / "double_pendulum" / f"{design}_published_parameters.yml")
     for motion in swings.motions:
         ours = slow_error(swings.model.torque(motion), motion)
         published = slow_error(their_torque(theirs, motion), motion)
-        assert ours.rms[0] < 1.35 * published.rms[0], motion.file
+        assert ours.rms[0] < published.rms[0], motion.file
+    if named:  # what no motion tells apart from it is the rotor's coupling, -gr Ir
+        rotor = swings.verdict["causes"][0]["parameters"][0]
+        assert rotor["value"] == pytest.approx((theirs["gr"] ** 2 + theirs["gr"]) * theirs["Ir"], rel=0.35)
