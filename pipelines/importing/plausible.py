@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.importing.consistency import integral_agreement, mean_power
-from pipelines.importing.finding import Finding
+from pipelines.importing.finding import Finding, counted
 from pipelines.mechanics.machine import MECHANISMS
 from pipelines.settings.import_map import ImportMap, JointSettings
 
@@ -16,6 +16,8 @@ OFF = 0.15
 """By so much the slope between both may be off 1: a filter in the drive, a late sample."""
 STRONGEST = {"torque": 1e3, "force": 1e5}
 """N·m and N: the drives of legs, arms and robots deliver less at a joint; what is more is mostly in another unit."""
+FAR = 20.0
+"""Times further off the middle than 99 % of a column's rows: no motion or load of a machine does that once."""
 GIVES_BACK = 0.2
 """Share of the mean magnitude of power that a drive may take out of a motion, on the whole."""
 
@@ -25,6 +27,7 @@ def look_at(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Fin
     for joint in settings.joint:
         yield from _still(columns, joint)
         yield from _velocity(columns, joint)
+        yield from _slips(columns, joint)
         yield from _too_strong(columns, joint)
     yield from _power(columns, settings.joint)
     if len(settings.joint) > 1 and settings.geometry.thigh_length_m is None:
@@ -41,6 +44,22 @@ def _still(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Fin
         name = joint.joint.column(quantity)
         if np.ptp(columns[name]) == 0.0:
             yield Finding(name, f"is {columns[name][0]:.6g} in every row", "nothing can be learnt from it")
+
+
+def _slips(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
+    """Tell of single readings far beyond what nearly all others are."""
+    for quantity in ("angle", "torque"):
+        name = joint.joint.column(quantity)
+        middle = float(np.median(columns[name]))
+        size = np.abs(columns[name] - middle)
+        usual = float(np.quantile(size, 0.99))
+        far = np.flatnonzero(size > FAR * usual)
+        if usual > 0.0 and len(far):
+            seen = (
+                f"{counted(len(far), 'row')} far off, the first {columns[name][far[0]]:.4g} at "
+                f"{columns['time_s'][far[0]]:.6g} s; 99 % lie between {middle - usual:.4g} and {middle + usual:.4g}"
+            )
+            yield Finding(name, seen, "kept; if it is a slip, a range at the reading leaves it out")
 
 
 def _too_strong(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:

@@ -24,6 +24,10 @@ from pipelines.settings.import_map import ImportMap, RecordingSettings
 
 FEWEST = 10
 """Rows that a recording must have at least."""
+LARGEST_TORQUE = 1e6
+"""N·m or N; beyond it no joint's drive comes near."""
+LONGEST_PERIOD = 1.01
+"""In runs: one that lasts a period ends a sample before it."""
 
 
 @dataclass(frozen=True)
@@ -124,6 +128,8 @@ def _recordings_of(
     findings += _sampling_findings(sampling)
     columns = {"time_s": time} | {name: values[whole] for name, values in columns.items()}
     _refuse_absurd_angles(columns, settings)
+    _refuse_absurd_torques(columns, settings)
+    _refuse_long_periods(wanted, float(run.time_s[-1]))
     findings += look_at(columns, settings)
     findings += before.look_at(f"{path.name}{suffix}", columns, log.turns)
     spans = [_span(time, float(run.time_s[-1]), recording) for recording in wanted]
@@ -208,6 +214,28 @@ def _refuse_absurd_angles(columns: Mapping[str, NDArray], settings: ImportMap) -
             raise SettingsError(
                 f"joint[{i}].angle: would be {np.min(angle):.4g} to {np.max(angle):.4g} rad, expected at most "
                 f"{LARGEST_ANGLE_RAD:.3g} to both sides; correct its unit, zero, counts_per_turn or wraps_at in the map"
+            )
+
+
+def _refuse_absurd_torques(columns: Mapping[str, NDArray], settings: ImportMap) -> None:
+    for i, joint in enumerate(settings.joint):
+        torque, unit = columns[joint.joint.column("torque")], "N·m" if joint.kind == "revolute" else "N"
+        absurd = np.flatnonzero(np.abs(torque) > LARGEST_TORQUE)
+        if len(absurd):
+            first = f"{torque[absurd[0]]:.4g} {unit} at {columns['time_s'][absurd[0]]:.6g} s"
+            raise SettingsError(
+                f"joint[{i}].torque: would be {first}, and "
+                f"beyond {LARGEST_TORQUE:g} {unit}, which no drive delivers, in {counted(len(absurd), 'row')}; leave "
+                "slips out with range, or correct unit, scale and what follows it in the map"
+            )
+
+
+def _refuse_long_periods(wanted: Sequence[RecordingSettings], duration_s: float) -> None:
+    for recording in wanted:
+        if recording.period_s is not None and recording.period_s > LONGEST_PERIOD * duration_s:
+            raise SettingsError(
+                f"recording.period_s: found {recording.period_s:g} ({recording.purpose}), expected at most the "
+                f"{duration_s:.6g} s of the run, for an excitation that repeats; correct it, or remove it"
             )
 
 

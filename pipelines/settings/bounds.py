@@ -13,6 +13,8 @@ SAFETY = {
     "settle_s": 600.0,
 }  # fmt: skip
 """The most that each may be."""
+MOST_GRAVITY_M_S2 = 30.0
+"""More than any planet has; 9.81 in cm/s² is beyond it."""
 STOP_S = 1.0
 """The longest that a stop may take from the highest speed."""
 

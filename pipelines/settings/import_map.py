@@ -17,7 +17,8 @@ from pipelines.settings.rig import GeometrySettings
 from pipelines.settings.units import unit_named, units_of
 from pipelines.validation import closest, similar_file
 
-LARGEST_ZERO = 1e12
+LARGEST = 1e12
+"""The most that a number of a map may be; what is more is a slip of the pen."""
 
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 
@@ -80,7 +81,7 @@ class ReadingSettings(Settings):
     scale: float = Field(1.0, description="Readings are multiplied by it first: 0.1 where a register counts tenths.")
     sign: Literal[1, -1] = Field(1, description="-1 where the log counts the other way.")
     zero: float = Field(
-        0.0, ge=-LARGEST_ZERO, le=LARGEST_ZERO, description="What the log says where the joint is at zero, in `unit`."
+        0.0, ge=-LARGEST, le=LARGEST, description="What the log says where the joint is at zero, in `unit`."
     )
     signed_bits: Literal[8, 16, 24, 32] | None = Field(
         None, description="Bits of a signed register that was logged as if it had no sign; 65535 of 16 bits is -1."
@@ -88,11 +89,15 @@ class ReadingSettings(Settings):
     wraps_at: float | None = Field(
         None,
         gt=0.0,
+        le=LARGEST,
         description="Raw reading at which a counter starts anew at 0 (65536, 360); turns are counted on, from the "
         "one in which the log begins nearest to `zero`. `signed_bits` beside it changes nothing.",
     )
     begins_at: float | None = Field(
-        None, description="About what raw reading each log begins at, turns counted, where that is not near `zero`."
+        None,
+        ge=-LARGEST,
+        le=LARGEST,
+        description="About what raw reading each log begins at, turns counted, where that is not near `zero`.",
     )
     range: tuple[float, float] | None = Field(
         None, description="Lowest and highest raw reading to believe; rows with others are left out."
@@ -105,8 +110,8 @@ class ReadingSettings(Settings):
     def _is_one_reading(self) -> Self:
         if (self.column is None) == (self.expression is None):
             raise ValueError("expected either column or expression, one of them")
-        if self.scale == 0.0:
-            raise ValueError("scale: found 0, expected any other number")
+        if not 1.0 / LARGEST <= abs(self.scale) <= LARGEST:
+            raise ValueError(f"scale: found {self.scale:g}, expected {1.0 / LARGEST:g} to {LARGEST:g} in size")
         if self.range is not None and self.range[0] >= self.range[1]:
             raise ValueError(f"range: found {list(self.range)}, expected the lower limit first")
         if self.begins_at is not None and self.wraps_at is None:
@@ -136,17 +141,26 @@ class JointReadingSettings(ReadingSettings):
     """A quantity of a joint, measured there or at its motor."""
 
     gear_ratio: float = Field(
-        1.0, gt=0.0, description="Turns of the motor for one of the joint, where the reading is the motor's."
+        1.0,
+        gt=0.0,
+        le=LARGEST,
+        description="Turns of the motor for one of the joint, where the reading is the motor's.",
     )
-    counts_per_turn: float | None = Field(None, gt=0.0, description="Encoder counts in a turn of what it sits on.")
-    counts_per_m: float | None = Field(None, gt=0.0, description="Counts in a metre of a linear encoder.")
-    lead_m: float | None = Field(None, gt=0.0, description="Travel of a prismatic joint for a turn of its screw.")
-    torque_constant_nm_a: float | None = Field(None, gt=0.0, description="The motor's torque for its current.")
-    force_constant_n_a: float | None = Field(None, gt=0.0, description="The same of a linear motor.")
-    gain_nm_v: float | None = Field(None, gt=0.0, description="Torque for a voltage.")
-    gain_n_v: float | None = Field(None, gt=0.0, description="Force for a voltage.")
-    rated_torque_nm: float | None = Field(None, gt=0.0, description="What 100 % or 1000 permille are.")
-    rated_force_n: float | None = Field(None, gt=0.0, description="The same of a linear motor.")
+    counts_per_turn: float | None = Field(
+        None, gt=0.0, le=LARGEST, description="Encoder counts in a turn of what it sits on."
+    )
+    counts_per_m: float | None = Field(None, gt=0.0, le=LARGEST, description="Counts in a metre of a linear encoder.")
+    lead_m: float | None = Field(
+        None, gt=0.0, le=LARGEST, description="Travel of a prismatic joint for a turn of its screw."
+    )
+    torque_constant_nm_a: float | None = Field(
+        None, gt=0.0, le=LARGEST, description="The motor's torque for its current."
+    )
+    force_constant_n_a: float | None = Field(None, gt=0.0, le=LARGEST, description="The same of a linear motor.")
+    gain_nm_v: float | None = Field(None, gt=0.0, le=LARGEST, description="Torque for a voltage.")
+    gain_n_v: float | None = Field(None, gt=0.0, le=LARGEST, description="Force for a voltage.")
+    rated_torque_nm: float | None = Field(None, gt=0.0, le=LARGEST, description="What 100 % or 1000 permille are.")
+    rated_force_n: float | None = Field(None, gt=0.0, le=LARGEST, description="The same of a linear motor.")
 
     def gain(self, target: str) -> float:
         """Return what a reading in SI is multiplied by to be what it is at the joint."""

@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 from pipelines.contracts.joints import Kind
 from pipelines.errors import SettingsError
 from pipelines.settings.base import Settings
+from pipelines.settings.bounds import MOST_GRAVITY_M_S2
 
 DEFAULT_NAMES = {"leg": ("hip", "knee"), "single": ("joint",)}
 
@@ -34,6 +35,7 @@ class MechanismSettings(Settings):
     gravity_m_s2: float = Field(
         9.8,
         ge=0.0,
+        le=MOST_GRAVITY_M_S2,
         description="Acceleration of gravity; the paper's value. 0 for joints with vertical axes and for level slides.",
     )
 

@@ -5,6 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from pipelines.settings.base import Settings
+from pipelines.settings.bounds import MOST_GRAVITY_M_S2
 
 Pair = tuple[float, float]
 Four = tuple[float, float, float, float]
@@ -49,7 +50,7 @@ class PlantSettings(Settings):
         None, description="File with effects that only the rig reads, relative to this one; see docs/rig.md."
     )
     thigh_length_m: float = Field(0.38952, gt=0.0, description="Hip axis to knee axis.")
-    gravity_m_s2: float = Field(9.8, ge=0.0, description="Acceleration of gravity.")
+    gravity_m_s2: float = Field(9.8, ge=0.0, le=MOST_GRAVITY_M_S2, description="Acceleration of gravity.")
     thigh_cuff_distance_m: float = Field(0.25, gt=0.0, description="Hip axis to thigh cuff.")
     shank_cuff_distance_m: float = Field(0.22, gt=0.0, description="Knee axis to shank cuff.")
     rest_rad: Pair = Field((0.0, 0.0), description="Where the leg hangs before a run.")

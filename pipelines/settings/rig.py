@@ -13,7 +13,7 @@ from pydantic.main import IncEx
 
 from pipelines.errors import SettingsError
 from pipelines.settings.base import Settings, load_toml
-from pipelines.settings.bounds import refuse_absurd
+from pipelines.settings.bounds import MOST_GRAVITY_M_S2, refuse_absurd
 from pipelines.settings.line import LineSettings, TcpLine
 from pipelines.settings.plant import PlantSettings
 
@@ -454,7 +454,7 @@ class GeometrySettings(Settings):
     """Lengths of the leg in this rig; what is left out comes from exoid.toml."""
 
     thigh_length_m: float | None = Field(None, gt=0.0, description="Hip axis to knee axis.")
-    gravity_m_s2: float | None = Field(None, ge=0.0, description="Acceleration of gravity.")
+    gravity_m_s2: float | None = Field(None, ge=0.0, le=MOST_GRAVITY_M_S2, description="Acceleration of gravity.")
     thigh_cuff_distance_m: float | None = Field(None, gt=0.0, description="Hip axis to thigh cuff.")
     shank_cuff_distance_m: float | None = Field(None, gt=0.0, description="Knee axis to shank cuff.")
 

@@ -296,6 +296,19 @@ def test_a_slip_in_a_column_does_not_hide_it(guessed, pendulum, write_csv):
     assert tomllib.loads(text)["joint"][0]["angle"]["column"] == "angle"
 
 
+@pytest.mark.parametrize("value", ["", "nan", "inf"])
+def test_a_column_without_a_number_makes_neither_a_part_nor_a_noise(guessed, pendulum, write_csv, value):
+    """Of numpy's warnings the suite makes errors."""
+    text, _ = guessed(write_csv(swinging(pendulum) | {"hip_angle": [value] * len(pendulum.time)}))
+    assert tomllib.loads(text)["joint"][0]["angle"]["column"] == "angle"
+
+
+def test_a_clock_that_misses_its_first_stamp_is_one_all_the_same(guessed, pendulum, write_csv):
+    columns = swinging(pendulum)
+    columns["time"] = ["", *columns["time"][1:]]
+    assert tomllib.loads(guessed(write_csv(columns))[0])["time"]["column"] == "time"
+
+
 def test_a_single_sine_is_not_taken_for_its_own_velocity(guessed, pendulum, write_csv):
     """The integral of a sine is a cosine, but a negative one."""
     time = pendulum.time

@@ -98,6 +98,55 @@ SLIPS = [
 ]  # fmt: skip
 
 
+ABSURD = [
+    ("", "\n[geometry]\ngravity_m_s2 = 981", "geometry.gravity_m_s2: found 981, expected less than or equal to 30"),
+    ('unit = "N·m"', 'unit = "N·m", scale = 1e300', "scale: found 1e+300, expected 1e-12 to 1e+12 in size"),
+    ('unit = "N·m"', 'unit = "N·m", scale = 0', "scale: found 0, expected 1e-12 to 1e+12 in size"),
+    (
+        'unit = "N·m"',
+        'unit = "N·m", scale = 1e9',
+        "joint[0].torque: would be",
+        "which no drive delivers",
+        "leave slips out",
+    ),
+    ('unit = "N·m"', 'unit = "N·m", gear_ratio = 1e300', "gear_ratio: found 1e+300, expected"),
+    ("", "period_s = 1e9", "recording.period_s: found 1e+09 (train), expected at most the 9.995 s of the run"),
+]
+
+
+@pytest.mark.parametrize(("right", "wrong", "parts"), [(a, b, c) for a, b, *c in ABSURD], ids=range(len(ABSURD)))
+def test_what_no_machine_has_is_refused_with_what_is_expected(imported, pendulum, write_csv, right, wrong, parts):
+    text = MAP.replace(right, wrong, 1) if right else MAP + wrong
+    outcome = imported(write_csv(pendulum.columns()), map_text=text)
+    assert (outcome.code, len(outcome.err.splitlines())) == (2, 1), outcome.err
+    assert all(part in outcome.err for part in parts), outcome.err
+
+
+def test_a_period_of_all_the_run_is_none_too_long(imported, pendulum, write_csv):
+    assert imported(write_csv(pendulum.columns()), map_text=MAP + "period_s = 10.0").code == 0
+
+
+def test_a_single_torque_that_no_drive_delivers_is_refused_with_its_instant_until_a_range_leaves_it_out(
+    imported, pendulum, write_csv
+):
+    torque = pendulum.torque.copy()
+    torque[100] = 1e35
+    path = write_csv(pendulum.columns() | {"torque": torque})
+    outcome = imported(path)
+    assert (outcome.code, len(outcome.err.splitlines())) == (2, 1)
+    assert "would be 1e+35 N·m at 0.5 s, and beyond 1e+06 N·m, which no drive delivers, in 1 row" in outcome.err
+    mended = imported(path, map_text=MAP.replace('unit = "N·m"', 'unit = "N·m", range = [-100, 100]'))
+    assert (mended.code, len(mended.recording().frame)) == (0, 1999)
+
+
+def test_a_single_reading_far_from_all_others_is_told_with_its_instant(imported, pendulum, write_csv):
+    torque = pendulum.torque.copy()
+    torque[100] = 500.0
+    told = imported(write_csv(pendulum.columns() | {"torque": torque})).told
+    assert "pivot_torque_nm: 1 row far off, the first 500 at 0.5 s; 99 % lie between" in told
+    assert "far off" not in imported(write_csv(pendulum.columns())).told
+
+
 @pytest.mark.parametrize(("right", "wrong", "parts"), [(a, b, c) for a, b, *c in SLIPS], ids=range(len(SLIPS)))
 def test_a_slip_in_a_map_is_the_users_to_mend(imported, pendulum, write_csv, right, wrong, parts):
     outcome = imported(write_csv(pendulum.columns()), map_text=MAP.replace(right, wrong, 1))

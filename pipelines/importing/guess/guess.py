@@ -58,8 +58,8 @@ def propose(paths: Sequence[Path]) -> Proposal:
         joints = group_joints([m for m in found if m.column in here], here, run.time_s, time.column)
         if not joints:
             raise InputError(
-                f"no name says angle or position, and no column integrates to another among {', '.join(source.names)}; "
-                "write the map by hand, docs/import.md tells how"
+                "no name of a column that changes says angle or position, and no column integrates to another among "
+                f"{', '.join(source.names)}; write the map by hand, docs/import.md tells how"
             )
     single = {name: float(v[0]) for name, v in columns.items() if len(v) == 1 and v.dtype.kind in "iuf"}
     used = {time.column}
@@ -85,15 +85,16 @@ def _goes_back(values: NDArray) -> bool:
 
 
 def _numeric(values: NDArray) -> NDArray:
-    """Return a column as numbers where it holds some, whatever stands between them."""
-    if values.dtype.kind in "biuf":
+    """Return a column as numbers where it holds some, whatever stands between them; infinite ones are missing."""
+    if values.dtype.kind in "biu":
         return values
     found = numbers(values, "", [])
-    return found if np.isfinite(found).any() else values
+    finite = np.isfinite(found)
+    return np.where(finite, found, np.nan) if finite.any() or values.dtype.kind == "f" else values
 
 
 def _longest_run(stamps: NDArray, unit: str) -> clock.Run:
-    runs = clock.runs((stamps - stamps[0]).astype(float) * UNITS[unit].factor, stamps, [])
+    runs = clock.runs((stamps - clock.first_stamp(stamps)).astype(float) * UNITS[unit].factor, stamps, [])
     return max(runs, key=len)
 
 

@@ -77,7 +77,7 @@ def _advances(values: NDArray) -> bool:
 
 def _breaks(values: NDArray, unit: str) -> tuple[float | None, bool]:
     """Return where the clock is full, where it looks so, and whether it starts over."""
-    runs = clock.runs((values - values[0]) * UNITS[unit].factor, values, [])
+    runs = clock.runs((values - clock.first_stamp(values)) * UNITS[unit].factor, values, [])
     full = [
         clock.full_register(values[before.rows[-1]], values[after.rows[0]])
         for before, after in itertools.pairwise(runs)
