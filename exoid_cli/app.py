@@ -175,6 +175,7 @@ _REMEDIES = {
     errno.EPERM: "you may not read or write there; change the permissions or choose another place",
     errno.ENOSPC: "free some space and run the command again",
     errno.EDQUOT: "free some space and run the command again",
+    errno.EFBIG: "files may not be so large there; raise the limit (ulimit -f), or choose another place",
     errno.EROFS: "choose a folder that can be written to",
     errno.ENOENT: "check the name",
     errno.EEXIST: "a file stands where a folder should; choose another name",
@@ -185,7 +186,8 @@ _REMEDIES = {
 def _about_the_system(error: OSError) -> str:
     place = f"{error.filename}: " if error.filename else ""
     remedy = _REMEDIES.get(error.errno or 0)
-    return f"{place}{error.strerror or error}" + (f"; {remedy}" if remedy else "")
+    what = os.strerror(error.errno or 0) if remedy else error.strerror or error  # Arrow's own words are no user's
+    return f"{place}{what}" + (f"; {remedy}" if remedy else "")
 
 
 def _keep_traceback() -> str:

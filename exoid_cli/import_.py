@@ -14,6 +14,7 @@ from pipelines.errors import InputError
 if TYPE_CHECKING:
     from pipelines.importing.finding import Finding
     from pipelines.importing.recordings import Imported
+    from pipelines.settings.import_map import ImportMap
 
 FEW = 3
 """Logs of which each is told with all that was seen in it."""
@@ -64,13 +65,32 @@ def _propose(files: list[Path], place: Path | None) -> None:
 
 
 def _import(files: list[Path], map_: Path, output: Path) -> None:
-    from pipelines.contracts.atomic import all_or_none, open_folder
-    from pipelines.importing.recordings import recordings, refuse_to_overwrite
-    from pipelines.importing.turns import Beginnings
+    from pipelines.contracts.atomic import folder_to_fill, leftovers
+    from pipelines.importing.aftermath import unused
     from pipelines.settings.import_map import load_map
 
     settings = load_map(map_)
-    open_folder(output)
+    for left in leftovers(output) if output.is_dir() else []:
+        console.warn(f"{left}: left by an import that was killed, or of one that goes on; remove it once none does")
+    with folder_to_fill(output):
+        told = _made(files, settings, map_, output)
+    for recording in unused(settings, files):
+        console.warn(f"{map_}: {recording}")
+    if len(told) > FEW:
+        _say_in_short(told)
+    else:
+        for one in told:
+            _say(one)
+    console.emit(told)
+    _say_what_follows(output, [made["path"].stem for one in told for made in one["recordings"]], map_)
+
+
+def _made(files: list[Path], settings: "ImportMap", map_: Path, output: Path) -> list[dict[str, Any]]:
+    """Write the recordings of all files, or none of them; return what is told of each file."""
+    from pipelines.contracts.atomic import all_or_none
+    from pipelines.importing.recordings import recordings, refuse_to_overwrite
+    from pipelines.importing.turns import Beginnings
+
     sources: dict[Path, Path] = {}
     before = Beginnings()
     told: list[dict[str, Any]] = []
@@ -81,23 +101,39 @@ def _import(files: list[Path], map_: Path, output: Path) -> None:
                 for recording in recordings(file, settings, map_, before):
                     path = output / recording.file
                     if path in sources:
-                        raise InputError(
-                            f"{file}: its recording {path} would replace that of {sources[path]}; "
-                            "give [[recording]] in the map names that differ, with {file} in them"
-                        )
+                        raise InputError(_twice(path, sources[path], file))
                     refuse_to_overwrite(path)
                     recording.write(folder)
                     sources[path] = file
                     made.append(_as_json(path, recording))
             told.append({"file": file, "recordings": made})
-    if len(told) > FEW:
-        _say_in_short(told)
+    return told
+
+
+def _twice(path: Path, first: Path, second: Path) -> str:
+    """Say that two recordings have one name, and which names would differ."""
+    if first.absolute() == second.absolute():
+        what = "give the file once, or [[recording]] in the map names that differ"
+    elif first.stem == second.stem:
+        what = (
+            'give [[recording]] in the map a name with {folder} in it, such as "{folder}_{file}_{purpose}", or each '
+            f'file one of its own, files = "{"/".join(second.absolute().parts[-2:])}"'
+        )
     else:
-        for one in told:
-            _say(one)
-    console.emit(told)
+        what = "give [[recording]] in the map names that differ, with {file} in them"
+    return f"{second}: its recording {path} would replace that of {first}; {what}"
+
+
+def _say_what_follows(output: Path, made: list[str], map_: Path) -> None:
+    from pipelines.importing.aftermath import lacks, no_longer_made
+
+    for name in no_longer_made(output, made):
+        console.warn(f"{output / name}: of these logs too, by an earlier map; this one makes it no more, remove it")
+    lacking = list(lacks(output, made, map_))
+    for one in lacking:
+        console.say(one)
     settings_file = output.parent / NAME
-    if not settings_file.exists():
+    if not lacking and not settings_file.exists():
         console.say(f"with an empty {settings_file.as_posix()} beside them, `exoid run` does the rest")
 
 

@@ -89,9 +89,9 @@ def place_of(config: Path | None, out: Path | None = None, lacking: str = "", *,
 
 
 def _how_to_begin(named: bool) -> str:
-    from pipelines.workflow.imported import has_imported
+    from pipelines.workflow.imported import imported_in
 
-    if has_imported(Path("recordings")):
+    if imported_in(Path("recordings")):
         return f"with an empty {NAME} beside recordings/, `exoid run` does all with what was imported"
     return (
         f"{'' if named else 'name it, '}go to an experiment's folder, name its settings with --config, or start one "

@@ -10,6 +10,9 @@ from pathlib import Path
 from pipelines.contracts.sameness import same_but_for_the_time
 from pipelines.errors import ExoidError, InputError
 
+TEMPORARY = ".tmp"
+"""What the names of files and folders end in that are not yet what they are to be; they begin with a dot."""
+
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
@@ -22,15 +25,15 @@ def whole_file(path: Path) -> Iterator[Path]:
     path = Path(os.path.realpath(path))  # a link keeps pointing at the file it names
     path.parent.mkdir(parents=True, exist_ok=True)
     # Not tempfile: its files are readable by their owner alone, and would stay so under the final name.
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}{TEMPORARY}")
     try:
         yield temporary
         _sync(temporary, os.O_RDWR)  # Windows brings to disk only what could be written to
         _put(temporary, path, is_same=same_but_for_the_time(path, temporary))
     except BaseException as error:
         temporary.unlink(missing_ok=True)
-        if isinstance(error, OSError) and str(error.filename) == str(temporary):
-            error.filename = str(path)  # the name that the user knows
+        if isinstance(error, OSError) and error.filename in (None, str(temporary), temporary):
+            error.filename = str(path)  # the name that the user knows; Arrow tells none
         raise
     with suppress(OSError):  # some file systems cannot sync a folder; the file itself is safe
         _sync(path.parent, os.O_RDONLY)
@@ -56,7 +59,7 @@ def all_or_none(folder: Path, vouching: str | None = None) -> Iterator[Path]:
     On any failure, Ctrl-C included, they go and ``folder`` stays as it was. The one whose name is ``vouching`` moves
     last, and never stands beside others than those it was made with.
     """
-    with tempfile.TemporaryDirectory(prefix=".", suffix=".tmp", dir=folder) as temporary:
+    with tempfile.TemporaryDirectory(prefix=".", suffix=TEMPORARY, dir=folder) as temporary:
         try:
             yield Path(temporary)
         except ExoidError as error:  # of a file by a name that nobody knows
@@ -82,6 +85,25 @@ def _put(made: Path, path: Path, *, is_same: bool) -> None:
         made.unlink()
     else:
         os.replace(made, path)
+
+
+@contextmanager
+def folder_to_fill(path: Path) -> Iterator[None]:
+    """Open a folder for what is made in the block; where that fails, the folders that were made for it go again."""
+    made = [folder for folder in (path, *path.parents) if not folder.exists()]
+    open_folder(path)
+    try:
+        yield
+    except BaseException:
+        for folder in made:
+            with suppress(OSError):  # what is not empty stays
+                folder.rmdir()
+        raise
+
+
+def leftovers(folder: Path) -> list[Path]:
+    """Return what killed runs left of their work within a folder, or what others have at work there now."""
+    return sorted(folder.glob(f".*{TEMPORARY}"))
 
 
 def open_folder(path: Path) -> None:

@@ -94,7 +94,8 @@ def refuse_place(path: Path, contract: str) -> None:
     if not path.exists() or path.stat().st_size == 0:
         return
     try:
-        found = _metadata(pq.ParquetFile(path).schema_arrow, path)["contract"]
+        schema = pq.ParquetFile(path).schema_arrow
+        found = _metadata(schema, path)["contract"] if KEY in (schema.metadata or {}) else "a table of somebody else's"
     except (pa.ArrowException, UnicodeDecodeError):
         if _start(path) == MAGIC:
             return  # what is left of one

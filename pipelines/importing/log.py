@@ -140,6 +140,11 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
     channels = tuple(_channels(settings))
     needed = _needed(channels, settings.time)
     for name, where in needed.items():
+        if f"{name}#1" in source.names:
+            raise SettingsError(
+                f"has {name!r} twice, which {where} in {map_path} names, and nobody knows which is meant; name "
+                f"{name}#1, {name}#2 ... in the map, or rename one in the file"
+            )
         if name not in source.names:
             raise SettingsError(
                 f"has no column {name!r}, which {where} in {map_path} names; {suggestion(name, list(source.names))}"

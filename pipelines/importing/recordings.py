@@ -66,7 +66,7 @@ def recordings(path: Path, settings: ImportMap, map_path: Path, before: Beginnin
     SettingsError
         Where no ``[[recording]]`` of the map is of this file.
     """
-    wanted = [recording for recording in settings.recording if recording.is_of(path.name)]
+    wanted = [recording for recording in settings.recording if recording.is_of(path)]
     if not wanted:
         patterns = ", ".join(recording.files for recording in settings.recording)
         raise SettingsError(f"{map_path}: no [[recording]] is of {path.name}, only of {patterns}; add one")
@@ -144,8 +144,7 @@ def _recordings_of(
             "given": given,
             "rows": [int(in_source[0]), int(in_source[-1])],
         }
-        name = recording.name.replace("{file}", path.stem).replace("{purpose}", recording.purpose) + suffix
-        yield Imported(name, own, metadata, cut, tuple(findings))
+        yield Imported(recording.name_of(path) + suffix, own, metadata, cut, tuple(findings))
 
 
 def _account(path: Path, log: Log, run: Run, sampling: Sampling, findings: Sequence[Finding]) -> dict[str, Any]:
@@ -249,6 +248,7 @@ def _span(time: NDArray, duration_s: float, recording: RecordingSettings) -> sli
         begin, end = recording.span_s
     first, last = np.searchsorted(time, [begin, end])
     if last - first < FEWEST:
+        end = end if np.isfinite(end) else duration_s
         raise InputError(
             f"{recording.purpose} from {begin:g} to {end:g} s has {last - first} rows of a run of {duration_s:.6g} s, "
             f"expected at least {FEWEST}; correct its span in the map"

@@ -215,8 +215,13 @@ class JointSettings(Settings):
 class RecordingSettings(Settings):
     """A recording to make of each file: all of it, or a span."""
 
-    name: str = Field("{file}_{purpose}", description="Its name; {file} is the source's, without its ending.")
-    files: str = Field("*", description='Which files it is of, such as "swing_0[0-2].csv".')
+    name: str = Field(
+        "{file}_{purpose}",
+        description="Its name; {file} is the source's, without its ending, and {folder} that of the folder it lies in.",
+    )
+    files: str = Field(
+        "*", description='Which files it is of, such as "swing_0[0-2].csv", or with their folder, "run1/*.csv".'
+    )
     purpose: Literal["train", "validate"] = Field(description="To be fitted to, or to be judged on.")
     run: Literal["exo_alone", "with_human"] = Field(
         "exo_alone", description="exo_alone is any machine with nobody in it."
@@ -247,9 +252,14 @@ class RecordingSettings(Settings):
                 raise ValueError(f"{name}: found {list(limits)}, expected its begin before its end")
         return self
 
-    def is_of(self, file: str) -> bool:
-        """Tell whether it is to be made of a file of that name."""
-        return fnmatch(file, self.files)
+    def is_of(self, file: Path) -> bool:
+        """Tell whether it is to be made of a file: a pattern with folders is that of the end of its path."""
+        return file.absolute().match(self.files) if "/" in self.files else fnmatch(file.name, self.files)
+
+    def name_of(self, file: Path) -> str:
+        """Return the name of the recording that is made of a file."""
+        known = {"file": file.stem, "folder": file.absolute().parent.name, "purpose": self.purpose}
+        return re.sub(r"\{(file|folder|purpose)\}", lambda found: known[found[1]], self.name)
 
 
 def _two_parts() -> tuple[RecordingSettings, ...]:

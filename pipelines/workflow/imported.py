@@ -72,9 +72,9 @@ def _damaged(experiment: Experiment, imported: bool, files: Iterable[Path]) -> I
     yield from (file for file in files if file.is_file() and not parquet.is_whole(file))
 
 
-def has_imported(folder: Path) -> bool:
-    """Return whether a folder of recordings holds imported ones."""
-    return any(_imported(sorted(folder.glob("*.parquet"))))
+def imported_in(folder: Path) -> dict[str, dict[str, Any]]:
+    """Return the metadata of the imported recordings in a folder, by their names."""
+    return dict(_imported(sorted(folder.glob("*.parquet"))))
 
 
 def refuse_imported(path: Path) -> None:

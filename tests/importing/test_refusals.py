@@ -50,7 +50,7 @@ def test_a_wrong_map_is_refused_with_its_key(imported, pendulum, write_csv, righ
     assert len(outcome.err.splitlines()) == 1
     for part in line.split(" ... "):
         assert part in outcome.err
-    assert list(outcome.folder.glob("*")) == []
+    assert not outcome.folder.exists()
     assert "more)" not in outcome.err  # one slip is one fault
 
 
@@ -226,12 +226,45 @@ def test_a_recording_that_was_measured_is_never_overwritten(imported, pendulum, 
     assert (outcome.code, "holds a recording that was not imported, not overwritten" in outcome.err) == (2, True)
 
 
+def test_a_name_that_stands_twice_is_told_and_refused_where_the_map_uses_it(imported, pendulum, write_csv):
+    columns = pendulum.columns() | {"again": np.zeros(len(pendulum.time))}
+    path = write_csv(columns)
+    path.write_text(path.read_text().replace("again", "angle", 1))
+    refused = imported(path)
+    assert (refused.code, len(refused.err.splitlines())) == (2, 1)
+    assert "has 'angle' twice, which joint[0].angle in" in refused.err
+    assert "name angle#1, angle#2 ... in the map" in refused.err
+    first = imported(path, map_text=MAP.replace('"angle"', '"angle#1"'))
+    np.testing.assert_allclose(first.recording().frame["pivot_angle_rad"], pendulum.angle)
+    assert first.recording().metadata["imported"]["notes"][-1] == "columns that stand twice are angle#1, angle#2"
+    unused = path.with_name("unused.csv")
+    unused.write_text(path.read_text().replace("angle", "note").replace("note", "angle", 1))
+    assert imported(path, map_text=MAP.replace('"angle"', '"angle#2"')).code == 0
+
+
+def test_a_nul_byte_in_a_text_is_named_with_its_line(imported, pendulum, write_csv):
+    path = write_csv(pendulum.columns())
+    lines = path.read_bytes().split(b"\n")
+    lines[50] = b"\0" * len(lines[50])
+    path.write_bytes(b"\n".join(lines))
+    outcome = imported(path)
+    assert (outcome.code, outcome.err.count("\n")) == (2, 1)
+    assert "log.csv: line 51 holds a NUL byte, as where a disk was full" in outcome.err
+
+
+def test_a_log_too_short_for_its_spans_says_from_when_to_when(imported, pendulum, write_csv):
+    columns = {name: values[:30] for name, values in pendulum.columns().items()}
+    outcome = imported(write_csv(columns), map_text=MAP.partition("[[recording]]")[0])
+    assert "validate from 0.1015 to 0.145 s has 9 rows of a run of 0.145 s" in outcome.err
+
+
 def test_two_files_do_not_become_one_recording(imported, pendulum, write_csv):
     files = [write_csv(pendulum.columns(), name=name) for name in ("a.csv", "b.csv")]
     outcome = imported(*files)
     assert outcome.code == 2
     assert "whole.parquet would replace that of" in outcome.err
-    assert list(outcome.folder.iterdir()) == []
+    assert "with {file} in them" in outcome.err
+    assert not outcome.folder.exists()
 
 
 def test_a_file_that_is_refused_takes_those_before_it_along(imported, pendulum, write_csv, tmp_path):
@@ -240,7 +273,7 @@ def test_a_file_that_is_refused_takes_those_before_it_along(imported, pendulum, 
     good, bad = write_csv(pendulum.columns(), name="good.csv"), tmp_path / "bad.csv"
     bad.write_text("dear diary")
     outcome = imported(good, bad, map_text=text)
-    assert (outcome.code, outcome.out, list(outcome.folder.iterdir())) == (2, "", [])
+    assert (outcome.code, outcome.out, outcome.folder.exists()) == (2, "", False)
     other = write_csv(pendulum.columns(), name="other.csv")
     outcome = imported(good, other, map_text=text)
     assert sorted(path.name for path in outcome.folder.iterdir()) == ["good.parquet", "other.parquet"]
@@ -251,7 +284,7 @@ def test_what_trains_does_not_validate(exoid, imported, pendulum, write_csv, tmp
     path = write_csv(pendulum.columns())
     validate = '[[recording]]\nname = "judge"\npurpose = "validate"\n'
     outcome = imported(path, map_text=f"{MAP}span = [0.0, 0.6]\n{validate}span_s = [5.0, 10.0]\n")
-    assert (outcome.code, list(outcome.folder.iterdir())) == (2, [])
+    assert (outcome.code, outcome.folder.exists()) == (2, False)
     assert "log.csv: 5 to 5.995 s would be to train and to validate, expected no sample in both" in outcome.err
     assert imported(path, map_text=f"{MAP}span = [0.0, 0.6]\n{validate}span = [0.6, 1.0]\n").code == 0
     again = imported(path, map_text=MAP)
@@ -279,7 +312,7 @@ def test_ctrl_c_leaves_no_half_recording(pendulum, write_csv, tmp_path):
     )
     stopped = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert (stopped.returncode, stopped.stderr) == (130, "exoid: stopped by Ctrl-C\n")
-    assert list((tmp_path / "out").iterdir()) == []
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_log_of_fewer_than_ten_rows_is_too_short_and_its_map_not_blamed(imported, pendulum, write_csv):

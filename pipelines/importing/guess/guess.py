@@ -114,10 +114,12 @@ def _write_recordings(proposal: Proposal, paths: Sequence[Path]) -> None:
             proposal.key("span", span, "shares of the run")
         return
     train = max(1, round(TRAIN * len(paths)))
+    alike = len({path.stem for path in paths}) < len(paths)
     for number, path in enumerate(paths):
         proposal.table("[[recording]]", "recording")
-        proposal.key("files", path.name.replace("[", "[[]"))
-        proposal.key("name", "{file}")
+        here = "/".join(path.absolute().parts[-2:]) if alike else path.name
+        proposal.key("files", here.replace("[", "[[]"))
+        proposal.key("name", "{folder}_{file}" if alike else "{file}")
         proposal.key("purpose", "train" if number < min(train, len(paths) - 1) else "validate")
 
 

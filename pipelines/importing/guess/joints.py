@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.importing.consistency import integral_agreement
-from pipelines.importing.guess.names import Meaning
+from pipelines.importing.guess.names import TWIN, Meaning
 from pipelines.importing.guess.torque import fit_torque
 from pipelines.settings.units import UNITS
 
@@ -99,7 +99,8 @@ def _joint(key: str, members: Sequence[Meaning], number: int, joints: int) -> Jo
         chosen[quantity] = candidates[0]
         others = [m.column for m in candidates[1:]]
         if others:
-            why[quantity] = f"rather than {', '.join(others)}"
+            twin = TWIN.sub("", others[0]) == TWIN.sub("", candidates[0].column)
+            why[quantity] = f"{'no name says which, ' if twin else ''}rather than {', '.join(others)}"
     named = key if key and key[0].isalpha() else ""
     return JointColumns(named or (f"joint{number}" if joints > 1 else "joint"), chosen, why)
 

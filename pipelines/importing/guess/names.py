@@ -52,6 +52,8 @@ NOISE = _words(
 """Words that tell nothing of which joint it is."""
 SLIDES = _words("position displacement travel stroke weg hub course")
 """Words of what may be in metres; the m of ``theta_m`` is a motor's."""
+TWIN = re.compile(r"#\d+$")
+"""What tells columns of one name apart."""
 UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"})
 SYMBOLS = _words("q qm th phi")
 """Of an angle, but also of an axis of a motor's current, ``i_q``."""
@@ -93,11 +95,12 @@ def meanings(names: Iterable[str]) -> list[Meaning]:
 
 def meaning(name: str) -> Meaning:
     """Return what a name says."""
-    told = unit_in(name)
-    words = _split(told.rest if told else name)
+    plain = TWIN.sub("", name)
+    told = unit_in(plain)
+    words = _split(told.rest if told else plain)
     quantity = _quantity(set(words))
     if told is not None and not (told.decides or _confirms(told, quantity, set(words))):
-        told, words = None, _split(name)
+        told, words = None, _split(plain)
         quantity = _quantity(set(words))
     said = set(words)
     if told is not None:

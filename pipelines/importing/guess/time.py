@@ -58,12 +58,17 @@ def guess_time(meanings: Sequence[Meaning], columns: Mapping[str, NDArray]) -> T
 def write_time(proposal: Proposal, found: TimeGuess) -> None:
     """Write the clock's table."""
     proposal.table("[time]", "time")
-    proposal.key("column", found.column, "goes forward" + ("" if found.sure else ", as no other does"), found.sure)
+    proposal.key("column", found.column, _how_it_goes(found), found.sure)
     proposal.key("unit", found.unit, found.why, found.sure)
     if found.wraps_at:
         proposal.key("wraps_at", found.wraps_at, "goes back where such a counter is full")
     elif found.restarts:
         proposal.key("restarts", "longest", 'the clock starts over; "split" makes a recording of each run', sure=False)
+
+
+def _how_it_goes(found: TimeGuess) -> str:
+    but = ", but starts over" if found.wraps_at or found.restarts else ""
+    return "goes forward" + but + ("" if found.sure else ", as no other does")
 
 
 def _advances(values: NDArray) -> bool:

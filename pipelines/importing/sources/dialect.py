@@ -16,6 +16,8 @@ DELIMITERS = (",", ";", "\t", "|", " ")
 COMMENTS = ("#", "%")
 BYTE_ORDER_MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 NOT_A_NUMBER = {"", "nan", "null", "none", "na", "n/a", "inf", "-inf", "-nan", "true", "false"}
+STRAY = 0.1
+"""Share of NUL bytes up to which a file may be a text with slips; of UTF-16 they are half."""
 ENOUGH = 0.5
 """Share of a row's fields that are numbers, in a row of data; the others are dates, states and comments."""
 
@@ -78,6 +80,8 @@ def find_dialect(path: Path, settings: SourceSettings) -> Dialect:
     if names == table.numbered:
         notes.append("no header: columns are named c1, c2, ...")
     comment = settings.comment or _comment(lines)
+    if twice := [name for name, times in Counter(names).items() if times > 1]:
+        notes.append(f"columns that stand twice are {', '.join(f'{name}#1, {name}#2' for name in twice)}")
     return Dialect(
         encoding, table.delimiter, table.decimal, comment, skipped + table.first, _told_apart(names), tuple(notes)
     )
@@ -88,6 +92,7 @@ def _encoding(start: bytes) -> str:
         if start.startswith(mark):
             return encoding
     if b"\0" in start:
+        _refuse_stray_nuls(start)
         raise InputError(
             f"is no text (it starts with {start[:8]!r}), nor of another format that exoid knows: "
             "text, .mat, Parquet, JSON, HDF5, MCAP, ROS 2 bag; export it as one of these"
@@ -97,6 +102,16 @@ def _encoding(start: bytes) -> str:
     except UnicodeDecodeError:
         return "cp1252"
     return "utf-8"
+
+
+def _refuse_stray_nuls(start: bytes) -> None:
+    """Tell of a text in which a NUL byte stands here and there, where a disk or a line failed, in which line."""
+    line = start.count(b"\n", 0, start.index(b"\0")) + 1
+    if line > 1 and start.count(b"\0") < STRAY * len(start):
+        raise InputError(
+            f"line {line} holds a NUL byte, as where a disk was full or a copy went wrong; mend that line, or copy the "
+            "file again"
+        )
 
 
 def _comment(lines: Sequence[str]) -> str | None:
@@ -185,10 +200,10 @@ def _is_number(field: str, decimal: str) -> bool:
 
 
 def _told_apart(names: Sequence[str]) -> tuple[str, ...]:
-    """Give names that stand twice a number: the second ``q`` is ``q#2``."""
-    seen: Counter[str] = Counter()
+    """Give names that stand twice a number: of two ``q`` the first is ``q#1``, the other ``q#2``."""
+    times, seen = Counter(names), Counter[str]()
     apart = []
     for name in names:
         seen[name] += 1
-        apart.append(name if seen[name] == 1 else f"{name}#{seen[name]}")
+        apart.append(name if times[name] == 1 else f"{name}#{seen[name]}")
     return tuple(apart)
