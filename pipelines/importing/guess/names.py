@@ -5,7 +5,7 @@ import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from pipelines.importing.guess.unit_in_name import QUANTITIES, UnitInName, unit_in
+from pipelines.importing.guess.unit_in_name import BRACKETS, QUANTITIES, UnitInName, unit_in
 from pipelines.settings.units import UNITS
 
 
@@ -16,9 +16,9 @@ def _words(text: str) -> frozenset[str]:
 WORDS: dict[str, frozenset[str]] = {
     quantity: _words(words)
     for quantity, words in {
-        "time": "time t stamp timestamp timestamps clock zeit zeitstempel temps horodatage",
-        "acceleration": "acc accel acceleration ddq qdd beschleunigung",
-        "velocity": "vel velocity speed omega dq qd qdot dtheta thetadot drehzahl geschwindigkeit vitesse",
+        "time": "time t stamp timestamp timestamps clock zeit uhrzeit zeitstempel temps horodatage",
+        "acceleration": "acc accel acceleration ddq qdd beschleunigung beschl",
+        "velocity": "vel velo velocity speed omega dq qd qdot dtheta thetadot drehzahl geschwindigkeit geschw vitesse",
         "torque": "tau torque trq tq effort moment drehmoment couple",
         "temperature": "temp temperature temperatur",
         "current": "cur current amp iq isq i strom courant intensite",
@@ -40,14 +40,14 @@ ENABLED = _words("enable enabled servoon")
 """Words of a switch of the drive; ``servo_on`` and the like are two."""
 SWITCHED = _words("servo drive motor torque power")
 SOMETHING_ELSE = _words(
-    "cell fric friction error err count number status state mode id isd ia ib ic iu iv iw flag bus supply battery "
-    "fehler schleppfehler schleppabstand abweichung nummer zustand modus zwischenkreis batterie versorgung "
-    "ecart erreur etat"
+    "cell fric friction error err count number status state mode id isd ia ib ic iu iv iw flag limit bus supply "
+    "battery imu gyro grenze fehler schleppfehler schleppabstand abweichung nummer zustand modus zwischenkreis "
+    "batterie versorgung ecart erreur etat"
 )
 """Words that make of a torque or a position something else."""
 NOISE = _words(
     "joint joints axis motor drive epos j m data value values log state states of in raw abs absolute wrapped "
-    "gelenk achse antrieb abtrieb wert mot moteur axe articulation de du la le en"
+    "present averaged rms arms aeff gelenk achse antrieb abtrieb wert mot moteur axe articulation de du la le en"
 )
 """Words that tell nothing of which joint it is."""
 SLIDES = _words("position displacement travel stroke weg hub course")
@@ -63,6 +63,7 @@ DIMENSIONS = {
     **{quantity: {dimension for dimension, of in QUANTITIES.items() if of == quantity} for quantity in WORDS},
     "reference": {"angle", "length", "counts"},
     "torque": {"torque", "force", "current", "voltage", "share"},
+    "force": {"force", "share"},
 }
 """Dimensions of the units that each quantity may be told in."""
 KNOWN = frozenset().union(*WORDS.values(), COMMANDED, FILTERED, MEASURED, NOISE, SOMETHING_ELSE)
@@ -145,10 +146,15 @@ def _confirms(told: UnitInName, quantity: str, words: set[str]) -> bool:
 
 def _split(name: str) -> list[str]:
     """Return the words of a name in plain small letters, compounds like Motordrehzahl apart."""
-    plain = name.translate(UMLAUTS)
+    plain = BRACKETS.sub(_words_in, name).translate(UMLAUTS)
     plain = "".join(letter for letter in unicodedata.normalize("NFKD", plain) if not unicodedata.combining(letter))
     words = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+", plain)
     return [part for word in words for part in _apart(word.lower())]
+
+
+def _words_in(bracket: re.Match[str]) -> str:
+    """Return what stands in brackets where it is words, ``(hip)``, and nothing where it is a unit that nobody knows."""
+    return f" {bracket[1]} " if re.fullmatch(r"[^\W\d_]{3,}(\s+[^\W\d_]{3,})*|\d*", bracket[1].strip()) else " "
 
 
 def _apart(word: str) -> list[str]:
