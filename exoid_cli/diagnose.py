@@ -62,11 +62,13 @@ def diagnose(
     with console.progress("diagnosing", 1.0) as report:
         found = find(motions, report)
     said = verdict(found)
-    shared = {"joints": motions[0].joint_metadata} | describe(files, settings.sections("mechanism", "filter"))
+    machine, geometry = motions[0].machine, motions[0].geometry
+    heeded = settings.sections_about(machine.is_exoskeleton, "mechanism", "filter")
+    shared = {"joints": motions[0].joint_metadata} | describe(files, heeded)
     model = {
         "covariance": found.covariance.tolist(),
-        "mechanism": motions[0].machine.mechanism.name,
-        "geometry": motions[0].geometry.metadata(),
+        "mechanism": machine.mechanism.name,
+        "geometry": machine.told(geometry),
         "method": {"name": "joint fit of baseline and named causes", "status": found.status},
         "collinear": found.collinear,
         "unrealizable": found.unrealizable,
@@ -86,7 +88,7 @@ def diagnose(
         if old not in drawn:
             (output / old).unlink(missing_ok=True)
     console.emit(said)
-    show_verdict(said, motions[0].machine.joints)
+    show_verdict(said, machine.joints)
     console.wrote(
         output, "verdict.json", *(f"{name}.parquet" for name in tables), "detectability.json",
         *(f"{name}.png" for name in FIGURES if figures),

@@ -65,14 +65,14 @@ def identify(
     refuse_another_mechanism(settings.mechanism, runs)
     with console.working("fitting"):
         found = fit(runs, estimator)
-    config_used = settings.sections("mechanism", "filter") | {
+    config_used = settings.sections_about(runs[0].machine.is_exoskeleton, "mechanism", "filter") | {
         "identify": settings.identify.changed(method=estimator.name).model_dump(mode="json")
     }
     shared = {"joints": runs[0].joint_metadata} | describe(inputs=files, config=config_used)
     described = {
         "covariance": found.covariance.tolist(),
         "mechanism": runs[0].machine.mechanism.name,
-        "geometry": runs[0].geometry.metadata(),
+        "geometry": runs[0].machine.told(runs[0].geometry),
         "method": found.method,
         "one_step": found.one_step.tolist(),
         "validation": found.validation.as_json(),

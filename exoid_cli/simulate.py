@@ -113,7 +113,7 @@ def _track(table: "Table", run: str, reference: Path | None, settings: "Experime
         gains = sweep(plant, chosen, wanted, chosen.sweep_nm_s_rad)
     frame = loop.frame()
     inputs = [path for path in (table.path, reference) if path]
-    described = describe(inputs, settings.sections("simulate", "mechanism")) | {
+    described = describe(inputs, settings.sections_about(plant.machine.is_exoskeleton, "simulate", "mechanism")) | {
         "joints": [{"name": joint.name, "kind": joint.kind} for joint in plant.joints],
         "plant": plant.metadata(),
         "controller": {"type": "rbf", "reference": str(reference.name) if reference else "gait"},
@@ -168,7 +168,8 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
         replayed = replay(plant.model, motion)
     open_loop, closed_loop = recorded.open_loop_frame(replayed, motion, plant.joints), None
     inputs = [path for path in (table.path, recording) if path]
-    shared: dict[str, Any] = describe(inputs, settings.sections("filter", "mechanism")) | {
+    config = settings.sections_about(plant.machine.is_exoskeleton, "filter", "mechanism")
+    shared: dict[str, Any] = describe(inputs, config) | {
         "joints": motion.joint_metadata,
         "plant": plant.metadata(),
     }

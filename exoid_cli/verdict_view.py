@@ -9,6 +9,14 @@ if TYPE_CHECKING:
     from pipelines.contracts import Joint
 
 
+ERRORS = {
+    "torque_rms_nm": "measured",
+    "noise_floor_nm": "noise floor",
+    "baseline_rmse_nm": "rigid + friction",
+    "extended_rmse_nm": "with the causes",
+}
+
+
 def show_verdict(said: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
     """Print a verdict/1 document about a machine of these joints."""
     from pipelines.contracts import HIP_AND_KNEE
@@ -18,21 +26,28 @@ def show_verdict(said: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
         console.say(f"But {caveat}.")
     console.say("")
     first, digits = joints[0], ".3f" if tuple(joints) == HIP_AND_KNEE else ".4g"
-    told = ("noise_floor_nm", "baseline_rmse_nm", "extended_rmse_nm")
+    told = {key: words for key, words in ERRORS.items() if key in said}  # of older files one lacks
     console.table(
-        ("joint", "noise floor", "rigid + friction", "with the causes", "excess left"),
+        ("joint", *told.values(), "excess left"),
         [
-            (joint.name, *(f"{said[key][joint.name]:{digits}}" for key in told),
-             "at the floor" if said["unexplained"][joint.name] is None else f"{said['unexplained'][joint.name]:.0%}")
+            (joint.name, *(f"{said[key][joint.name]:{digits}}" for key in told), _excess_left(said, joint.name))
             for joint in joints
         ],
         title=f"{first.effort} error on runs no fit has seen, {first.unit('torque')}",
-        numbers="noise floor, rigid + friction, with the causes, excess left",
-    )  # fmt: skip
+        numbers=", ".join((*told.values(), "excess left")),
+    )
     for cause in said["causes"]:
         _show_cause(cause)
     if said["causes"]:
         _show_control(said["control"])
+
+
+def _excess_left(said: Mapping[str, Any], joint: str) -> str:
+    """Return the share of a joint's error beyond noise that is left; none is told where nothing is beyond chance."""
+    share = said["unexplained"][joint]
+    if share is None:
+        return "at the floor"
+    return "by chance" if said["status"] == "nothing_missing" else f"{share:.0%}"
 
 
 def _show_cause(cause: Mapping[str, Any]) -> None:

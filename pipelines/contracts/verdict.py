@@ -122,6 +122,8 @@ class Verdict(_Object):
     acquisition_at_fault: bool = False
     caveats: list[str]
     scoring: dict[str, Any]
+    torque_rms_nm: ByJoint | None = None
+    """What was measured; files of older versions lack it."""
     noise_floor_nm: dict[str, Annotated[Number, Field(gt=0.0)]] = Field(min_length=1)
     baseline_rmse_nm: ByJoint
     extended_rmse_nm: ByJoint
@@ -157,6 +159,8 @@ class Verdict(_Object):
                     "baseline_simulation_rmse_rad", "extended_simulation_rmse_rad", "unexplained", "error_budget",
                     "depends_on", "units"):  # fmt: skip
             yield key, getattr(self, key)
+        if self.torque_rms_nm is not None:
+            yield "torque_rms_nm", self.torque_rms_nm
         for key, loop in (("without", self.control.without), ("with", self.control.with_)):
             if loop:
                 yield f"control.{key}.tracking_rmse_rad", loop.tracking_rmse_rad

@@ -26,6 +26,7 @@ from pipelines.diagnosis.faults import Fault, excluding, find_faults
 from pipelines.diagnosis.fit import Fit, fit, residuals_on
 from pipelines.diagnosis.fitted_model import model_of_run
 from pipelines.diagnosis.floor import Floor, noise_floor
+from pipelines.diagnosis.gain import errors_of
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, like_trained, observe, with_load
 from pipelines.diagnosis.search import imperfection
 from pipelines.diagnosis.second_look import slower
@@ -108,6 +109,11 @@ class Diagnosis:
             return (-round(sum(self.alike(label).values()), 1), -self.choice.alone(label))
 
         return tuple(sorted(self.likely, key=order))
+
+    @property
+    def torque_rms(self) -> NDArray:
+        """(J,) N·m that was measured, on the samples that the errors are of."""
+        return errors_of(self.validate, [run.measured for run in self.validate]).rms
 
     @property
     def spoilt(self) -> list[Fault]:
@@ -278,6 +284,7 @@ def summary_numbers(diagnosis: Diagnosis) -> dict[str, Any]:
 
     before, after = diagnosis.before.errors, diagnosis.after.errors
     return {
+        "torque_rms_nm": by_joint(diagnosis.torque_rms),
         "noise_floor_nm": by_joint(diagnosis.standing.floor),
         "baseline_rmse_nm": by_joint(before.rms),
         "extended_rmse_nm": by_joint(after.rms),

@@ -28,6 +28,9 @@ OF_THREE = 0.5
 """Three causes together can imitate nearly anything: each is as likely there as not."""
 
 
+HIDING = 0.2
+"""Share of a joint's torque from which a guessed floor is told as one that hides what may be missing: no drive's
+current and no torque sensor is as noisy as that, so much of it is what the model lacks; and friction is seldom more."""
 MENTIONED = 3
 """Causes that could stand for each other, in the summary; ``indistinguishable_from`` has all."""
 CERTAIN = 1000.0
@@ -194,7 +197,20 @@ def _caveats(d: Diagnosis) -> list[str]:
         f"{IN_WORDS}, which would let every fit take the machine for too light; looked at below {CUTOFF_HZ:g} Hz: set "
         f"filter.cutoff_hz = {CUTOFF_HZ:g} for the other stages, and see to encoder counts and time stamps"
     )
-    return [noisy] * d.noisy_angles + _of_one_kind(d)
+    hiding = [
+        f"the noise floor of {the(joint)} is a guess of {share:.0%} of its "
+        f"{d.baseline.machine.joint(joint).effort}, more than any sensor's noise: much of it may be what the model "
+        "lacks; record one motion several times over and say its period, and see whether unit, sign and instants of "
+        "that channel are right"
+        for joint, share in _floor_that_hides(d).items()
+    ]
+    return [noisy] * d.noisy_angles + hiding * (not d.spoilt) + _of_one_kind(d)
+
+
+def _floor_that_hides(d: Diagnosis) -> dict[str, float]:
+    """Return the joints whose floor is a guess and so high that much could hide in it, with its share of the torque."""
+    shares = dict(zip(d.baseline.joints, (d.standing.floor / d.torque_rms).tolist(), strict=True))
+    return {} if d.floor.from_periods else {joint: share for joint, share in shares.items() if share > HIDING}
 
 
 def _of_one_kind(d: Diagnosis) -> list[str]:
@@ -230,9 +246,11 @@ def _finding(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -
     machine, exerted = d.baseline.machine, d.baseline.machine.joint(joint).effort
     size = f"{amount(machine, joint, before[worst])}, {before[worst] / floor[worst]:.2f} times the noise floor"
     if d.status == "nothing_missing":
-        return (
-            f"Nothing is missing that these data could show: the largest {exerted} error, at {the(joint)}, is {size}."
-        )
+        said = f"Nothing is missing that these data could show: the largest {exerted} error, at {the(joint)}, is {size}"
+        hiding = _floor_that_hides(d).get(joint)
+        if hiding is None:
+            return f"{said}."
+        return f"{said}, but the floor itself is {hiding:.0%} of the {exerted}: these data could show little."
     if d.status == "unknown_cause":
         described = f" {left.description}" if left else ""
         return (

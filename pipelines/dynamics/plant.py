@@ -44,7 +44,7 @@ class Plant:
             }
             for term in self.model
         ]
-        return {"run": self.run, "geometry": self.geometry.metadata(), "effects": effects}
+        return {"run": self.run, "geometry": self.machine.told(self.geometry), "effects": effects}
 
 
 def make_plant(model: Model, geometry: Geometry, joints: tuple[Joint, ...], run: str) -> Plant:

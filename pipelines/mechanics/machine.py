@@ -46,6 +46,11 @@ class Machine:
         slowest = max((scale.travel / scale.speed for scale in self.scales), default=1.0)
         return seconds * min(1.0, slowest)
 
+    def told(self, geometry: Geometry) -> dict[str, float]:
+        """Return what a file says of the machine's geometry: one joint is at no distance from a second."""
+        said = geometry.metadata()
+        return said if len(self.joints) > 1 else {key: value for key, value in said.items() if key == "gravity_m_s2"}
+
     def place(self, name: str) -> str:
         """Return what effects call the joint of a name: ``hip`` for a leg's first, whatever it is called."""
         return self.mechanism.places[self.names.index(name)]

@@ -77,6 +77,8 @@ class Fall:
     floor: float
     unexplained: float | None
     """Share of what is above the floor that is left; None where nothing is."""
+    torque: float | None = None
+    """What was measured; None where a file of an older version does not tell."""
 
     @property
     def highest(self) -> float:
@@ -114,6 +116,7 @@ def falls(verdict: dict[str, Any]) -> list[Fall]:
             verdict["extended_rmse_nm"][joint] if named else None,
             verdict["noise_floor_nm"][joint],
             verdict["unexplained"][joint],
+            (verdict.get("torque_rms_nm") or {}).get(joint),
         )
         for joint, before in verdict["baseline_rmse_nm"].items()
     ]

@@ -65,6 +65,15 @@ class Experiment(Settings):
         """Return some sections as JSON would hold them: what a result records of its settings."""
         return {name: getattr(self, name).model_dump(mode="json") for name in names}
 
+    def sections_about(self, a_leg: bool, *names: str) -> dict[str, Any]:
+        """Return some sections as a result about a machine, ``a_leg`` or another, records them.
+
+        The defaults of [mechanism] are the leg's: of another machine it is null where nobody wrote it, for then what
+        counts is what the recordings say of themselves.
+        """
+        unsaid = {} if a_leg or self.mechanism.model_fields_set else {"mechanism": None}
+        return self.sections(*names) | {name: value for name, value in unsaid.items() if name in names}
+
     def refuse_missing_files(self) -> None:
         """Refuse to name a file that is not there."""
         named = {"acquire.rig": self.acquire.rig}

@@ -80,7 +80,10 @@ def graph(experiment: Experiment, config: Path, out: Path, imported: ImportedRun
         stage: str, target: Path, inputs: Iterable[Path], settings: Sequence[str], *command: str,
         run: str | None = None, beside: Iterable[str] = (),
     ) -> Step:  # fmt: skip
-        counted, others = experiment.sections(*settings), tuple(target.with_name(name) for name in beside)
+        sections = experiment.sections_about(imported.of_a_leg, *settings)
+        # What nobody wrote is not compared with what a result tells.
+        counted = {name: section for name, section in sections.items() if section is not None}
+        others = tuple(target.with_name(name) for name in beside)
         words = (*command, *told, "-o", _output(stage, target))
         return Step(stage, target, tuple(inputs), counted, words, run, beside=others)
 

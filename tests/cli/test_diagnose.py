@@ -2,7 +2,9 @@
 
 import pytest
 
-from exoid_cli.verdict_view import _in_words
+from exoid_cli.verdict_view import _in_words, show_verdict
+from pipelines.contracts import HIP_AND_KNEE
+from tests.report.sessions import verdict_of
 
 
 @pytest.mark.parametrize(
@@ -16,3 +18,18 @@ from exoid_cli.verdict_view import _in_words
 )
 def test_a_parameter_has_its_unit_and_an_interval_only_if_it_was_fitted(value, unit, ci95, said):
     assert _in_words({"name": "play", "value": value, "unit": unit, "ci95": ci95}) == said
+
+
+@pytest.mark.parametrize(("status", "left"), [("explained", "5%"), ("nothing_missing", "by chance")])
+def test_what_chance_may_have_left_is_told_by_no_share(capsys, status, left):
+    show_verdict(verdict_of(status=status, causes=[]), HIP_AND_KNEE)
+    (knee,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("knee")]
+    assert knee.endswith(left)
+
+
+def test_an_error_stands_beside_the_torque_that_it_is_of_and_older_files_lack_it(capsys):
+    show_verdict(verdict_of(torque_rms_nm={"hip": 22.5, "knee": 12.25}), HIP_AND_KNEE)
+    show_verdict(verdict_of(), HIP_AND_KNEE)
+    knee, older = [line.split() for line in capsys.readouterr().out.splitlines() if line.startswith("knee ")][::2]
+    assert knee[:3] == ["knee", "12.250", "0.272"]
+    assert older[:2] == ["knee", "0.272"]

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipelines.contracts import RECORDING
+from pipelines.contracts import PARAMETERS, RECORDING
 
 RATE_HZ = 200.0
 
@@ -60,6 +60,16 @@ def test_nothing_is_recorded_in_its_place(exoid, folder, words):
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
     assert "imported" in outcome.err
     assert (folder / "recordings" / "Monday-1.parquet").read_bytes() == before
+
+
+def test_results_about_another_machine_tell_no_settings_of_a_leg_until_somebody_writes_them(exoid, folder):
+    assert exoid("run", "identify").code == 0
+    made = PARAMETERS.read(folder / "identified" / "parameters.parquet").metadata
+    assert made["config"]["mechanism"] is None
+    assert made["geometry"] == {"gravity_m_s2": 9.8}
+    (folder / "exoid.toml").write_text('[mechanism]\nname = "single"\ngravity_m_s2 = 1.6\n')
+    stale = {one["stage"]: one["why"] for one in json.loads(exoid("status", "--json").out)}["identify"]
+    assert any(why.startswith("mechanism was unset, is ") for why in stale)
 
 
 def test_a_machine_that_is_no_leg_is_not_asked_to_follow_a_gait(exoid, folder):

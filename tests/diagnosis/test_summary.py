@@ -7,6 +7,7 @@ import pytest
 
 from pipelines.contracts.table import Table
 from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.gain import scored
 from pipelines.diagnosis.verdict import _evidence, _finding, _in_words, _times, verdict
 from pipelines.effects import ParallelSpring
 from pipelines.mechanics.kinematics import motion_table
@@ -78,6 +79,34 @@ def test_a_floor_that_no_repetition_shows_is_said_to_be_a_guess(stuck):
     assert "guess" not in verdict(stuck)["summary"]
     without_periods = replace(stuck, floor=replace(stuck.floor, from_periods=False))
     assert "so the noise floor is a guess from the band above the motion." in verdict(without_periods)["summary"]
+
+
+def nothing_missing(d, share, from_periods):
+    """A diagnosis whose noise floor is so much of each joint's torque, and of which nothing stands out."""
+    floor = share * d.torque_rms
+    standing = replace(d.standing, floor=floor, baseline=floor, extended=floor)
+    return replace(d, standing=standing, status="nothing_missing", floor=replace(d.floor, from_periods=from_periods))
+
+
+def test_a_guessed_floor_that_is_most_of_the_torque_is_said_to_hide_what_may_be_missing(stuck):
+    told = verdict(nothing_missing(stuck, 0.87, from_periods=False))
+    assert told["status"] == "nothing_missing"
+    assert "but the floor itself is 87% of the torque: these data could show little." in told["finding"]
+    assert any("the noise floor of the hip is a guess of 87% of its torque" in caveat for caveat in told["caveats"])
+
+
+@pytest.mark.parametrize(("share", "from_periods"), [(0.05, False), (0.87, True)])
+def test_a_floor_that_is_measured_or_a_small_share_is_taken_as_it_is(stuck, share, from_periods):
+    told = verdict(nothing_missing(stuck, share, from_periods))
+    assert told["finding"].startswith("Nothing is missing that these data could show")
+    assert "floor itself" not in told["finding"]
+    assert not any("noise floor" in caveat for caveat in told["caveats"])
+
+
+def test_the_torque_that_an_error_is_of_is_told_on_the_samples_of_the_error(stuck):
+    squares = [run.measured[scored(run), :2] ** 2 for run in stuck.validate]
+    measured = np.sqrt(np.concatenate(squares).mean(axis=0))
+    assert list(verdict(stuck)["torque_rms_nm"].values()) == pytest.approx(measured.tolist())
 
 
 def test_odds_are_those_among_the_causes_that_exoid_knows_in_their_own_words(stuck):

@@ -55,6 +55,13 @@ def test_bars_with_tied_causes_are_of_the_likeliest_and_say_so(tmp_path):
     assert "with the named cause" in top(folder)
 
 
+def test_an_error_is_told_beside_the_torque_that_was_measured(tmp_path):
+    folder = write_session(tmp_path / "leg")
+    assert "measured" not in top(folder)
+    write_verdict(folder, torque_rms_nm={"hip": 22.512, "knee": 12.25})
+    assert "; measured" in top(folder) and "22.5" in top(folder)
+
+
 def test_faults_of_acquisition_stand_below_a_lead_that_is_the_finding_alone(tmp_path):
     folder = write_session(tmp_path / "leg")
     write_verdict(folder, summary="Found. Guessed. Faulty.", finding="Found.", data_faults=[FAULT, FAULT, FAULT])
