@@ -6,6 +6,9 @@ from numpy.typing import NDArray
 
 from pipelines.importing.finding import Finding, counted
 
+LONGEST = 20
+"""Letters of a text that a finding shows."""
+
 
 def numbers(values: NDArray, where: str, findings: list[Finding]) -> NDArray:
     """Return the values (n,) as float64, NaN where there is no number."""
@@ -16,7 +19,7 @@ def numbers(values: NDArray, where: str, findings: list[Finding]) -> NDArray:
     words = np.isnan(found) & text.notna().to_numpy()
     if words.any():
         row = int(np.argmax(words))
-        seen = f"{counted(int(words.sum()), 'row')} with text, the first {str(values[row])!r} in row {row}"
+        seen = f"{counted(int(words.sum()), 'row')} with text, the first {str(values[row])[:LONGEST]!r} in row {row}"
         findings.append(Finding(where, seen, "taken for missing"))
     return found
 

@@ -48,12 +48,15 @@ def test_comments_among_the_rows_are_no_rows(imported, pendulum, write_csv):
     assert_is_the_pendulum(imported(path), pendulum)
 
 
-def test_a_row_of_units_below_the_header_belongs_to_the_names(imported, pendulum, write_csv):
+@pytest.mark.parametrize("units", ["[s],[rad],[rad/s],[Nm]", "sec,radians,rad/sec,Nm"])
+def test_a_row_of_units_below_the_header_belongs_to_the_names(imported, pendulum, write_csv, units):
     path = write_csv(pendulum.columns())
     header, rest = path.read_text().split("\n", 1)
-    path.write_text(f"{header}\n[s],[rad],[rad/s],[Nm]\n{rest}")
-    text = MAP.replace('"time"', '"time [s]"').replace('"angle"', '"angle [rad]"')
-    text = text.replace('"velocity"', '"velocity [rad/s]"').replace('"torque"', '"torque [Nm]"')
+    path.write_text(f"{header}\n{units}\n{rest}")
+    names = dict(zip(pendulum.columns(), units.replace("[", "").replace("]", "").split(","), strict=True))
+    text = MAP
+    for name, unit in names.items():
+        text = text.replace(f'column = "{name}"', f'column = "{name} [{unit}]"')
     assert_is_the_pendulum(imported(path, map_text=text), pendulum)
 
 
@@ -206,3 +209,16 @@ def test_a_library_that_is_not_installed_is_named_with_its_extra(imported, pendu
     assert outcome.err == (
         f"exoid: {path}: to read it exoid needs h5py, which is not installed; pip install 'exoid[import]'\n"
     )
+
+
+@pytest.mark.parametrize("row", [50, 1900])
+def test_a_line_of_nul_bytes_costs_its_row_wherever_it_stands(imported, pendulum, write_csv, row):
+    """As a logger leaves them whose disk was full; the first is among the bytes by which the format is found."""
+    path = write_csv(pendulum.columns())
+    lines = path.read_bytes().split(b"\n")
+    lines[row + 1] = b"\0" * len(lines[row + 1])
+    path.write_bytes(b"\n".join(lines))
+    outcome = imported(path)
+    assert (outcome.code, len(outcome.recording().frame)) == (0, 1999)
+    assert r"time: 1 row with text, the first '\x00" in outcome.told
+    assert f"in row {row}; taken for missing" in outcome.told

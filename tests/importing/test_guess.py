@@ -247,9 +247,9 @@ def test_a_log_in_which_nothing_moves_gets_no_guess(pendulum, write_csv, capsys)
         ("Lage Motor (Inkr.)", "angle", "", "counts"),
         ("Drehzahl Motor [1/min]", "velocity", "", "rpm"),
         ("n / (1/min)", "velocity", "", "rpm"),
-        ("Strom Hüfte [mA]", "current", "huefte", "mA"),
+        ("Strom Hüfte [mA]", "current", "hip", "mA"),
         ("Motorstrom in A", "current", "", "A"),
-        ("Kniewinkel (°)", "angle", "knie", "deg"),
+        ("Kniewinkel (°)", "angle", "knee", "deg"),
         ("Drehzahlistwert_U/min", "velocity", "", "rpm"),
         ("Sollwinkel [Grad]", "reference", "", "deg"),
         ("Schleppfehler [Inkr]", "", "", None),
@@ -307,6 +307,30 @@ def test_a_clock_that_misses_its_first_stamp_is_one_all_the_same(guessed, pendul
     columns = swinging(pendulum)
     columns["time"] = ["", *columns["time"][1:]]
     assert tomllib.loads(guessed(write_csv(columns))[0])["time"]["column"] == "time"
+
+
+@pytest.mark.parametrize("unit", ["us", "ms"])
+def test_a_log_of_a_moment_gets_a_guess_without_a_sign(guessed, pendulum, write_csv, unit):
+    """A window in which a torque could be compared with the motion is longer than all of it."""
+    columns = swinging(pendulum)
+    names = {"time": f"t [{unit}]", "angle": "angle [deg]", "velocity": "speed [rpm]", "torque": "torque [Nm]"}
+    columns = {names[name]: values[:60] for name, values in columns.items()}
+    assert "joint[0].torque.sign" in guessed(write_csv(columns))[1]
+
+
+def test_a_clock_in_whose_unit_no_machine_is_sampled_is_doubted_whatever_its_name_says(guessed, pendulum, write_csv):
+    columns = swinging(pendulum)
+    columns["t [ms]"] = columns.pop("time")
+    assert "at which no machine is sampled: is it s?" in guessed(write_csv(columns))[1]["time.unit"]
+
+
+def test_a_leg_is_a_leg_in_other_languages(guessed, pendulum, write_csv):
+    one = swinging(pendulum)
+    columns = {"Zeit [s]": one["time"]}
+    for joint in ("Hüfte", "Knie"):
+        columns |= {f"Winkel {joint} [°]": np.degrees(one["angle"]), f"Strom {joint} [mA]": 1e3 * one["torque"]}
+    joints = tomllib.loads(guessed(write_csv(columns))[0])["joint"]
+    assert [joint["name"] for joint in joints] == ["hip", "knee"]
 
 
 def test_a_single_sine_is_not_taken_for_its_own_velocity(guessed, pendulum, write_csv):

@@ -242,16 +242,6 @@ def test_a_name_that_stands_twice_is_told_and_refused_where_the_map_uses_it(impo
     assert imported(path, map_text=MAP.replace('"angle"', '"angle#2"')).code == 0
 
 
-def test_a_nul_byte_in_a_text_is_named_with_its_line(imported, pendulum, write_csv):
-    path = write_csv(pendulum.columns())
-    lines = path.read_bytes().split(b"\n")
-    lines[50] = b"\0" * len(lines[50])
-    path.write_bytes(b"\n".join(lines))
-    outcome = imported(path)
-    assert (outcome.code, outcome.err.count("\n")) == (2, 1)
-    assert "log.csv: line 51 holds a NUL byte, as where a disk was full" in outcome.err
-
-
 def test_a_log_too_short_for_its_spans_says_from_when_to_when(imported, pendulum, write_csv):
     columns = {name: values[:30] for name, values in pendulum.columns().items()}
     outcome = imported(write_csv(columns), map_text=MAP.partition("[[recording]]")[0])

@@ -50,6 +50,8 @@ NOISE = _words(
     "present averaged rms arms aeff gelenk achse antrieb abtrieb wert mot moteur axe articulation de du la le en"
 )
 """Words that tell nothing of which joint it is."""
+JOINTS = {"huefte": "hip", "hueft": "hip", "hanche": "hip", "knie": "knee", "genou": "knee"}
+"""A leg's joints, whose names exoid knows."""
 SLIDES = _words("position displacement travel stroke weg hub course")
 """Words of what may be in metres; the m of ``theta_m`` is a motor's."""
 TWIN = re.compile(r"#\d+$")
@@ -115,7 +117,7 @@ def meaning(name: str) -> Meaning:
     elif commanded and quantity in ("angle", ""):
         quantity = "reference"
     unit = told.unit if told and told.unit and UNITS[told.unit].dimension in DIMENSIONS.get(quantity, ()) else None
-    joint = "_".join(word for word in words if word not in KNOWN)
+    joint = "_".join(JOINTS.get(word, word) for word in words if word not in KNOWN)
     return Meaning(name, quantity, joint, unit, commanded, bool(said & FILTERED), bool(said & MEASURED))
 
 

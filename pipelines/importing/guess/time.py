@@ -24,6 +24,7 @@ class TimeGuess:
     unit: str
     why: str
     sure: bool
+    unit_sure: bool
     wraps_at: float | None
     restarts: bool
 
@@ -50,8 +51,10 @@ def guess_time(meanings: Sequence[Meaning], columns: Mapping[str, NDArray]) -> T
         )
         named = found.quantity == "time"
         wraps_at, restarts = _breaks(values, chosen)
+        usual = clock.SLOWEST_HZ <= 1.0 / (step * UNITS[chosen].factor) <= clock.FASTEST_HZ
         why += "" if named else "; no name says which column is the time"
-        return TimeGuess(found.column, chosen, why, named, wraps_at, restarts)
+        why += "" if usual else f", at which no machine is sampled: is it {' or '.join(fitting) or 'another column'}?"
+        return TimeGuess(found.column, chosen, why, named, named and usual, wraps_at, restarts)
     return None
 
 
@@ -59,7 +62,7 @@ def write_time(proposal: Proposal, found: TimeGuess) -> None:
     """Write the clock's table."""
     proposal.table("[time]", "time")
     proposal.key("column", found.column, _how_it_goes(found), found.sure)
-    proposal.key("unit", found.unit, found.why, found.sure)
+    proposal.key("unit", found.unit, found.why, found.unit_sure)
     if found.wraps_at:
         proposal.key("wraps_at", found.wraps_at, "goes back where such a counter is full")
     elif found.restarts:

@@ -10,6 +10,9 @@ from pipelines.importing.consistency import whole_rows
 WINDOW_S = 0.1
 """Of the parabola whose bend is the acceleration: short against a swing, long against an encoder's steps."""
 
+FEWEST = 50
+"""Rows from which a fit of five numbers says something."""
+
 
 @dataclass(frozen=True)
 class TorqueFit:
@@ -34,14 +37,16 @@ class TorqueFit:
 
 
 def fit_torque(time_s: NDArray, angle_rad: NDArray, torque: NDArray) -> TorqueFit | None:
-    """Fit a ddq + b sgn dq + c sin q + d cos q + e to a torque (n,); None where nothing moves."""
+    """Fit a ddq + b sgn dq + c sin q + d cos q + e to a torque (n,); None where nothing moves, or not for long."""
     time_s, angle_rad, torque = whole_rows(time_s, angle_rad, torque)
-    half = max(2, round(0.5 * WINDOW_S / float(np.median(np.diff(time_s))))) if len(time_s) > 50 else 0
-    if not half or np.ptp(angle_rad) == 0.0 or np.ptp(torque) == 0.0:
+    half = max(2, round(0.5 * WINDOW_S / float(np.median(np.diff(time_s))))) if len(time_s) > FEWEST else 0
+    if not half or len(time_s) < FEWEST + 2 * half or np.ptp(angle_rad) == 0.0 or np.ptp(torque) == 0.0:
         return None
     before, at, after = angle_rad[: -2 * half], angle_rad[half:-half], angle_rad[2 * half :]
     first, last = time_s[half:-half] - time_s[: -2 * half], time_s[2 * half :] - time_s[half:-half]
     regular = np.abs(first - last) < 0.2 * np.median(first)
+    if np.count_nonzero(regular) < FEWEST:
+        return None
     dq = (after - before) / (first + last)
     ddq = 2.0 * ((after - at) / last - (at - before) / first) / (first + last)
     mean = np.convolve(torque, np.ones(2 * half + 1) / (2 * half + 1), "valid")

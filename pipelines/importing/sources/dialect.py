@@ -9,6 +9,7 @@ from pathlib import Path
 
 from pipelines.errors import InputError
 from pipelines.settings.import_map import SourceSettings
+from pipelines.settings.units import unit_named
 
 LOOKED_AT = 2**16
 """Bytes at the beginning of a file that tell how it is written."""
@@ -20,6 +21,9 @@ STRAY = 0.1
 """Share of NUL bytes up to which a file may be a text with slips; of UTF-16 they are half."""
 ENOUGH = 0.5
 """Share of a row's fields that are numbers, in a row of data; the others are dates, states and comments."""
+
+UNIT = r"[\[(].*[\])]|[-\w°µ/·*%.²]{1,5}"
+"""What may be a unit where nobody knows it: in brackets, or short."""
 
 
 @dataclass(frozen=True)
@@ -91,8 +95,8 @@ def _encoding(start: bytes) -> str:
     for mark, encoding in BYTE_ORDER_MARKS.items():
         if start.startswith(mark):
             return encoding
-    if b"\0" in start:
-        _refuse_stray_nuls(start)
+    nuls = start.count(b"\0")
+    if nuls and not _is_stray(nuls, start):
         raise InputError(
             f"is no text (it starts with {start[:8]!r}), nor of another format that exoid knows: "
             "text, .mat, Parquet, JSON, HDF5, MCAP, ROS 2 bag; export it as one of these"
@@ -104,14 +108,9 @@ def _encoding(start: bytes) -> str:
     return "utf-8"
 
 
-def _refuse_stray_nuls(start: bytes) -> None:
-    """Tell of a text in which a NUL byte stands here and there, where a disk or a line failed, in which line."""
-    line = start.count(b"\n", 0, start.index(b"\0")) + 1
-    if line > 1 and start.count(b"\0") < STRAY * len(start):
-        raise InputError(
-            f"line {line} holds a NUL byte, as where a disk was full or a copy went wrong; mend that line, or copy the "
-            "file again"
-        )
+def _is_stray(nuls: int, start: bytes) -> bool:
+    """Tell whether NUL bytes are slips in a text, as where a disk was full: few, and after a header without any."""
+    return nuls < STRAY * len(start) and b"\0" not in start.partition(b"\n")[0]
 
 
 def _comment(lines: Sequence[str]) -> str | None:
@@ -174,7 +173,7 @@ class _Table:
             return self.numbered
         names, *before = reversed(fitting)
         names = [name or number for name, number in zip(names, self.numbered, strict=True)]
-        if before and all(re.fullmatch(r"[\[(].*[\])]|[-\w°µ/·*%.²]{1,5}", field) for field in names):
+        if before and all(unit_named(field) or re.fullmatch(UNIT, field) for field in names):
             names = [f"{name} [{unit.strip('[]()')}]" for name, unit in zip(before[0], names, strict=True)]
         return tuple(names)
 
