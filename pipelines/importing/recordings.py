@@ -219,7 +219,7 @@ def _refuse_absurd_angles(columns: Mapping[str, NDArray], settings: ImportMap) -
 def _refuse_absurd_torques(columns: Mapping[str, NDArray], settings: ImportMap) -> None:
     for i, joint in enumerate(settings.joint):
         torque, unit = columns[joint.joint.column("torque")], "N·m" if joint.kind == "revolute" else "N"
-        absurd = np.flatnonzero(np.abs(torque) > LARGEST_TORQUE)
+        absurd = np.flatnonzero((torque > LARGEST_TORQUE) | (torque < -LARGEST_TORQUE))
         if len(absurd):
             first = f"{torque[absurd[0]]:.4g} {unit} at {columns['time_s'][absurd[0]]:.6g} s"
             raise SettingsError(
