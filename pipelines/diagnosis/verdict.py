@@ -19,7 +19,7 @@ from pipelines.diagnosis.unknown import Unknown, unknown
 from pipelines.effects import Effect
 from pipelines.estimation.angle_noise import CUTOFF_HZ, IN_WORDS
 from pipelines.estimation.regression import mask_in_words
-from pipelines.label import amount, effect_labelled, in_words, number
+from pipelines.label import amount, cause_label, effect_labelled, in_words, number
 from pipelines.model import effect_named
 
 HIGHEST = 0.96
@@ -163,6 +163,8 @@ def _evidence(d: Diagnosis, label: str, effect: Effect, worth: float, joint: str
         f"it takes {number(machine, worth)} of {amount(machine, joint, before)} of {machine.joint(joint).effort} error "
         f"at {the(joint)} on runs no fit has seen"
     ]
+    if _may_be_chance(d, label):
+        sentences.append("that gain may be chance: its 95 % interval includes nought")
     if label in d.perceived:
         sentences.append(PERCEIVED[effect.name])
     others = {k: p for k, p in d.likely[label].items() if k not in alike}
@@ -175,6 +177,13 @@ def _evidence(d: Diagnosis, label: str, effect: Effect, worth: float, joint: str
     sentences.append(f"it looks like {effect.looks_like}")
     sentences.append(f"to make sure: {effect.confirm}")
     return sentences
+
+
+def _may_be_chance(d: Diagnosis, label: str) -> bool:
+    """Tell whether what a cause gains on the validation runs cannot be told from nought, nor was it heard or felt."""
+    if label in d.perceived or label not in d.without:
+        return False
+    return gain(d.without[label].errors, d.after.errors).low <= 0.0
 
 
 def _times(likely: float, other: float) -> str:
@@ -257,7 +266,8 @@ def _finding(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -
             "Something is missing, and no cause that exoid knows explains it well enough to be named: "
             f"{the(joint)}'s {exerted} error is {size}.{described}"
         )
-    named = "; and ".join(_in_words(cause) for cause in causes)
+    doubts = [", whose gain may be chance" * _may_be_chance(d, cause_label(cause)) for cause in causes]
+    named = "; and ".join(_in_words(cause) + doubt for cause, doubt in zip(causes, doubts, strict=True))
     most = int(((before**2 - after**2) / floor**2).argmax())
     joint = d.baseline.joints[most]
     return (

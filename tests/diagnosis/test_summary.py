@@ -121,6 +121,16 @@ def test_two_causes_are_they_and_a_rest_at_the_worst_joint_is_not_noise(stuck):
     assert said.endswith("to 1.50 N·m, still 5.00 times the floor.")
 
 
+def test_a_gain_that_may_be_chance_is_told_as_that_unless_the_cause_was_heard(stuck):
+    label = "parallel_spring@knee"
+    assert "may be chance" not in verdict(stuck)["summary"]
+    idle = replace(stuck, without={label: stuck.after})
+    assert "whose gain may be chance. With it" in verdict(idle)["summary"]
+    told = verdict(idle)["causes"][0]["evidence"]
+    assert "that gain may be chance: its 95 % interval includes nought" in told
+    assert "may be chance" not in _finding(replace(idle, perceived=(label,)), verdict(idle)["causes"], None)
+
+
 def test_ties_are_one_answer_with_one_probability():
     tied = SPRING | {"indistinguishable_from": [{"effect": "base_tilt", "joint": None}]}
     assert _in_words(tied) == (
