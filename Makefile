@@ -27,7 +27,7 @@ test: $(INSTALLED) ## the tests
 test-slow: $(INSTALLED) ## the statistical campaigns, minutes long
 	$(BIN)/pytest -n 2 -m slow
 
-invariants: $(INSTALLED) ## what keeps a leg safe, over 10,000 random sequences of faults; about ten minutes
+invariants: $(INSTALLED) ## what keeps a leg safe, over 20,000 random sequences of faults; about half an hour
 	$(BIN)/pytest -m slow tests/acquisition/test_invariants.py
 
 check: $(INSTALLED) ## lint, formatting, types, direction of imports

@@ -58,6 +58,11 @@ class Device:
         """For how long it has not answered what it was asked, s; 0 where it has."""
         return self.line.awaited_s(self._unit)
 
+    @property
+    def went_out_at(self) -> float:
+        """When its last request was sent, host's clock, s; 0 where there was none."""
+        return self.line.went_out_at.get(self._unit, 0.0)
+
     async def check_identity(self, identity: Iterable[Identity]) -> None:
         """Refuse a device that is not the one that the rig file describes."""
         for entry in identity:

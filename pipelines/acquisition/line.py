@@ -62,6 +62,8 @@ class Line:
         """Whether a request is under way, whether the last one was not answered, and whether any ever was."""
         self._asked: dict[int, float] = {}
         """Units that have not answered yet, or are waiting for their turn, and since when; the event loop's time, s."""
+        self.went_out_at: dict[int, float] = {}
+        """When a unit was sent its last request; the event loop's time, s."""
         self._owed: dict[int, Owed] = {}
         """What units may still answer that were not waited for any longer."""
         self._quiet_since = 0.0
@@ -153,6 +155,7 @@ class Line:
             # The one place where pymodbus looks for how long to wait, be it for a connection or for an answer.
             self.client.ctx.comm_params.timeout_connect = within_s
             self._asking = self._failed = True
+            self.went_out_at[unit] = loop.time()
             answer = await request(**arguments, device_id=unit)
             self._failed, self._has_answered = False, True
             self._asked.pop(unit, None)

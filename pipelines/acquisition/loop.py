@@ -127,6 +127,8 @@ class Loop:
             self._heed_signals()
             if self.supervisor.missed(found, time.monotonic()) and not await self._resume():
                 continue
+            for drive in self.machine.drives:  # what is decided now goes on from what is on its way
+                await drive.is_told()
             answers = await self._exchange(self.supervisor.next(found, time.monotonic()))
             row = self.supervisor.judge(answers, time.monotonic())
             for joint, told in enumerate(answers.drives):
@@ -174,7 +176,7 @@ class Loop:
             self.supervisor.refuse_after_abort()
             if self._told_at(joint) != told:  # nobody is awaited for long
                 patience = SLACK_SAMPLES * period
-            elif drive.device.awaited_s > period:  # it is the one who is awaited
+            elif drive.being_told or drive.device.awaited_s > period:  # it is the one who is awaited
                 look_at = time.monotonic() + LOOK_PAUSE * period
             else:
                 await self._tell_alone(joint)
@@ -185,18 +187,16 @@ class Loop:
         return max(self.machine.drives[joint].told_at, float(self.supervisor.sent_at[joint]))
 
     async def _tell_alone(self, joint: int) -> None:
-        """Tell one drive where to go, from where it is."""
-        told = self.supervisor.sent_at[joint]
-        try:
+        """Tell one drive where to go, from where it is, unless it is being told."""
+        drive, told = self.machine.drives[joint], self.supervisor.sent_at[joint]
+        with suppress(Unanswered):  # whoever follows the plan finds out for how long
             self._heed(joint)
             if self.supervisor.is_stale(joint, time.monotonic()):
                 await self._find(joint)
-            if self.supervisor.sent_at[joint] == told:
+            if self.supervisor.sent_at[joint] == told and not drive.being_told:
                 reading = await self._send(joint, self.supervisor.tend(joint, time.monotonic()))
                 self.supervisor.hear(joint, time.monotonic())
                 self.supervisor.judge_tended(joint, reading)
-        except Unanswered:  # whoever follows the plan finds out for how long
-            pass
 
     async def _enable(self) -> Row:
         """Enable the drives where the leg stands; return the first sample at which they say that they are."""
@@ -222,6 +222,7 @@ class Loop:
         self._latencies.add(time.perf_counter() - asked)
         for joint, drive in enumerate(self.machine.drives):
             self.supervisor.hear(joint, drive.told_at)
+            self.supervisor.went_out(joint, drive.sent_at)
             self._heed(joint)
         return answers
 
@@ -233,6 +234,8 @@ class Loop:
         except Unsent:
             self.supervisor.unsent(joint)
             raise
+        finally:
+            self.supervisor.went_out(joint, self.machine.drives[joint].sent_at)
 
     def _heed(self, joint: int) -> None:
         """Heed what a drive has told, though it came beside what is awaited, or ended the run, or was asked again."""
@@ -314,6 +317,7 @@ class Loop:
                 await tending
             if drive.told_reference is not None:  # what was decided last may not have been sent
                 self.supervisor.begin_stop(joint, drive.told_reference)
+                self.supervisor.went_out(joint, drive.sent_at)
             self._heed(joint)
             while True:
                 # On the host's clock: the device's counter may be what has failed. What is late is not caught up

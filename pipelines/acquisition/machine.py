@@ -97,6 +97,10 @@ class Drive:
         self._counted = 0
         self.told_reference: float | None = None
         """The last set-point on its way to it, rad; None while it has been told nothing, and need not be disabled."""
+        self._telling = asyncio.Lock()
+        """Held while a set-point is on its way to it, and until it is answered or not."""
+        self.sent_at = 0.0
+        """When the last one was sent, host's clock, s."""
         self.told_at = 0.0
         """When it answered the last one, host's clock, s: where others are on its line, that may be late."""
         self.conditions: list[Condition] = []
@@ -152,20 +156,35 @@ class Drive:
         """
         control = self.map.enable if self.map.halt is None or not halt else self.map.halt
         words = self.words(control, reference)
-        held, self.told_reference = self.told_reference, reference
-        self.conditions.clear()
-        # Nobody knows which set-point a drive follows that did not answer.
-        before, self._sent = self._sent, np.nan
-        sent = time.perf_counter()
-        try:
-            answer = await self.device.exchange(self.tell, words, self.told, fresh_s=fresh_s)
-        except Unsent:
-            self.told_reference, self._sent = held, before
-            raise
-        self._sent, self.told_at = before, time.monotonic()
-        reading = self._reading(answer, sent)
-        self._sent = reference
-        return reading
+        async with self._telling:
+            held, self.told_reference = self.told_reference, reference
+            self.conditions.clear()
+            # Nobody knows which set-point a drive follows that did not answer.
+            before, self._sent = self._sent, np.nan
+            sent = time.perf_counter()
+            try:
+                answer = await self.device.exchange(self.tell, words, self.told, fresh_s=fresh_s)
+                self.sent_at = self.device.went_out_at
+            except Unsent:
+                self.told_reference, self._sent = held, before
+                raise
+            except BaseException:
+                self.sent_at = self.device.went_out_at
+                raise
+            self._sent, self.told_at = before, time.monotonic()
+            reading = self._reading(answer, sent)
+            self._sent = reference
+            return reading
+
+    @property
+    def being_told(self) -> bool:
+        """Whether a set-point is on its way to it."""
+        return self._telling.locked()
+
+    async def is_told(self) -> None:
+        """Wait until no set-point is on its way to it."""
+        async with self._telling:
+            pass
 
     async def disable(self, angle: float, *, in_motion: bool = False) -> None:
         """Take the torque away, and make sure of it; ``angle`` (rad) is where the leg stands or was sent."""

@@ -395,6 +395,10 @@ class Supervisor:
         """Return for how long the last set-points may wait for their turn on a line, (J,) s."""
         return self._fresh_until - now
 
+    def went_out(self, joint: int, at: float) -> None:
+        """Note when the last set-point of a drive was sent: it may have waited for its turn since it was decided."""
+        self.sent_at[joint] = max(self.sent_at[joint], at)
+
     def unsent(self, joint: int) -> None:
         """Take back the last set-point of a drive: it did not go out."""
         for state, before in zip(self._decided, self._before, strict=True):

@@ -111,13 +111,22 @@ happenings = st.one_of(
 )
 
 
+silences = st.one_of(
+    st.tuples(st.just("late"), st.floats(0.0, 0.06)),
+    st.tuples(st.sampled_from(["lost", "no answer"]), st.none()),
+    st.tuples(st.just("raise"), raised(DeviceError)),
+    st.tuples(st.just("dead"), st.integers(1, 12)),
+    st.tuples(st.just("counter"), st.integers(-3, 3)),
+)
+
+
 @st.composite
-def sequences_of_events(draw):
+def sequences_of(draw, happen, most, apart):
     """Return events that begin anywhere in a run and then follow each other closely, into the stop and its end."""
     at, events = draw(st.integers(1, 420)), []
-    for kind, what in draw(st.lists(happenings, max_size=6)):
+    for kind, what in draw(st.lists(happen, max_size=most)):
         events.append(Event(at, kind, what))
-        at += draw(st.integers(0, 60))
+        at += draw(st.integers(0, apart))
     return events
 
 
@@ -284,7 +293,7 @@ def only_drawn_transitions_were_made(run):
 sequences = given(
     clock=st.sampled_from(["real_time", "lockstep"]), reads_back=st.booleans(),
     count_rad=st.sampled_from([FINE_RAD, COARSE_RAD]), line=st.sampled_from(LINES),
-    goes_on=st.booleans(), human=st.booleans(), happens=sequences_of_events(),
+    goes_on=st.booleans(), human=st.booleans(), happens=sequences_of(happenings, 6, 60),
     plan=st.none() | bad_plans(), own=own_errors,
 )  # fmt: skip
 relaxed = dict(deadline=None, suppress_health_check=list(HealthCheck))
@@ -328,6 +337,11 @@ relaxed = dict(deadline=None, suppress_health_check=list(HealthCheck))
              Event(at=138, kind="counter", what=1), Event(at=143, kind="counter", what=1),
              Event(at=149, kind="lost", what=None)], plan=None, own=None,
 )  # fmt: skip
+@example(
+    clock="real_time", reads_back=False, count_rad=FINE_RAD, line="tcp", goes_on=True, human=True,
+    happens=[Event(at=198, kind="late", what=0.03125), Event(at=208, kind="lost", what=None),
+             Event(at=217, kind="late", what=0.03125)], plan=None, own=None,
+)  # fmt: skip
 @sequences
 @settings(max_examples=60, derandomize=True, **relaxed)
 def test_whatever_happens_the_leg_is_stopped_within_its_limits_and_it_is_said_why(
@@ -343,6 +357,17 @@ def test_ten_thousand_times_the_leg_is_stopped_within_its_limits_and_it_is_said_
     clock, reads_back, count_rad, line, goes_on, human, happens, plan, own
 ):
     check_every_invariant(clock, reads_back, count_rad, line, goes_on, human, happens, plan, own)
+
+
+@pytest.mark.slow
+@given(
+    reads_back=st.booleans(), line=st.sampled_from(LINES), human=st.booleans(), happens=sequences_of(silences, 9, 12)
+)
+@settings(max_examples=10_000, database=None, **relaxed)
+def test_ten_thousand_times_drives_that_go_on_by_themselves_are_led_from_where_they_are_however_silences_fall(
+    reads_back, line, human, happens
+):
+    check_every_invariant("real_time", reads_back, FINE_RAD, line, True, human, happens, None, None)
 
 
 def test_a_simulated_run_to_which_nothing_happens_is_complete(tmp_path):
