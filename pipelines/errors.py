@@ -47,10 +47,6 @@ class Unanswered(DeviceError):
     """A device gave no answer in time; while the leg moves, one such is survived."""
 
 
-class Unsent(Unanswered):
-    """A request was not sent, for it was too old when its turn on the line came."""
-
-
 @contextmanager
 def about(file: Path | str | None) -> Iterator[None]:
     """Put before every complaint of the block which file it is about; nothing where there is none."""

@@ -1,7 +1,7 @@
 """A Modbus device: what can be asked of it, and every way to fail turned into one sentence."""
 
 from collections.abc import Awaitable, Callable, Iterable, Sequence
-from math import inf
+from contextlib import AbstractAsyncContextManager
 from typing import Any, NamedTuple
 
 from pymodbus.constants import ExcCodes
@@ -58,10 +58,9 @@ class Device:
         """For how long it has not answered what it was asked, s; 0 where it has."""
         return self.line.awaited_s(self._unit)
 
-    @property
-    def went_out_at(self) -> float:
-        """When its last request was sent, host's clock, s; 0 where there was none."""
-        return self.line.went_out_at.get(self._unit, 0.0)
+    def turn(self) -> AbstractAsyncContextManager[None]:
+        """Wait until it is its turn on the line, and keep it for all that this task asks it within."""
+        return self.line.turn(self._unit)
 
     async def check_identity(self, identity: Iterable[Identity]) -> None:
         """Refuse a device that is not the one that the rig file describes."""
@@ -105,14 +104,8 @@ class Device:
         request = self._client.write_registers
         await self._ask(what, None, wait, request, address=block.address, values=list(words))
 
-    async def exchange(self, write: Block, words: Sequence[int], read: Block, *, fresh_s: float = inf) -> list[int]:
-        """Write one block and read another in one FC23 exchange, unless the line is busy for longer than ``fresh_s``.
-
-        Raises
-        ------
-        Unsent
-            It was; nothing was written.
-        """
+    async def exchange(self, write: Block, words: Sequence[int], read: Block) -> list[int]:
+        """Write one block and read another in one FC23 exchange."""
         what = f"an exchange (writing registers {_range(write)}, reading {_range(read)})"
         return await self._ask(
             what,
@@ -123,7 +116,6 @@ class Device:
             read_count=read.count,
             write_address=write.address,
             values=list(words),
-            fresh_s=fresh_s,
         )
 
     async def _ask(

@@ -5,9 +5,8 @@ import errno
 import socket
 import ssl
 import sys
-from collections.abc import Awaitable, Callable, Mapping
-from contextlib import suppress
-from math import inf
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any, cast
 
@@ -20,7 +19,7 @@ from pymodbus.pdu import DecodePDU, ModbusPDU
 from serial.tools import list_ports
 
 from pipelines.acquisition.reply import check_replies
-from pipelines.errors import DeviceError, SettingsError, Unsent
+from pipelines.errors import DeviceError, SettingsError
 from pipelines.settings.line import LineSettings, NetworkLine, RtuLine, RtuOverTcpLine, TlsLine
 from pipelines.settings.rig import DeviceSettings, RigSettings
 
@@ -58,12 +57,14 @@ class Line:
         """Who is on it."""
         self._settings, self._timeout_s, self._name = settings, timeout_s, name
         self._turn = asyncio.Lock()
+        self._holder: asyncio.Task | None = None
+        """Whose turn it is."""
+        self._used = False
+        """Whether anything was asked in it."""
         self._asking = self._failed = self._has_answered = False
         """Whether a request is under way, whether the last one was not answered, and whether any ever was."""
         self._asked: dict[int, float] = {}
         """Units that have not answered yet, or are waiting for their turn, and since when; the event loop's time, s."""
-        self.went_out_at: dict[int, float] = {}
-        """When a unit was sent its last request; the event loop's time, s."""
         self._owed: dict[int, Owed] = {}
         """What units may still answer that were not waited for any longer."""
         self._quiet_since = 0.0
@@ -120,42 +121,48 @@ class Line:
                 owed.came.set()
             self._owed.clear()
 
+    @asynccontextmanager
+    async def turn(self, unit: int) -> AsyncIterator[None]:
+        """Wait until it is a unit's turn, and keep it for all that this task asks within."""
+        waits = unit not in self._asked
+        self._asked.setdefault(unit, asyncio.get_running_loop().time())
+        await self._take_turn(unit)
+        self._holder, self._used = asyncio.current_task(), False
+        try:
+            yield
+        finally:
+            if waits and not self._used:
+                self._asked.pop(unit, None)
+            self._holder = None
+            self._turn.release()
+
     async def ask(
-        self,
-        unit: int,
-        within_s: float,
-        request: Callable[..., Awaitable[ModbusPDU]],
-        *,
-        fresh_s: float = inf,
-        **arguments: Any,
+        self, unit: int, within_s: float, request: Callable[..., Awaitable[ModbusPDU]], **arguments: Any
     ) -> ModbusPDU:
         """Send a unit a request of the client's when it is its turn, and return the answer, awaited for ``within_s``.
 
         Raises
         ------
-        Unsent
-            Its turn came only when the request was older than ``fresh_s``.
         DeviceError
             The line is lost.
         ModbusException, OSError
             The device did not answer; the line stands.
         """
-        loop = asyncio.get_running_loop()
-        decided = loop.time()
-        self._asked.setdefault(unit, decided)
-        await self._take_turn(unit)
+        if self._holder is asyncio.current_task():
+            return await self._ask(unit, within_s, request, arguments)
+        async with self.turn(unit):
+            return await self._ask(unit, within_s, request, arguments)
+
+    async def _ask(
+        self, unit: int, within_s: float, request: Callable[..., Awaitable[ModbusPDU]], arguments: dict[str, Any]
+    ) -> ModbusPDU:
+        self._used = True
+        self._asked.setdefault(unit, asyncio.get_running_loop().time())
         try:
             await self._quiet()
-            if loop.time() - decided > fresh_s:
-                self._asked.pop(unit, None)
-                raise Unsent(
-                    f"{self._label}: was busy for {loop.time() - decided:.3g} s, too long for what was to be sent to "
-                    f"unit {unit}; see to devices on it that do not answer, or give it fewer of them"
-                )
             # The one place where pymodbus looks for how long to wait, be it for a connection or for an answer.
             self.client.ctx.comm_params.timeout_connect = within_s
             self._asking = self._failed = True
-            self.went_out_at[unit] = loop.time()
             answer = await request(**arguments, device_id=unit)
             self._failed, self._has_answered = False, True
             self._asked.pop(unit, None)
@@ -166,11 +173,10 @@ class Line:
             raise DeviceError(f"{self._label}: {self._loss()}") from error
         finally:
             if self._asking:
-                self._quiet_since = loop.time()
+                self._quiet_since = asyncio.get_running_loop().time()
                 if self._failed and (len(self.devices) > 1 or not self.tells_replies_apart):
                     self._owed[unit] = Owed(within_s)
             self._asking = False
-            self._turn.release()
 
     def awaited_s(self, unit: int) -> float:
         """Return for how long a unit has not answered what it is to be asked, s; 0 where it has."""

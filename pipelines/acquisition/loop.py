@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from pipelines.acquisition.columns import columns_of
 from pipelines.acquisition.journal import Journal
 from pipelines.acquisition.latency import Latencies
-from pipelines.acquisition.machine import Answers, Machine, Reading, Row, all_answers
+from pipelines.acquisition.machine import Answers, Drive, Machine, Reading, Row, all_answers
 from pipelines.acquisition.pace import Lockstep, PhaseLock
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.sampling import Sampling
 from pipelines.acquisition.states import SLACK_SAMPLES, State, Supervisor
-from pipelines.errors import DeviceError, Unanswered, Unsent
+from pipelines.errors import DeviceError, Unanswered
 
 REPORT_S = 0.1
 DISABLE_TRIES = 3
@@ -127,13 +127,8 @@ class Loop:
             self._heed_signals()
             if self.supervisor.missed(found, time.monotonic()) and not await self._resume():
                 continue
-            for drive in self.machine.drives:  # what is decided now goes on from what is on its way
-                await drive.is_told()
             answers = await self._exchange(self.supervisor.next(found, time.monotonic()))
             row = self.supervisor.judge(answers, time.monotonic())
-            for joint, told in enumerate(answers.drives):
-                if isinstance(told, Unsent):  # now, rather than after who kept it waiting is asked again
-                    await self._tell_alone(joint)
             if row is None:
                 continue
             last = self._row = row
@@ -176,7 +171,7 @@ class Loop:
             self.supervisor.refuse_after_abort()
             if self._told_at(joint) != told:  # nobody is awaited for long
                 patience = SLACK_SAMPLES * period
-            elif drive.being_told or drive.device.awaited_s > period:  # it is the one who is awaited
+            elif drive.device.awaited_s > period:  # it is the one who is awaited
                 look_at = time.monotonic() + LOOK_PAUSE * period
             else:
                 await self._tell_alone(joint)
@@ -187,14 +182,16 @@ class Loop:
         return max(self.machine.drives[joint].told_at, float(self.supervisor.sent_at[joint]))
 
     async def _tell_alone(self, joint: int) -> None:
-        """Tell one drive where to go, from where it is, unless it is being told."""
+        """Tell one drive where to go, from where it is, unless it is told until its turn comes."""
         drive, told = self.machine.drives[joint], self.supervisor.sent_at[joint]
         with suppress(Unanswered):  # whoever follows the plan finds out for how long
-            self._heed(joint)
-            if self.supervisor.is_stale(joint, time.monotonic()):
-                await self._find(joint)
-            if self.supervisor.sent_at[joint] == told and not drive.being_told:
-                reading = await self._send(joint, self.supervisor.tend(joint, time.monotonic()))
+            async with drive.device.turn():
+                if self.supervisor.sent_at[joint] != told:
+                    return
+                self._heed(joint)
+                if self.supervisor.is_stale(joint, time.monotonic()):
+                    await self._find(joint)
+                reading = await drive.exchange(self.supervisor.tend(joint, time.monotonic()))
                 self.supervisor.hear(joint, time.monotonic())
                 self.supervisor.judge_tended(joint, reading)
 
@@ -218,24 +215,24 @@ class Loop:
     async def _exchange(self, reference: NDArray) -> Answers:
         self._cycle += 1
         asked = time.perf_counter()
-        answers = await self.machine.cycle(reference, self._cycle, self.supervisor.fresh_s(time.monotonic()))
+        answers = await self.machine.cycle(reference, self._cycle, self._tell_in_turn)
         self._latencies.add(time.perf_counter() - asked)
         for joint, drive in enumerate(self.machine.drives):
             self.supervisor.hear(joint, drive.told_at)
-            self.supervisor.went_out(joint, drive.sent_at)
             self._heed(joint)
         return answers
 
-    async def _send(self, joint: int, reference: float, *, halt: bool = False) -> Reading:
-        """Tell one drive a set-point (rad); the supervisor is told where that did not go out."""
-        fresh_s = float(self.supervisor.fresh_s(time.monotonic())[joint])
-        try:
-            return await self.machine.drives[joint].exchange(reference, halt=halt, fresh_s=fresh_s)
-        except Unsent:
-            self.supervisor.unsent(joint)
-            raise
-        finally:
-            self.supervisor.went_out(joint, self.machine.drives[joint].sent_at)
+    async def _tell_in_turn(self, drive: Drive, reference: float) -> Reading:
+        """Tell a drive its set-point (rad), or where its turn came too late what is due to it by then."""
+        joint = self.machine.drives.index(drive)
+        async with drive.device.turn():
+            if self.supervisor.is_fresh(joint, time.monotonic()):
+                self.supervisor.send_now(joint, time.monotonic())
+            else:  # by itself the drive may have gone on
+                self.supervisor.unsent(joint)
+                await self._find(joint)
+                reference = self.supervisor.tend(joint, time.monotonic())
+            return await drive.exchange(reference)
 
     def _heed(self, joint: int) -> None:
         """Heed what a drive has told, though it came beside what is awaited, or ended the run, or was asked again."""
@@ -317,7 +314,6 @@ class Loop:
                 await tending
             if drive.told_reference is not None:  # what was decided last may not have been sent
                 self.supervisor.begin_stop(joint, drive.told_reference)
-                self.supervisor.went_out(joint, drive.sent_at)
             self._heed(joint)
             while True:
                 # On the host's clock: the device's counter may be what has failed. What is late is not caught up
@@ -325,15 +321,16 @@ class Loop:
                 due_at = self._told_at(joint) + period
                 await asyncio.sleep(0.0 if drive.in_lockstep else max(0.0, due_at - time.monotonic()))
                 try:
-                    if self.supervisor.is_stale(joint, time.monotonic()):
-                        await self._find(joint)
-                    if not (due := self.supervisor.stop(joint, time.monotonic())):
-                        break
-                    reference, halt = due
-                    reading = await self._send(joint, reference, halt=halt)
-                    answered = time.monotonic()
-                    self.supervisor.hear(joint, answered)
-                    self.supervisor.feel(joint, reading)
+                    async with drive.device.turn():
+                        if self.supervisor.is_stale(joint, time.monotonic()):
+                            await self._find(joint)
+                        if not (due := self.supervisor.stop(joint, time.monotonic())):
+                            break
+                        reference, halt = due
+                        reading = await drive.exchange(reference, halt=halt)
+                        answered = time.monotonic()
+                        self.supervisor.hear(joint, answered)
+                        self.supervisor.feel(joint, reading)
                 except Unanswered:  # a lost reply alone is no reason to take a moving leg's torque away
                     if time.monotonic() - answered > self.machine.rig.safety.watchdog_s:
                         raise

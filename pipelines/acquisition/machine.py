@@ -5,7 +5,6 @@ import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from math import inf
 from typing import TypeVar
 
 import numpy as np
@@ -17,7 +16,7 @@ from pipelines.acquisition.device import Device
 from pipelines.acquisition.line import Line, lines_of
 from pipelines.acquisition.patience import Patience
 from pipelines.acquisition.ring import Queue, Ring
-from pipelines.errors import DeviceError, Refused, SettingsError, Unanswered, Unsent
+from pipelines.errors import DeviceError, Refused, SettingsError, Unanswered
 from pipelines.mechanics.motion import CUFFS
 from pipelines.registers import Block
 from pipelines.settings.rig import DriveSettings, RigSettings, SensorSettings, registers_of
@@ -97,10 +96,6 @@ class Drive:
         self._counted = 0
         self.told_reference: float | None = None
         """The last set-point on its way to it, rad; None while it has been told nothing, and need not be disabled."""
-        self._telling = asyncio.Lock()
-        """Held while a set-point is on its way to it, and until it is answered or not."""
-        self.sent_at = 0.0
-        """When the last one was sent, host's clock, s."""
         self.told_at = 0.0
         """When it answered the last one, host's clock, s: where others are on its line, that may be late."""
         self.conditions: list[Condition] = []
@@ -146,45 +141,20 @@ class Drive:
             self._counted = number
         return number
 
-    async def exchange(self, reference: float, *, halt: bool = False, fresh_s: float = inf) -> Reading:
-        """Send a set-point (rad) and return the sample that is latched; ``halt`` where the leg is to stand there.
-
-        Raises
-        ------
-        Unsent
-            The line was busy until the set-point was older than ``fresh_s``: by then the drive may have gone on.
-        """
+    async def exchange(self, reference: float, *, halt: bool = False) -> Reading:
+        """Send a set-point (rad) and return the sample that is latched; ``halt`` where the leg is to stand there."""
         control = self.map.enable if self.map.halt is None or not halt else self.map.halt
         words = self.words(control, reference)
-        async with self._telling:
-            held, self.told_reference = self.told_reference, reference
-            self.conditions.clear()
-            # Nobody knows which set-point a drive follows that did not answer.
-            before, self._sent = self._sent, np.nan
-            sent = time.perf_counter()
-            try:
-                answer = await self.device.exchange(self.tell, words, self.told, fresh_s=fresh_s)
-                self.sent_at = self.device.went_out_at
-            except Unsent:
-                self.told_reference, self._sent = held, before
-                raise
-            except BaseException:
-                self.sent_at = self.device.went_out_at
-                raise
-            self._sent, self.told_at = before, time.monotonic()
-            reading = self._reading(answer, sent)
-            self._sent = reference
-            return reading
-
-    @property
-    def being_told(self) -> bool:
-        """Whether a set-point is on its way to it."""
-        return self._telling.locked()
-
-    async def is_told(self) -> None:
-        """Wait until no set-point is on its way to it."""
-        async with self._telling:
-            pass
+        self.told_reference = reference
+        self.conditions.clear()
+        # Nobody knows which set-point a drive follows that did not answer.
+        before, self._sent = self._sent, np.nan
+        sent = time.perf_counter()
+        answer = await self.device.exchange(self.tell, words, self.told)
+        self._sent, self.told_at = before, time.monotonic()
+        reading = self._reading(answer, sent)
+        self._sent = reference
+        return reading
 
     async def disable(self, angle: float, *, in_motion: bool = False) -> None:
         """Take the torque away, and make sure of it; ``angle`` (rad) is where the leg stands or was sent."""
@@ -374,6 +344,10 @@ class Drive:
         )
 
 
+Tell = Callable[[Drive, float], Awaitable[Reading]]
+"""Sends a drive a set-point (rad) and returns the sample that is latched."""
+
+
 class Sensor:
     """One 3-axis force sensor."""
 
@@ -553,10 +527,10 @@ class Machine:
         """Return the cycle that the first drive is in."""
         return await self.drives[0].count() // self.samples_per_cycle
 
-    async def cycle(self, reference: NDArray, number: int, fresh_s: NDArray) -> Answers:
+    async def cycle(self, reference: NDArray, number: int, tell: Tell = Drive.exchange) -> Answers:
         """Send set-points (J,) rad and return what came: the sample that all devices latched, or of each its newest.
 
-        Set-points that cannot be sent within ``fresh_s`` (J,) s are not.
+        Each drive is told by ``tell``, all at once.
 
         In lockstep the drives' exchange ends a sample, so sensors are read before it. In real time the drives
         tell when a new sample begins, so sensors are read after it. Nothing is sent twice, for a set-point that comes
@@ -564,9 +538,9 @@ class Machine:
         """
         if self.rig.clock == "lockstep":
             forces = await self.felt(number)
-            told = await self._exchange(reference, fresh_s)
+            told = await self._exchange(reference, tell)
         else:
-            told = await self._exchange(reference, fresh_s)
+            told = await self._exchange(reference, tell)
             forces = await self.felt(number)
         readings = [answer for answer in told if isinstance(answer, Reading)]
         whole = len(readings) == len(told)
@@ -587,10 +561,10 @@ class Machine:
                 forces[CUFFS.index(sensor.settings.cuff)] = force
         return forces
 
-    async def _exchange(self, reference: NDArray, fresh_s: NDArray) -> list[Reading | Unanswered]:
+    async def _exchange(self, reference: NDArray, tell: Tell) -> list[Reading | Unanswered]:
         """Exchange every drive; return what each answers."""
-        due = zip(self.drives, reference.tolist(), fresh_s.tolist(), strict=True)
-        return await answers_or_silence(drive.exchange(angle, fresh_s=fresh) for drive, angle, fresh in due)
+        pairs = zip(self.drives, reference.tolist(), strict=True)
+        return await answers_or_silence(tell(drive, angle) for drive, angle in pairs)
 
     async def _latch(self, readings: list[Reading]) -> bool:
         """Ask those drives again that have not latched the others' sample yet.

@@ -19,7 +19,7 @@ from pipelines.acquisition.machine import Answers, Condition, Reading, Row
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.safety import HOLD_SAMPLES, Limits, refuse_leap, slowed
 from pipelines.acquisition.stream import Stream
-from pipelines.errors import DeviceError, Unanswered, Unsent
+from pipelines.errors import DeviceError, Unanswered
 from pipelines.mechanics.motion import CUFFS
 from pipelines.settings.rig import RigSettings, SensorSettings
 
@@ -224,7 +224,7 @@ class Supervisor:
         else:  # its leg lags behind one that holds, and is ahead with one that goes on
             place = np.clip(reading.angle, *sorted((sent, sent + self._pace[joint] * silent_s)))
         speed = (place - sent) / silent_s if np.isnan(reading.velocity) else reading.velocity
-        self.base[joint] = place
+        self.base[joint] = self._in_force[joint] = place
         self._speed[joint] = np.clip(speed, *sorted((0.0, self._speed[joint])))
 
     def tend(self, joint: int, now: float) -> float:
@@ -319,10 +319,7 @@ class Supervisor:
     def _is_new(self, joint: int, found: Reading | Unanswered, now: float) -> bool:
         """Tell whether an answer is a new sample; raise DeviceError where it, or silence, is reason to stop."""
         stream = self._streams[joint]
-        if isinstance(found, Unsent):
-            self.unsent(joint)
-            is_new = False
-        elif isinstance(found, Unanswered):
+        if isinstance(found, Unanswered):
             stream.miss(found)
             is_new = False
         else:
@@ -391,13 +388,13 @@ class Supervisor:
         if State.ABORT in TRANSITIONS[self.state]:
             self._go(State.ABORT)
 
-    def fresh_s(self, now: float) -> NDArray:
-        """Return for how long the last set-points may wait for their turn on a line, (J,) s."""
-        return self._fresh_until - now
+    def is_fresh(self, joint: int, now: float) -> bool:
+        """Tell whether the last set-point of a drive may still be sent, though it had to wait for its turn."""
+        return bool(now <= self._fresh_until[joint])
 
-    def went_out(self, joint: int, at: float) -> None:
-        """Note when the last set-point of a drive was sent: it may have waited for its turn since it was decided."""
-        self.sent_at[joint] = max(self.sent_at[joint], at)
+    def send_now(self, joint: int, now: float) -> None:
+        """Note that the last set-point of a drive is sent only now: it has waited for its turn since it was decided."""
+        self.sent_at[joint] = now
 
     def unsent(self, joint: int) -> None:
         """Take back the last set-point of a drive: it did not go out."""

@@ -372,11 +372,11 @@ def _patched(simulated, time, run, plan, own):
     async def check_identity(device, identity):
         pass
 
-    async def ask(device, write, read, within_s, fresh_s=inf):
+    async def ask(device, write, read, within_s):
         async def request(device_id):
             return await simulated.answer(device, write, read, within_s)
 
-        return await device.line.ask(device._unit, within_s, request, fresh_s=fresh_s)
+        return await device.line.ask(device._unit, within_s, request)
 
     safety = simulated.rig.safety
 
@@ -386,8 +386,8 @@ def _patched(simulated, time, run, plan, own):
     async def write(device, block, words, *, in_motion=False):
         await ask(device, (block, words), None, safety.longest_reply_s if in_motion else safety.watchdog_s)
 
-    async def exchange(device, block, words, read, *, fresh_s=inf):
-        return await ask(device, (block, words), (read.address, read.count), safety.longest_reply_s, fresh_s)
+    async def exchange(device, block, words, read):
+        return await ask(device, (block, words), (read.address, read.count), safety.longest_reply_s)
 
     abort, go = Supervisor.abort, Supervisor._go
 

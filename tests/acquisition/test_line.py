@@ -17,12 +17,11 @@ from pipelines.acquisition.device import Device
 from pipelines.acquisition.line import Line, _explained
 from pipelines.acquisition.machine import Machine
 from pipelines.contracts import RECORDING
-from pipelines.errors import DeviceError, SettingsError, Unanswered, Unsent
-from pipelines.registers import Block
+from pipelines.errors import DeviceError, SettingsError, Unanswered
 from pipelines.rig.null_modem import null_modem
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.line import RtuLine, RtuOverTcpLine
-from pipelines.settings.rig import Register, SafetySettings, load_rig
+from pipelines.settings.rig import SafetySettings, load_rig
 
 from .conftest import free_port
 
@@ -415,19 +414,27 @@ def test_a_line_is_renewed_only_where_it_failed_and_nobody_is_asked_in_between()
     assert Slow(9.0, 0.0).at_work(ask) == ([False], [1, 1])
 
 
-def test_a_set_point_that_waited_too_long_for_its_turn_is_not_sent():
-    slow = Slow(0.3, 0.0, 0.0)
-
+def test_whoever_has_the_turn_on_a_line_keeps_it_for_all_that_is_asked_within():
     async def ask(device):
         drive = Device("drive knee", 2, device.line, SafetySettings(watchdog_s=5.0, reply_s=0.4))
-        block = Block({"reference": Register(address=200, type="uint16")})
-        found = await asyncio.gather(
-            device.read(100, 1), drive.exchange(block, [7], block, fresh_s=0.1), return_exceptions=True
-        )
-        assert drive.awaited_s == 0.0  # nobody waits for an answer to what was not sent
-        return *found, slow.asked, await drive.exchange(block, [8], block, fresh_s=0.1)
 
-    first, unsent, asked, after = slow.at_work(ask)
-    assert (first, asked, after) == ([0], 1, [1])
-    assert isinstance(unsent, Unsent)
-    assert re.match(r"line leg \(.*\): was busy for 0\.3\d* s, too long for what was to be sent to unit 2", str(unsent))
+        async def twice():
+            async with drive.turn():
+                first = await drive.read(100, 1)
+                await asyncio.sleep(0.1)
+                return first, await drive.read(100, 1)
+
+        return await asyncio.gather(device.read(100, 1), twice(), device.read(100, 1))
+
+    assert Slow(0.2, 0.1, 0.1, 0.0).at_work(ask) == [[0], ([1], [2]), [3]]
+
+
+def test_who_waited_for_a_turn_and_had_nothing_to_ask_is_not_waited_for():
+    async def ask(device):
+        drive = Device("drive knee", 2, device.line, SafetySettings(watchdog_s=5.0, reply_s=0.4))
+        async with drive.turn():
+            pass
+        await asyncio.sleep(0.1)
+        return drive.awaited_s
+
+    assert Slow().at_work(ask) == 0.0
