@@ -186,11 +186,11 @@ class Loop:
         drive, told = self.machine.drives[joint], self.supervisor.sent_at[joint]
         with suppress(Unanswered):  # whoever follows the plan finds out for how long
             async with drive.device.turn():
-                if self.supervisor.sent_at[joint] != told:
-                    return
                 self._heed(joint)
                 if self.supervisor.is_stale(joint, time.monotonic()):
                     await self._find(joint)
+                if self.supervisor.sent_at[joint] != told:
+                    return
                 reading = await drive.exchange(self.supervisor.tend(joint, time.monotonic()))
                 self.supervisor.hear(joint, time.monotonic())
                 self.supervisor.judge_tended(joint, reading)
@@ -311,7 +311,10 @@ class Loop:
         answered = time.monotonic()
         try:
             for tending in self._tending[joint : joint + 1]:  # may be waiting for an answer still
-                await tending
+                await _outlive([tending], self.supervisor.abort)
+                # Whatever ended it is a reason to stop, and none to stop otherwise than all others do.
+                if not tending.cancelled() and (error := tending.exception()):
+                    self.supervisor.abort(error)
             if drive.told_reference is not None:  # what was decided last may not have been sent
                 self.supervisor.begin_stop(joint, drive.told_reference)
             self._heed(joint)

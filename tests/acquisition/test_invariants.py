@@ -157,6 +157,7 @@ def check_every_invariant(clock, reads_back, count_rad, line, goes_on, human, ha
         no_drive_leaps(simulated)
         a_drive_that_says_it_is_not_enabled_is_told_to_disable_and_nothing_else(simulated)
         motion_stops_within_the_stated_number_of_cycles(simulated)
+        a_leg_is_slowed_down_before_its_torque_is_taken_away(simulated)
         no_drive_that_answers_is_told_nothing_for_long(simulated)
         the_abort_is_told(simulated, folder)
         drives_are_disabled_or_it_is_said_that_they_are_not(simulated)
@@ -219,6 +220,23 @@ def motion_stops_within_the_stated_number_of_cycles(run):
         assert len(after) <= slowing + HOLD_SAMPLES
 
 
+def a_leg_is_slowed_down_before_its_torque_is_taken_away(run):
+    """Whatever the reason to stop, wherever its drive answers soundly, is enabled, and nobody is pressed."""
+    if run.aborted_at is None or run.supervisor.pressing or any(at >= run.aborted_at for at, _ in run.rig.raised):
+        return
+    for drive in run.rig.drives:
+        mine = [asked for asked in run.rig.asked if drive.settings.joint in asked.label]
+        late = (asked for asked in mine if not asked.was_answered_by(asked.time + SOON_S))
+        silent = any(asked.answered > run.aborted_at for asked in late)
+        said_wrong = drive.wrong or drive.fault or drive.unpowered or drive.stuck_status or drive.was_without_torque
+        told = [t for t in run.rig.told if t.joint == drive.joint]
+        moved = any(t.control != 0 for t in told if t.time <= run.aborted_at)
+        if moved and not silent and not said_wrong:
+            after = list(itertools.takewhile(lambda t: t.control != 0, (t for t in told if t.time > run.aborted_at)))
+            assert len(after) >= HOLD_SAMPLES
+            assert len({t.reference for t in after[-HOLD_SAMPLES:]}) == 1
+
+
 def no_drive_that_answers_is_told_nothing_for_long(run):
     """As docs/safety.md states it, from the first set-point that moves it until it is told to disable."""
     for drive in run.rig.drives if run.rig.rig.clock == "real_time" else ():
@@ -236,11 +254,13 @@ def longest_alone(run, joint, begin, end):
     As long as you like where it does not answer itself.
     """
     asked = [asked for asked in run.rig.asked if asked.time <= end and not asked.was_answered_by(begin)]
-    silent = {asked.label for asked in asked if not asked.was_answered_by(asked.time + SOON_S)}
-    if any(f"drive {joint}" in label for label in silent):
+    late = [asked for asked in asked if not asked.was_answered_by(asked.time + SOON_S)]
+    silent = {asked.label for asked in late if asked.answered == inf}
+    if any(f"drive {joint}" in asked.label for asked in late):
         return inf, len(silent)
-    on_its_line = len(silent) if run.rig.rig.line else 0
-    return 2 / RATE + SOON_S + on_its_line * run.rig.rig.safety.longest_reply_s, len(silent)
+    waited_s = len(silent) * run.rig.rig.safety.longest_reply_s
+    waited_s += sum(asked.answered - asked.time for asked in late if asked.answered < inf)
+    return 2 / RATE + SOON_S + (waited_s if run.rig.rig.line else 0.0), len(silent)
 
 
 def the_abort_is_told(run, folder):
