@@ -236,8 +236,9 @@ class Loop:
 
     def _heed(self, joint: int) -> None:
         """Heed what a drive has told, though it came beside what is awaited, or ended the run, or was asked again."""
-        for condition in self.machine.drives[joint].conditions:
-            self.supervisor.heed(joint, condition)
+        conditions = self.machine.drives[joint].conditions
+        while conditions:
+            self.supervisor.heed(joint, conditions.pop(0))
 
     def _keep(self, row: Row) -> None:
         """Write a sample, and note those missed before it."""

@@ -99,7 +99,7 @@ class Drive:
         self.told_at = 0.0
         """When it answered the last one, host's clock, s: where others are on its line, that may be late."""
         self.conditions: list[Condition] = []
-        """What it has told since it was told where to go, though whoever asked may not have come to hear it."""
+        """What it has told that nobody has heeded yet: whoever asked may not have come to hear it."""
 
     def _its_ring(self) -> Ring | Queue:
         settings = self.map.ring
@@ -146,7 +146,6 @@ class Drive:
         control = self.map.enable if self.map.halt is None or not halt else self.map.halt
         words = self.words(control, reference)
         self.told_reference = reference
-        self.conditions.clear()
         # Nobody knows which set-point a drive follows that did not answer.
         before, self._sent = self._sent, np.nan
         sent = time.perf_counter()

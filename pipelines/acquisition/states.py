@@ -32,6 +32,8 @@ SLACK_SAMPLES = 2
 """How far set-points may be ahead of their speed limit for a moment: they come in step with samples, which the host
 sees up to one sample late or early."""
 
+NO_LAG_RAD = 1e-9
+"""What rounding leaves between a set-point and the plan."""
 FRESH_SAMPLES = 3
 """How long after a drive has answered it may be sent a set-point that was decided by that: it may go on by itself."""
 
@@ -95,7 +97,9 @@ class Supervisor:
         self._streams = [Stream(rig, j, sample_rate_hz, told) for j, told in enumerate(self._told)]
         self._records = [Stream(rig, j, sample_rate_hz, told) for j, told in enumerate(self._told)]
         self._speed = np.zeros_like(self.sent)
-        """(J,) rad/s that a stop slows down from: the plan's, as far as set-points move with it."""
+        """(J,) rad/s at which set-points move: a stop slows down from there, the way back to the plan begins there."""
+        self._along = np.zeros_like(self.sent)
+        """(J,) rad/s at which the plan went when the last set-points were decided."""
         self._pace = np.zeros_like(self.sent)
         """(J,) rad/s at which a drive may go on by itself: as its last set-point did from the one before."""
         self._fresh_until = np.full_like(self.sent, inf)
@@ -241,11 +245,10 @@ class Supervisor:
         awaited_s = now - self._found_at
         if awaited_s > self.rig.safety.longest_reply_s + SLACK_SAMPLES / self.rate:
             return self._slow(joint, now)
-        due, planned = self._planned(self._found + int(awaited_s * self.rate))
-        base, step = self.base[joint], self._step(planned, now)[joint]
-        reference = float(np.clip(due[joint], base - step, base + step))
-        self._speed[joint] = np.clip(reference - base, *sorted((0.0, planned[joint]))) * self.rate
-        return self._pass(joint, reference, now)
+        before, due = self._planned(self._found + int(awaited_s * self.rate))
+        reference, speed = self._towards(before, due, now)
+        self._speed[joint], self._along[joint] = speed[joint], (due - before)[joint] * self.rate
+        return self._pass(joint, float(reference[joint]), now)
 
     def judge_tended(self, joint: int, reading: Reading) -> None:
         """Raise DeviceError where what a drive tells that is tended is reason to stop."""
@@ -276,13 +279,13 @@ class Supervisor:
         self._look(found, now)
         while self.state is not self._due(self._index(found)):
             self._go(FOLLOWING[FOLLOWING.index(self.state) + 1])
-        due, planned = self._planned(found)
-        step = self._step(planned, now) if found > self._found else 0.0  # one step a sample
-        reference = np.clip(due, self.base - step, self.base + step)
+        before, due = self._planned(found)
+        reference, speed = self.base.copy(), self._speed
+        if found > self._found:  # one step a sample
+            reference, speed = self._towards(before, due, now)
         self._refuse_to_lag(due, reference)
-        # A step back to the plan is no motion to be slowed down from: it may be far faster than the plan.
-        speed = np.clip(reference - self.base, np.minimum(planned, 0.0), np.maximum(planned, 0.0)) * self.rate
-        self._send(reference, speed if found > self._found else self._speed, now)
+        self._send(reference, speed, now)
+        self._along = (due - before) * self.rate
         self._found_at = now
         self._found = found
         return self.sent.copy()
@@ -486,20 +489,33 @@ class Supervisor:
         """Return which set-point of the path is due at a sample."""
         return min(found - self._first, len(self._plan.reference))
 
-    def _step(self, planned: NDArray, now: float) -> NDArray:
-        """Return how far set-points may go now, (J,) rad: the plan's own step, or as far as the walk back leads by now.
+    def _towards(self, before: NDArray, due: NDArray, now: float) -> tuple[NDArray, NDArray]:
+        """Return set-points (J,) rad along the plan, or on the way back to it, and how fast they move, rad/s.
 
-        After a late one the next comes soon: for the drive both may fall into one sample, which must not make the way
-        back twice as fast.
+        The way back begins as fast as set-points move already, and goes faster and slower as gently as a stop does: a
+        drive that is sent from rest to its speed limit within a sample jerks the leg with all of its torque. It is no
+        longer than the time allows: after a late set-point the next comes soon, and both may fall into one sample.
         """
-        return np.maximum(np.abs(planned), self._walk * np.minimum(self._elapsed_s(now), self._sample_s))
+        along, lag = (due - before) * self.rate, before - self.base
+        if not lag.any() and np.array_equal(self._speed, self._along):
+            return due, along
+        deceleration, took_s = self.rig.safety.deceleration_rad_s2, np.minimum(self._elapsed_s(now), self._sample_s)
+        softly = np.minimum(np.abs(lag) * self.rate, np.sqrt(2.0 * deceleration * np.abs(lag)))
+        # Twice what a stop changes: the last steps towards the plan follow their parabola a sample late.
+        change = 2.0 * deceleration * took_s + np.abs(along - self._along)
+        fastest = np.maximum(np.abs(along), self._walk)
+        speed = np.clip(along + np.copysign(softly, lag), self._speed - change, self._speed + change)
+        speed = np.clip(speed, -fastest, fastest)
+        on_plan = (np.abs(lag) < NO_LAG_RAD) & (speed == along)
+        reference = self.base + np.where(on_plan, due - before, speed * took_s)
+        return np.where(np.abs(reference - due) < NO_LAG_RAD, due, reference), speed
 
     def _planned(self, found: int) -> tuple[NDArray, NDArray]:
-        """Return the set-points (J,) rad that are due at a sample, and their steps; refuse a plan that leaps there."""
+        """Return the set-points (J,) rad before those due at a sample, and these; refuse a plan that leaps there."""
         index = self._index(found)
         before, due = self._path(max(index - 1, 0)), self._path(index)
         refuse_leap(self.rig.drive, before, due, self._sample_s)
-        return due, due - before
+        return before, due
 
     def _path(self, index: int) -> NDArray:
         """Return the set-points (J,) rad of the path, whose first is where the leg stood."""

@@ -135,19 +135,25 @@ def told(reference, velocity=np.nan, enabled=True):
 
 
 @pytest.mark.parametrize("gone_on", [0.0, 0.01, 0.03])
-def test_after_missed_samples_set_points_walk_back_to_the_plan_from_where_the_drive_is(supervisor, gone_on):
-    supervisor.take(Plan(np.arange(1, 129)[:, np.newaxis] * [2.0 / RATE, 0.0], 50, 100), np.zeros(2))
+def test_after_missed_samples_set_points_walk_back_to_the_plan_gently_from_where_the_drive_is(supervisor, gone_on):
+    supervisor.take(Plan(np.arange(1, 129)[:, np.newaxis] * [1.5 / RATE, 0.0], 50, 100), np.zeros(2))
     supervisor.rest(10.0)
     supervisor.begin(row(100), 10.0)
     before = follow(supervisor, 101)
-    assert supervisor.missed(111, 10.0 + 11 / RATE)
-    supervisor.resume(0, told(before + gone_on), 10.0 + 11 / RATE)
-    sent = [before + gone_on, *(follow(supervisor, k) for k in range(111, 180))]
-    steps = np.diff(sent)
-    assert steps[0] == pytest.approx(0.8 * 3.0 / RATE)  # short of the speed limit
-    assert steps.max() <= 0.8 * 3.0 / RATE + 1e-12
-    assert sent[-1] == pytest.approx(79 * 2.0 / RATE)  # the plan again
-    assert steps[-1] == pytest.approx(2.0 / RATE)
+    assert supervisor.missed(106, 10.0 + 6 / RATE)
+    supervisor.resume(0, told(before + gone_on), 10.0 + 6 / RATE)
+    sent = np.array([before + gone_on, *(follow(supervisor, k) for k in range(106, 200))])
+    speed, plan = RATE * np.diff(sent), np.arange(106, 200) * 1.5 / RATE - 150 / RATE
+    a = supervisor.rig.safety.deceleration_rad_s2
+    assert np.abs(np.diff([supervisor_speed_before(before, gone_on), *speed])).max() <= 2.0 * a / RATE + 1e-9
+    assert speed.max() <= 0.8 * 3.0 + 1e-9  # short of the speed limit
+    assert (sent[1:] - plan).max() <= 2.0 * a / RATE**2, "it does not overshoot"
+    assert sent[-1] == plan[-1], "the plan again"
+
+
+def supervisor_speed_before(before, gone_on):
+    """Return how fast (rad/s) the drive is found to move: between rest and the plan's own speed."""
+    return min(gone_on / (5 / RATE), 1.5) if before else 0.0
 
 
 def test_a_set_point_that_comes_soon_after_a_late_one_leads_back_to_the_plan_no_faster(supervisor):
@@ -161,8 +167,7 @@ def test_a_set_point_that_comes_soon_after_a_late_one_leads_back_to_the_plan_no_
     late = 10.0 + 11.8 / RATE
     first = float(supervisor.next(111, late)[0])
     soon = float(supervisor.next(112, late + 0.2 / RATE)[0])
-    assert first - before == pytest.approx(0.8 * 3.0 / RATE)
-    assert soon - first == pytest.approx(2.0 / RATE)  # the plan's own
+    assert 0.0 < soon - first < 0.5 * (first - before)
 
 
 @pytest.mark.parametrize("tells", [True, False])
@@ -183,8 +188,9 @@ def test_a_drive_that_went_on_while_it_was_led_back_to_a_standing_plan_is_found_
     assert supervisor.is_stale(0, at)
     assert not supervisor.is_stale(1, at), "it is held"
     sent = supervisor.sent[0]
-    supervisor.resume(0, told(sent + 0.02), at)
-    assert supervisor.base[0] == pytest.approx(sent + 0.02)
+    moved = 2.0 * (sent - 0.1)
+    supervisor.resume(0, told(sent + moved), at)
+    assert supervisor.base[0] == pytest.approx(sent + moved)
 
 
 def test_a_run_that_lags_too_far_behind_its_plan_is_stopped(supervisor):
