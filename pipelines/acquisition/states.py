@@ -98,8 +98,6 @@ class Supervisor:
         self._records = [Stream(rig, j, sample_rate_hz, told) for j, told in enumerate(self._told)]
         self._speed = np.zeros_like(self.sent)
         """(J,) rad/s at which set-points move: a stop slows down from there, the way back to the plan begins there."""
-        self._along = np.zeros_like(self.sent)
-        """(J,) rad/s at which the plan went when the last set-points were decided."""
         self._pace = np.zeros_like(self.sent)
         """(J,) rad/s at which a drive may go on by itself: as its last set-point did from the one before."""
         self._fresh_until = np.full_like(self.sent, inf)
@@ -245,9 +243,8 @@ class Supervisor:
         awaited_s = now - self._found_at
         if awaited_s > self.rig.safety.longest_reply_s + SLACK_SAMPLES / self.rate:
             return self._slow(joint, now)
-        before, due = self._planned(self._found + int(awaited_s * self.rate))
-        reference, speed = self._towards(before, due, now)
-        self._speed[joint], self._along[joint] = speed[joint], (due - before)[joint] * self.rate
+        reference, speed = self._towards(self._found + int(awaited_s * self.rate), now)
+        self._speed[joint] = speed[joint]
         return self._pass(joint, float(reference[joint]), now)
 
     def judge_tended(self, joint: int, reading: Reading) -> None:
@@ -279,13 +276,12 @@ class Supervisor:
         self._look(found, now)
         while self.state is not self._due(self._index(found)):
             self._go(FOLLOWING[FOLLOWING.index(self.state) + 1])
-        before, due = self._planned(found)
+        due = self._planned(found)
         reference, speed = self.base.copy(), self._speed
         if found > self._found:  # one step a sample
-            reference, speed = self._towards(before, due, now)
+            reference, speed = self._towards(found, now)
         self._refuse_to_lag(due, reference)
         self._send(reference, speed, now)
-        self._along = (due - before) * self.rate
         self._found_at = now
         self._found = found
         return self.sent.copy()
@@ -487,22 +483,23 @@ class Supervisor:
 
     def _index(self, found: int) -> int:
         """Return which set-point of the path is due at a sample."""
-        return min(found - self._first, len(self._plan.reference))
+        return min(max(found - self._first, 0), len(self._plan.reference))
 
-    def _towards(self, before: NDArray, due: NDArray, now: float) -> tuple[NDArray, NDArray]:
+    def _towards(self, found: int, now: float) -> tuple[NDArray, NDArray]:
         """Return set-points (J,) rad along the plan, or on the way back to it, and how fast they move, rad/s.
 
         The way back begins as fast as set-points move already, and goes faster and slower as gently as a stop does: a
         drive that is sent from rest to its speed limit within a sample jerks the leg with all of its torque. It is no
         longer than the time allows: after a late set-point the next comes soon, and both may fall into one sample.
         """
-        along, lag = (due - before) * self.rate, before - self.base
-        if not lag.any() and np.array_equal(self._speed, self._along):
+        due, before, earlier = (self._path(self._index(found - back)) for back in range(3))
+        along, was, lag = (due - before) * self.rate, (before - earlier) * self.rate, before - self.base
+        if not lag.any() and np.array_equal(self._speed, was):
             return due, along
         deceleration, took_s = self.rig.safety.deceleration_rad_s2, np.minimum(self._elapsed_s(now), self._sample_s)
-        softly = np.minimum(np.abs(lag) * self.rate, np.sqrt(2.0 * deceleration * np.abs(lag)))
-        # Twice what a stop changes: the last steps towards the plan follow their parabola a sample late.
-        change = 2.0 * deceleration * took_s + np.abs(along - self._along)
+        # Half of what a stop slows down by is left for what samples make of a parabola.
+        softly = np.minimum(np.abs(lag) * self.rate, np.sqrt(deceleration * np.abs(lag)))
+        change = np.maximum(deceleration, np.abs(along - was) * self.rate) * took_s
         fastest = np.maximum(np.abs(along), self._walk)
         speed = np.clip(along + np.copysign(softly, lag), self._speed - change, self._speed + change)
         speed = np.clip(speed, -fastest, fastest)
@@ -510,12 +507,12 @@ class Supervisor:
         reference = self.base + np.where(on_plan, due - before, speed * took_s)
         return np.where(np.abs(reference - due) < NO_LAG_RAD, due, reference), speed
 
-    def _planned(self, found: int) -> tuple[NDArray, NDArray]:
-        """Return the set-points (J,) rad before those due at a sample, and these; refuse a plan that leaps there."""
+    def _planned(self, found: int) -> NDArray:
+        """Return the set-points (J,) rad that are due at a sample; refuse a plan that leaps there."""
         index = self._index(found)
         before, due = self._path(max(index - 1, 0)), self._path(index)
         refuse_leap(self.rig.drive, before, due, self._sample_s)
-        return before, due
+        return due
 
     def _path(self, index: int) -> NDArray:
         """Return the set-points (J,) rad of the path, whose first is where the leg stood."""

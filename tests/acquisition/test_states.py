@@ -142,13 +142,13 @@ def test_after_missed_samples_set_points_walk_back_to_the_plan_gently_from_where
     before = follow(supervisor, 101)
     assert supervisor.missed(106, 10.0 + 6 / RATE)
     supervisor.resume(0, told(before + gone_on), 10.0 + 6 / RATE)
-    sent = np.array([before + gone_on, *(follow(supervisor, k) for k in range(106, 200))])
-    speed, plan = RATE * np.diff(sent), np.arange(106, 200) * 1.5 / RATE - 150 / RATE
+    sent = np.array([before + gone_on, *(follow(supervisor, k) for k in range(106, 220))])
+    speed, plan = RATE * np.diff(sent), np.arange(106, 220) * 1.5 / RATE - 150 / RATE
     a = supervisor.rig.safety.deceleration_rad_s2
-    assert np.abs(np.diff([supervisor_speed_before(before, gone_on), *speed])).max() <= 2.0 * a / RATE + 1e-9
+    assert np.abs(np.diff([supervisor_speed_before(before, gone_on), *speed])).max() <= a / RATE + 1e-9
     assert speed.max() <= 0.8 * 3.0 + 1e-9  # short of the speed limit
     assert (sent[1:] - plan).max() <= 2.0 * a / RATE**2, "it does not overshoot"
-    assert sent[-1] == plan[-1], "the plan again"
+    assert sent[-1] == pytest.approx(plan[-1], abs=1e-12), "the plan again"
 
 
 def supervisor_speed_before(before, gone_on):
