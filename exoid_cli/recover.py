@@ -63,7 +63,9 @@ def _told(one: "Recovered") -> str:
         text += f"; {account.cut_off} more ({seconds:.3f} s) were planned"
     text += f"; {account.missed} are missing in {len(account.gaps)} gaps" if account.gaps else "; no gaps"
     if account.damaged:
-        text += "; the journal is damaged in places and is kept: check the disk"
+        text += "; the journal is damaged or cut off, and is kept: check the disk"
+    if not account.checked:
+        text += "; its numbers were not checked, an older exoid wrote it without checksums"
     return f"{text}; {account.abort or 'the run had ended, only its recording was not written'}"
 
 
@@ -71,5 +73,5 @@ def _as_json(one: "Recovered") -> dict:
     account = one.account
     return {
         "path": one.path, "samples": account.samples, "planned": account.planned, "cut_off": account.cut_off,
-        "gaps": account.gaps, "abort": account.abort, "damaged": account.damaged,
+        "gaps": account.gaps, "abort": account.abort, "damaged": account.damaged, "checked": account.checked,
     }  # fmt: skip

@@ -6,6 +6,7 @@ other readers of Arrow pass over it.
 
 import re
 from base64 import b64decode, b64encode
+from collections.abc import Iterator
 from typing import BinaryIO
 from zlib import crc32
 
@@ -21,12 +22,18 @@ def copy_of(head: bytes) -> str:
     return f"exoid-head:{crc32(head):08x}:{b64encode(head).decode()}"
 
 
-def head_in(file: BinaryIO) -> bytes | None:
-    """Return the head that the first whole copy in a journal holds; None where there is none."""
+def ends_of(file: BinaryIO) -> Iterator[bytes]:
+    """Yield the beginning and the end of a journal, as far as it is searched for what tells how to read it."""
     length = file.seek(0, 2)
     for place in (0, max(length - SEARCHED, 0)):
         file.seek(place)
-        for told in _TOLD.finditer(file.read(SEARCHED)):
+        yield file.read(SEARCHED)
+
+
+def head_in(file: BinaryIO) -> bytes | None:
+    """Return the head that the first whole copy in a journal holds; None where there is none."""
+    for content in ends_of(file):
+        for told in _TOLD.finditer(content):
             try:
                 head = b64decode(told[2])
             except ValueError:

@@ -8,6 +8,7 @@ import errno
 import io
 import json
 import os
+import re
 import threading
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -17,7 +18,8 @@ from typing import Any, BinaryIO, Self
 
 import pyarrow as pa
 
-from pipelines.acquisition.head import COPY, copy_of, head_in
+from pipelines.acquisition import checksum
+from pipelines.acquisition.head import COPY, copy_of, ends_of, head_in
 from pipelines.acquisition.lock import locked, take
 from pipelines.contracts.beside import JOURNAL
 from pipelines.contracts.parquet import to_json
@@ -34,10 +36,12 @@ FOUND = b"found"
 """Key under which they hold what the run found out for its metadata."""
 ROWS = b"rows"
 """Key under which they tell how many samples there must be."""
-MARK = b"\xff\xff\xff\xff"
-"""With this every part of an Arrow stream begins, at a multiple of eight bytes."""
+MARK = re.compile(rb"\xff{4}(?!\xff)")
+"""With these bytes every part of an Arrow stream begins; a length comes next, a multiple of eight, and no fifth."""
+END = b"\xff\xff\xff\xff\0\0\0\0"
+"""With this a stream ends that was closed."""
 SCANNED = 65536
-"""Bytes that are looked through at once for the next one, a multiple of eight."""
+"""Bytes that are looked through at once for the next mark."""
 NO_SAMPLE = 512
 """So short a file holds no sample: the head of a run alone, with its columns and metadata, is longer."""
 
@@ -54,20 +58,18 @@ class Journal:
         self.path = path
         self.rows = 0
         self._schema = pa.schema(map(field_of, columns), metadata={KEY: to_json(metadata, str(path)).encode()})
-        self._copy = {COPY: copy_of(self._schema.serialize().to_pybytes())}
+        self._head = self._schema.serialize().to_pybytes()
+        self._copy = {COPY: copy_of(self._head).encode()}
         self._waiting: deque[Sequence[float]] = deque()
         self._failure: OSError | None = None
-        self._last_words: dict[bytes, str] | None = None
+        self._last_words: dict[bytes, bytes] | None = None
         path.parent.mkdir(parents=True, exist_ok=True)
         # Exclusive: a journal that is there already is all that is left of a run.
         self._file = open(path, "xb", buffering=0)  # noqa: SIM115, it stays open from the first sample to the last
         self._identity = os.fstat(self._file.fileno())
         take(self._file, wait=True)
-        self._bytes = io.BytesIO()
-        self._stream = pa.ipc.new_stream(self._bytes, self._schema)
-        # The head comes to disk with a first batch only, which brings its copy.
-        self._stream.write_batch(self._batch([]), custom_metadata=self._copy)
-        self._hand_over()
+        # Two copies: one piece of a disk that is lost may lie across the head and the first.
+        self._hand_over(self._head + 2 * self._batch([], self._copy))
         self._writing, self._ends = threading.Lock(), threading.Event()
         self._writer = threading.Thread(target=self._write_on, name="journal", daemon=True)
         self._writer.start()
@@ -94,8 +96,7 @@ class Journal:
             if not rows:
                 return
             try:
-                self._stream.write_batch(self._batch(rows))
-                self._hand_over()
+                self._hand_over(self._batch(rows))
             except OSError:
                 self._waiting.extendleft(reversed(rows))
                 raise
@@ -123,7 +124,8 @@ class Journal:
 
         ``found`` is what else its metadata shall tell that was not known before the run.
         """
-        self._last_words = {ABORT: abort or "", FOUND: json.dumps(found or {}), ROWS: str(self.rows)}
+        words = {ABORT: abort or "", FOUND: json.dumps(found or {}), ROWS: str(self.rows)}
+        self._last_words = {key: word.encode() for key, word in words.items()}
 
     def close(self) -> None:
         """Write the rest and close the file."""
@@ -131,22 +133,23 @@ class Journal:
         self._writer.join()
         with self._file:  # closed even where the disk is full
             self.flush()
-            if self._last_words is not None:
-                # The copy once more: what damages the beginning of a file may reach further than its head.
-                self._stream.write_batch(self._batch([]), custom_metadata=self._last_words | self._copy)
-            self._stream.close()
-            self._hand_over()
+            # The copy once more: what damages the beginning of a file may reach further than its head.
+            words = b"" if self._last_words is None else self._batch([], self._last_words | self._copy)
+            self._hand_over(words + END)
 
-    def _batch(self, rows: Sequence[Sequence[float]]) -> pa.RecordBatch:
+    def _batch(self, rows: Sequence[Sequence[float]], more: Mapping[bytes, bytes] | None = None) -> bytes:
+        """Return rows as a part of an Arrow stream, with ``more`` and a checksum as the metadata of its own."""
         columns = zip(*rows, strict=True) if rows else ((),) * len(self._schema)
         arrays = [pa.array(column, type=field.type) for column, field in zip(columns, self._schema, strict=True)]
-        return pa.record_batch(arrays, schema=self._schema)
+        stream = io.BytesIO()
+        with pa.ipc.new_stream(stream, self._schema) as made:
+            metadata = {**(more or {}), checksum.KEY: checksum.BLANK}
+            made.write_batch(pa.record_batch(arrays, schema=self._schema), custom_metadata=metadata)
+        return checksum.with_checksum(stream.getvalue()[len(self._head) : -len(END)], self._head)
 
-    def _hand_over(self) -> None:
-        """Write what the stream has made; all of it or, where the disk is full, nothing."""
-        whole, left = self._file.tell(), memoryview(self._bytes.getvalue())
-        self._bytes.seek(0)
-        self._bytes.truncate()
+    def _hand_over(self, parts: bytes) -> None:
+        """Write parts of the stream; all of them or, where the disk is full, nothing."""
+        whole, left = self._file.tell(), memoryview(parts)
         try:
             while left:
                 left = left[self._file.write(left) :]
@@ -180,12 +183,14 @@ class JournalFile:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.damaged = self.rows = 0
-        """Of what was read last: bytes that told nothing though more came after them, and samples."""
+        """Of what was read last: bytes that told nothing, and samples."""
         with open(path, "rb") as file:
             try:
                 copy = head_in(file)
+                self.checked = any(map(checksum.has_any, ends_of(file)))
+                """Whether its batches have checksums: those of an older exoid have none, and are believed."""
                 # The copy has a checksum, the head itself none: where they differ, that one is right.
-                self._head = copy or _first_part(file)
+                self._head = copy or _part_at(file, 0)
                 self._lost = 0 if self._head == _between(file, 0, len(self._head)) else len(self._head)
                 self.schema = pa.ipc.open_stream(self._head).schema
                 metadata = json.loads(self.schema.metadata[KEY])
@@ -214,7 +219,6 @@ class JournalFile:
             unread_from = len(self._head)
             place: int | None = unread_from
             while place is not None:
-                file.seek(place)
                 if batch := self._batch_at(file, place):
                     self.damaged += place - unread_from
                     self.rows += batch.rows.num_rows
@@ -222,14 +226,17 @@ class JournalFile:
                     yield batch
                 else:
                     place = _next_mark(file, place + 1)
+            rest = file.seek(0, os.SEEK_END) - unread_from
+            if rest > 0 and _between(file, unread_from, unread_from + rest) != END:
+                self.damaged += rest
 
     def _batch_at(self, file: BinaryIO, place: int) -> Batch | None:
         """Return the batch that begins at a place of the file, and leave the file at its end; None where none does."""
         try:
-            pa.ipc.read_message(pa.PythonFile(file, mode="r"))
-            end = file.tell()
-            stream = pa.ipc.open_stream(self._head + _between(file, place, end))
-            rows, words = stream.read_next_batch_with_custom_metadata()
+            part = _part_at(file, place)
+            if self.checked and not checksum.fits(part, self._head):
+                return None
+            rows, words = pa.ipc.open_stream(self._head + part).read_next_batch_with_custom_metadata()
             rows.validate()
         except OSError as error:
             _raise_if_the_disk_s(self.path, error)
@@ -269,11 +276,24 @@ def _short(value: object) -> str:
     return told if len(told) <= 40 else f"{told[:37]}..."
 
 
-def _first_part(file: BinaryIO) -> bytes:
-    """Return the part that a stream begins with."""
-    file.seek(0)
-    pa.ipc.read_message(pa.PythonFile(file, mode="r"))
-    return _between(file, 0, file.tell())
+class _Within:
+    """A file of which no more is read than there is: Arrow asks for as many bytes as damaged bytes tell."""
+
+    closed = False
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file, self._end = file, os.fstat(file.fileno()).st_size
+
+    def read(self, count: int) -> bytes:
+        """Return so many bytes, or as many as are left."""
+        return self._file.read(max(0, min(count, self._end - self._file.tell())))
+
+
+def _part_at(file: BinaryIO, place: int) -> bytes:
+    """Return the part of a stream that begins at a place of the file, and leave the file at its end."""
+    file.seek(place)
+    pa.ipc.read_message(pa.PythonFile(_Within(file), mode="r"))
+    return _between(file, place, file.tell())
 
 
 def _between(file: BinaryIO, begin: int, end: int) -> bytes:
@@ -283,13 +303,10 @@ def _between(file: BinaryIO, begin: int, end: int) -> bytes:
 
 def _next_mark(file: BinaryIO, begin: int) -> int | None:
     """Return where the next part of a stream may begin, from a place on; None where none does."""
-    file.seek(begin - begin % -8)
-    place = file.tell()
-    while chunk := file.read(SCANNED):
-        for k in range(0, len(chunk) - 7, 8):
-            if chunk[k : k + 4] == MARK:
-                return place + k
-        place += len(chunk)
+    while len(chunk := _between(file, begin, begin + SCANNED)) >= 4:
+        if found := MARK.search(chunk):
+            return begin + found.start()
+        begin += len(chunk) - 3  # a mark may begin in the last three
     return None
 
 
@@ -317,5 +334,5 @@ def refuse_leftover(path: Path) -> None:
     rows = sum(batch.rows.num_rows for batch in journal.batches())
     raise InputError(
         f"{path}: holds {rows} samples of a run {journal.metadata.get('run')} that was killed; `exoid recover {path}` "
-        "makes a recording of them; or delete it"
+        f"makes a recording of them; or {'move it away, it is damaged' if journal.damaged else 'delete it'}"
     )

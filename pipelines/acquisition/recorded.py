@@ -35,7 +35,9 @@ class Account:
     found: dict[str, Any] = field(default_factory=dict)
     """What else the run found out for its metadata."""
     damaged: bool = False
-    """Whether the journal holds less than was written into it, and not only because it was cut off."""
+    """Whether the journal holds less than was written into it, or bytes that tell nothing."""
+    checked: bool = True
+    """Whether each sample was held against a checksum."""
 
     @property
     def missed(self) -> int:
@@ -70,11 +72,13 @@ def account_of(journal: JournalFile) -> Account:
         # A full disk takes the last words with it: nobody can tell the two apart.
         why = f"ended {reached / rate_hz:.3f} s into {seconds:g} s without a word: killed, or its disk was full"
         damaged = journal.damaged > 0 or last_words is not None
-        return Account(samples, planned, rate_hz, gaps, why, damaged=damaged)
+        why += ", or its last words are damaged" if damaged else ""
+        return Account(samples, planned, rate_hz, gaps, why, damaged=damaged, checked=journal.checked)
     abort, found_out, rows = said
     if not abort:
         gaps = gaps + _gaps(np.array([reached - 1, planned]), rate_hz)
-    return Account(samples, planned, rate_hz, gaps, abort, found_out, journal.damaged > 0 or rows != journal.rows)
+    damaged = journal.damaged > 0 or rows != journal.rows
+    return Account(samples, planned, rate_hz, gaps, abort, found_out, damaged, journal.checked)
 
 
 def _said(last_words: dict[bytes, bytes]) -> tuple[str | None, dict[str, Any], int] | None:
@@ -123,7 +127,8 @@ def _gaps(index: np.ndarray, rate_hz: float) -> list[tuple[float, int]]:
 def write_recording(journal: JournalFile, path: Path, account: Account, **more: Any) -> None:
     """Write what a journal holds as ``recording/1``; ``more`` goes into its metadata."""
     abort = {"abort": account.abort} if account.abort else {}
-    metadata = journal.metadata | account.found | {"gaps": account.gaps} | abort | more
+    unchecked = {} if account.checked else {"unchecked": True}
+    metadata = journal.metadata | account.found | {"gaps": account.gaps} | abort | unchecked | more
     rows = (batch.rows for batch in sound_batches(journal))
     RECORDING.write_pieces(path, in_pieces(rows, PIECE_ROWS), metadata)
 

@@ -26,7 +26,7 @@ def journals_in(place: Path) -> list[Path]:
 
 
 def recover(path: Path, output: Path | None = None) -> Recovered:
-    """Make a recording of a journal that was cut off anywhere, and remove the journal; one that is damaged is kept.
+    """Make a recording of a journal, and remove the journal where every byte of it told something.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def recover(path: Path, output: Path | None = None) -> Recovered:
         journal = JournalFile(path)
         account = account_of(journal)
         if not account.samples:
-            raise InputError(f"{path}: holds no sample, the run ended before its recording began; delete it")
+            raise InputError(f"{path}: {_why_no_sample(account)}")
         output = output or place_for(path.with_name(path.name.removesuffix(JOURNAL)), account.abort)
         if output.exists():
             raise InputError(f"{output}: is there already and is not overwritten; name another file with -o")
@@ -62,3 +62,9 @@ def recover(path: Path, output: Path | None = None) -> Recovered:
         if not account.damaged:
             lock.remove()
     return Recovered(output, account)
+
+
+def _why_no_sample(account: Account) -> str:
+    if account.damaged:
+        return "no sample in it can be read, it is damaged; nothing was changed; keep it, and check the disk"
+    return "holds no sample, the run ended before its recording began; delete it"

@@ -211,7 +211,7 @@ def test_a_damaged_copy_of_the_head_is_not_believed(three_batches):
 def test_a_run_that_is_killed_before_its_first_sample_has_said_no_last_word(tmp_path):
     path = tmp_path / "run.journal"
     journal = fill(path, 0)
-    assert [batch.last_words for batch in JournalFile(path).batches()] == [None]
+    assert [batch.last_words for batch in JournalFile(path).batches()] == [None, None]
     journal.close()
 
 
