@@ -34,6 +34,7 @@ from exoid_cli.heeding import Command, JsonOption, QuietOption, heeding
 from exoid_cli.identify import identify
 from exoid_cli.import_ import import_
 from exoid_cli.init import init
+from exoid_cli.lasting import outlast_terminals
 from exoid_cli.recover import recover
 from exoid_cli.report import report
 from exoid_cli.rig_group import rig
@@ -112,6 +113,7 @@ def main() -> NoReturn:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(encoding="utf-8")  # Windows' pipes have one that knows no N·m
+    outlast_terminals()
     arguments = sys.argv[1:]
     sys.exit(run(matching_files(arguments) if os.name == "nt" else arguments))
 

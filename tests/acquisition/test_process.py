@@ -1,11 +1,13 @@
 """``exoid acquire`` as a process of its own: with its embedded rig, under signals, and killed."""
 
+import fcntl
 import os
 import re
 import signal
 import socket
 import subprocess
 import sys
+import termios
 import time
 
 import numpy as np
@@ -130,6 +132,42 @@ def test_a_signal_stops_the_leg_keeps_the_record_and_says_so_in_one_line(start, 
     )
     assert table.metadata["abort"] == f"stopped by {name}"
     assert len(table.frame) >= 100
+    assert ended(tmp_path)
+
+
+@pytest.fixture
+def start_on_a_terminal():
+    """Start exoid on a terminal of its own; returns the process and the end that closes the terminal."""
+    started = []
+
+    def run(arguments):
+        here, there = os.openpty()
+        command = [sys.executable, "-m", "exoid_cli.app", *map(str, arguments)]
+        process = subprocess.Popen(
+            command, stdin=there, stdout=there, stderr=there, env=os.environ | {"TERM": "xterm"},
+            start_new_session=True, preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+        )  # fmt: skip
+        os.close(there)
+        started.append(process)
+        return process, here
+
+    yield run
+    for process in started:
+        process.kill()
+        process.wait()
+
+
+def test_a_terminal_that_is_closed_stops_the_leg_and_its_silence_is_no_fault_of_exoids(
+    start_on_a_terminal, experiment, tmp_path
+):
+    arguments, output = experiment("plain", 4000.0)
+    process, terminal = start_on_a_terminal(arguments)
+    wait_for_rows(process, output, 100)
+    os.close(terminal)
+    assert process.wait(timeout=60) == 3
+    table = RECORDING.read(output.with_name("one.aborted.parquet"))
+    assert table.metadata["abort"] == "stopped by SIGHUP"
+    assert os.listdir(output.parent) == ["one.aborted.parquet"]
     assert ended(tmp_path)
 
 
