@@ -126,10 +126,12 @@ def _twice(path: Path, first: Path, second: Path) -> str:
 
 def _say_what_follows(output: Path, made: list[str], map_: Path) -> None:
     from pipelines.importing.aftermath import lacks, no_longer_made
+    from pipelines.workflow.imported import imported_in
 
-    for name in no_longer_made(output, made):
+    found = imported_in(output)
+    for name in no_longer_made(found, made):
         console.warn(f"{output / name}: of these logs too, by an earlier map; this one makes it no more, remove it")
-    lacking = list(lacks(output, made, map_))
+    lacking = list(lacks(found, made, map_))
     for one in lacking:
         console.say(one)
     settings_file = output.parent / NAME

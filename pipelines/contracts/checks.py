@@ -117,24 +117,22 @@ def refuse_unknown_values(column: pa.ChunkedArray, choices: Sequence[str], where
 
 def refuse_absurd(column: pa.ChunkedArray, where: Place) -> None:
     """Refuse numbers that no machine's quantity reaches."""
-    size = np.nan_to_num(np.abs(column.to_numpy()))
-    row = int(np.argmax(size > LARGEST))
-    if size[row] > LARGEST:
-        raise ContractError(
-            f"{where.row(row)}: found {column[row].as_py():.6g}, expected at most {LARGEST:g}; "
-            "correct the unit or scale of the column, or drop the row"
-        )
+    said = f", expected at most {LARGEST:g}; correct the unit or scale of the column, or drop the row"
+    _refuse_beyond(LARGEST, column, where, said)
 
 
 def refuse_degrees(column: pa.ChunkedArray, where: Place) -> None:
     """Refuse angles that no leg reaches in radians."""
+    said = ", which looks like degrees; expected radians, multiply by pi/180"
+    _refuse_beyond(LARGEST_ANGLE_RAD, column, where, said)
+
+
+def _refuse_beyond(most: float, column: pa.ChunkedArray, where: Place, said: str) -> None:
+    """Refuse the first number whose size is more than ``most``; ``said`` comes after what was found."""
     size = np.nan_to_num(np.abs(column.to_numpy()))
-    row = int(np.argmax(size > LARGEST_ANGLE_RAD))
-    if size[row] > LARGEST_ANGLE_RAD:
-        raise ContractError(
-            f"{where.row(row)}: found {column[row].as_py():.6g}, which looks like degrees; "
-            "expected radians, multiply by pi/180"
-        )
+    row = int(np.argmax(size > most))
+    if size[row] > most:
+        raise ContractError(f"{where.row(row)}: found {column[row].as_py():.6g}{said}")
 
 
 def refuse_time_that_does_not_increase(frame: pd.DataFrame, time: str, within: Sequence[str], where: Place) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,7 @@ from pipelines.diagnosis.faults import Fault, excluding, find_faults
 from pipelines.diagnosis.fit import Fit, fit, residuals_on
 from pipelines.diagnosis.fitted_model import model_of_run
 from pipelines.diagnosis.floor import Floor, noise_floor
-from pipelines.diagnosis.gain import errors_of
+from pipelines.diagnosis.gain import Gain, errors_of, gain
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, like_trained, observe, with_load
 from pipelines.diagnosis.search import imperfection
 from pipelines.diagnosis.second_look import slower
@@ -110,7 +110,12 @@ class Diagnosis:
 
         return tuple(sorted(self.likely, key=order))
 
-    @property
+    @cached_property
+    def gains(self) -> dict[str, Gain]:
+        """What each named cause gains on the validation runs beside the others, by its label."""
+        return {label: gain(without.errors, self.after.errors) for label, without in self.without.items()}
+
+    @cached_property
     def torque_rms(self) -> NDArray:
         """(J,) N·m that was measured, on the samples that the errors are of."""
         return errors_of(self.validate, [run.measured for run in self.validate]).rms

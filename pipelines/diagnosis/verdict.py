@@ -12,7 +12,6 @@ from pipelines.diagnosis.diagnose import Diagnosis, summary_numbers
 from pipelines.diagnosis.error_budget import error_budget
 from pipelines.diagnosis.examined import PERCEIVED
 from pipelines.diagnosis.faults import Fault
-from pipelines.diagnosis.gain import gain
 from pipelines.diagnosis.status import AT_FLOOR, EXPLAINED
 from pipelines.diagnosis.ties import tie_between
 from pipelines.diagnosis.unknown import Unknown, unknown
@@ -88,7 +87,7 @@ def _depends_on(before: Sequence[Dependence], after: Sequence[Dependence]) -> di
 def _cause(d: Diagnosis, label: str) -> dict[str, Any]:
     effect = effect_labelled(label)
     alike = d.alike(label)
-    worth = gain(d.without[label].errors, d.after.errors)
+    worth = d.gains[label]
     named_joint = d.baseline.joints[worth.joint]
     floor = d.standing.floor[worth.joint]
     power = d.without[label].errors.rms[worth.joint] ** 2 - floor**2
@@ -181,9 +180,7 @@ def _evidence(d: Diagnosis, label: str, effect: Effect, worth: float, joint: str
 
 def _may_be_chance(d: Diagnosis, label: str) -> bool:
     """Tell whether what a cause gains on the validation runs cannot be told from nought, nor was it heard or felt."""
-    if label in d.perceived or label not in d.without:
-        return False
-    return gain(d.without[label].errors, d.after.errors).low <= 0.0
+    return label not in d.perceived and label in d.gains and d.gains[label].low <= 0.0
 
 
 def _times(likely: float, other: float) -> str:

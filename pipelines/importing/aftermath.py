@@ -7,14 +7,16 @@ from typing import Any
 from pipelines.contracts.joints import joints_of
 from pipelines.mechanics.machine import MECHANISMS
 from pipelines.settings.import_map import ImportMap
-from pipelines.workflow.imported import imported_in
 
 NEEDED = {"train": "to fit to", "validate": "to judge on"}
 
 
-def no_longer_made(folder: Path, made: Collection[str]) -> list[str]:
-    """Return the files in a folder that were made of the same logs as ``made`` were, by a map that named them so."""
-    found = imported_in(folder)
+Metadata = Mapping[str, Mapping[str, Any]]
+"""That of the imported recordings in a folder, by their names (``imported_in``)."""
+
+
+def no_longer_made(found: Metadata, made: Collection[str]) -> list[str]:
+    """Return the files found that were made of the same logs as ``made`` were, by a map that named them so."""
     logs = {sha for name in made for sha in found[name]["imported"]["sha256"]}
     return [
         f"{name}.parquet"
@@ -30,9 +32,8 @@ def unused(settings: ImportMap, files: Collection[Path]) -> Iterator[str]:
             yield f'recording[{number}] ({recording.purpose}) is of "{recording.files}", and no file given is; left out'
 
 
-def lacks(folder: Path, made: Collection[str], map_path: Path) -> Iterator[str]:
+def lacks(found: Metadata, made: Collection[str], map_path: Path) -> Iterator[str]:
     """Yield what keeps the recordings in a folder from a verdict."""
-    found = imported_in(folder)
     purposes = {told["purpose"] for told in found.values()}
     for purpose, what in NEEDED.items():
         if purpose not in purposes:
@@ -40,7 +41,7 @@ def lacks(folder: Path, made: Collection[str], map_path: Path) -> Iterator[str]:
                 f"`exoid run` lacks a recording {what}: add a [[recording]] to {map_path} with "
                 f'purpose = "{purpose}", and a span of its own or the files that it is of'
             )
-    yield from dict.fromkeys(_unknown_mechanism(found[name]) for name in made if _unknown_mechanism(found[name]))
+    yield from dict.fromkeys(filter(None, (_unknown_mechanism(found[name]) for name in made)))
 
 
 def _unknown_mechanism(told: Mapping[str, Any]) -> str:

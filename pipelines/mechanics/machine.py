@@ -49,7 +49,7 @@ class Machine:
     def told(self, geometry: Geometry) -> dict[str, float]:
         """Return what a file says of the machine's geometry: one joint is at no distance from a second."""
         said = geometry.metadata()
-        return said if len(self.joints) > 1 else {key: value for key, value in said.items() if key == "gravity_m_s2"}
+        return said if len(self.joints) > 1 else {"gravity_m_s2": said["gravity_m_s2"]}
 
     def place(self, name: str) -> str:
         """Return what effects call the joint of a name: ``hip`` for a leg's first, whatever it is called."""

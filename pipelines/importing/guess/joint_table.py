@@ -242,12 +242,11 @@ def _unit_of_current(whole: bool) -> tuple[str, str, bool]:
 
 def _unit_of_torque(named: str | None, kind: Kind, values: NDArray) -> tuple[str, str, bool]:
     """Return the unit of a torque or force, why, and whether it is sure; doubt one in which no drive is so strong."""
-    quantity, unit = ("torque", "N·m") if kind == "revolute" else ("force", "N")
-    unit, why = (named, "its name says so") if named else (unit, "no name says its unit; SI assumed")
+    quantity, si = ("torque", "N·m") if kind == "revolute" else ("force", "N")
+    unit, why = (named, "its name says so") if named else (si, "no name says its unit; SI assumed")
     reach = float(np.nanquantile(np.abs(values), 0.99)) * UNITS[unit].factor
     if reach <= STRONGEST[quantity]:
         return unit, why, named is not None
-    si = "N·m" if quantity == "torque" else "N"
     return unit, f"{why}, but no joint's drive delivers {reach:.4g} {si}: is it m{si}?", False
 
 
