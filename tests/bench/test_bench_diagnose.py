@@ -6,7 +6,9 @@ from tests.bench.bench_diagnose import catalogue_rows, length_rows, recorded, se
 def test_the_search_outruns_a_refit_of_every_combination():
     searched, every, same, each = search_rows(recorded(20.0), sample=3)
     assert "3 causes" in searched.name
-    assert every.ratio > same.ratio > 1.0
+    # Of 20 s; which of the two naive searches takes longer is not held to anything, scaled up from 3 sets as they are.
+    assert every.ratio > 5.0
+    assert same.ratio > 1.0
     assert "scaled up from 3 sets" in each.name
 
 
