@@ -243,7 +243,7 @@ def _recorded(output: Path, lock: Lock, kind: type[ExoidError], told: str, fault
         journal = JournalFile(path)
         account = account_of(journal)
         place, samples = place_for(output, account.abort), account.samples
-        if samples or not account.abort:
+        if samples or not (account.abort or account.damaged):
             write_recording(journal, place, account)
     except (ExoidError, OSError) as error:
         raise kind(
@@ -251,9 +251,9 @@ def _recorded(output: Path, lock: Lock, kind: type[ExoidError], told: str, fault
             f"mended, `exoid recover {path}` makes one"
         ) from error
     if account.damaged:
+        left = f"{samples} samples are in {place}, but" if samples else "no sample of it can be read, since"
         raise kind(
-            f"{told}; {samples} samples are in {place}, but the disk did not give back all that was written; check the "
-            f"disk, {path} is kept"
+            f"{told}; {left} the disk did not give back all that was written; check the disk, {path} is kept"
         ) from fault
     lock.remove()
     if account.abort:

@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 
+from pipelines.acquisition.acquire import _recorded
 from pipelines.acquisition.journal import Journal, JournalFile, refuse_leftover
+from pipelines.acquisition.lock import locked
+from pipelines.acquisition.recorded import place_for
 from pipelines.acquisition.recover import recover
 from pipelines.contracts import RECORDING
 from pipelines.contracts.beside import journal_of
-from pipelines.errors import InputError
+from pipelines.errors import DeviceError, InputError
 from tests.acquisition.test_recover import COLUMNS, METADATA
 
 SAMPLES, BATCH = 160, 20
@@ -23,7 +26,7 @@ def row(index):
 class Written:
     """A journal's bytes, and where each of its batches of samples begins and ends."""
 
-    def __init__(self, folder, *, ended, run="exo_alone"):
+    def __init__(self, folder, *, ended, run="exo_alone", why=None):
         self.path = journal_of(folder / "one.parquet")
         self.places = []
         journal = Journal(self.path, COLUMNS, METADATA | {"run": run, "subject": "x" * 2000})
@@ -34,7 +37,7 @@ class Written:
                 journal.flush()
                 self.places.append((begin, journal._file.tell()))
         if ended:
-            journal.end(None)
+            journal.end(why)
             journal.close()
         else:
             journal._file.close()  # as the system does for a process that is no more
@@ -143,6 +146,25 @@ def test_where_nothing_can_be_read_any_more_the_journal_is_not_said_to_be_of_no_
     )
     with pytest.raises(InputError, match=r"holds 0 samples .* or move it away, it is damaged"):
         refuse_leftover(written.path)
+
+
+@pytest.mark.parametrize("why", ["stopped by Ctrl-C; the leg was stopped", None])
+@pytest.mark.parametrize("lost", [3, 8])
+def test_a_run_whose_journal_the_disk_damaged_tells_how_many_samples_are_left_and_where(tmp_path, why, lost):
+    """Eight batches are all that it had: then there is no recording, and none is named."""
+    written, output = Written(tmp_path, ended=True, why=why), tmp_path / "one.parquet"
+    begin, end = written.places[0][0], written.places[lost - 1][1]
+    written.path.write_bytes(written.bytes[:begin] + bytes(end - begin) + written.bytes[end:])
+    told = why or "the run is complete"
+    with locked(written.path) as lock, pytest.raises(DeviceError) as raised:
+        _recorded(output, lock, DeviceError, told, None)
+    place = place_for(output, why) if lost == 8 else next(tmp_path.glob("*.parquet"))
+    left = "no sample of it can be read, since" if lost == 8 else f"100 samples are in {place}, but"
+    assert str(raised.value) == (
+        f"{told}; {left} the disk did not give back all that was written; check the disk, {written.path} is kept"
+    )
+    assert place.exists() == (lost < 8)
+    assert written.path.exists()
 
 
 @pytest.fixture
