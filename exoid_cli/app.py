@@ -35,6 +35,7 @@ from exoid_cli.identify import identify
 from exoid_cli.import_ import import_
 from exoid_cli.init import init
 from exoid_cli.lasting import outlast_terminals
+from exoid_cli.lost_interrupts import interrupts_told
 from exoid_cli.recover import recover
 from exoid_cli.report import report
 from exoid_cli.rig_group import rig
@@ -166,7 +167,8 @@ def _unheard() -> int:
 def _command_line(arguments: Sequence[str]) -> int:
     command = typer.main.get_command(app)
     # Not standalone: typer would print a box of several lines for a mistyped option.
-    code = command.main(args=list(arguments) or ["--help"], prog_name="exoid", standalone_mode=False)
+    with interrupts_told():
+        code = command.main(args=list(arguments) or ["--help"], prog_name="exoid", standalone_mode=False)
     if code == INTERRUPTED:
         raise KeyboardInterrupt  # of which typer makes an exit code, and says nothing
     return code or 0
