@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pipelines.acquisition.alone import alone
 from pipelines.acquisition.columns import columns_of
 from pipelines.acquisition.embedded import embedded
+from pipelines.acquisition.heartbeat import refuse_short_heartbeat
 from pipelines.acquisition.journal import Journal, JournalFile, refuse_leftover
 from pipelines.acquisition.line_rate import refuse_slow_lines
 from pipelines.acquisition.lock import Lock, locked
@@ -101,6 +102,7 @@ def acquire(
     if rig.clock == "real_time":
         with about(rig_path):
             refuse_slow_lines(rig, sample_rate_hz, with_sensors=run.run == "with_human")
+            refuse_short_heartbeat(rig, sample_rate_hz, with_sensors=run.run == "with_human")
     RECORDING.refuse_place(output)
     journal = journal_of(output)
     refuse_leftover(journal)

@@ -71,8 +71,8 @@ class Line:
 
     @property
     def tells_replies_apart(self) -> bool:
-        """Whether a reply names the request that it answers; on a serial line none does."""
-        return not isinstance(self._settings, RtuLine | RtuOverTcpLine)
+        """Whether a reply names the request that it answers."""
+        return self._settings.tells_replies_apart
 
     def join(self, name: str, unit: int) -> str:
         """Add a device; return what errors call it."""

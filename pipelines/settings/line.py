@@ -1,7 +1,7 @@
 """A line: the connection that one device or several share, by TCP, RTU on a serial port, RTU over TCP or TLS."""
 
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -14,6 +14,9 @@ line specification and implementation guide" V1.02, 2.5.1.1)."""
 
 class Line(Settings):
     """What lines of every kind have."""
+
+    tells_replies_apart: ClassVar[bool] = True
+    """Whether a reply names the request that it answers; among RTU frames none does."""
 
     @property
     def files(self) -> dict[str, Path]:
@@ -61,6 +64,7 @@ class TcpLine(NetworkLine):
 class RtuOverTcpLine(NetworkLine):
     """RTU frames through a TCP connection, as a serial device server passes them on."""
 
+    tells_replies_apart = False
     transport: Literal["rtu_over_tcp"]
 
 
@@ -92,6 +96,7 @@ class TlsLine(NetworkLine):
 class RtuLine(Line):
     """Modbus RTU on a serial port."""
 
+    tells_replies_apart = False
     transport: Literal["rtu"]
     serial_port: str = Field(min_length=1, description="Path of the port, best one below /dev/serial/by-id.")
     baud_rate: int = Field(19200, ge=300, description="Bits a second.")

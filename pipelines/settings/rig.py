@@ -469,6 +469,9 @@ class SafetySettings(Settings):
     reply_s: float | None = Field(
         None, gt=0.0, description="Longest wait for one reply in motion, then it is a gap; else 0.3 of watchdog_s."
     )
+    heartbeat_s: float | None = Field(
+        None, gt=0.0, description="Time-out of the drives' own watchdogs, as it is set in them; else it is not known."
+    )
     connect_s: float = Field(5.0, gt=0.0, description="Longest wait, before anything moves, for a line or a reply.")
     control_s: float = Field(1.0, gt=0.0, description="Longest a drive may take to do what a control word tells it.")
     deceleration_rad_s2: float = Field(8.0, gt=0.0, description="How a stop slows the set-points down.")
@@ -682,6 +685,13 @@ class RigSettings(Settings):
         """Return what is known of the drives' loops, by joint; a virtual rig's are its plant's unless the file says."""
         plant = self.plant.controllers() if self.plant else {}
         return plant | {joint: loop.model_dump(exclude_none=True) for joint, loop in self.controller.items()}
+
+    @property
+    def known_heartbeat_s(self) -> tuple[str, float | None]:
+        """The key that tells how long the drives' own watchdogs wait, and what it tells, s; None where nobody does."""
+        if self.safety.heartbeat_s is None and self.plant:
+            return "plant.heartbeat_s", self.plant.heartbeat_s
+        return "safety.heartbeat_s", self.safety.heartbeat_s
 
     def public(self) -> dict:
         """Return what recordings may tell of the rig: everything but the plant, which later stages are to find."""

@@ -206,7 +206,9 @@ def test_a_signal_while_a_silent_device_is_waited_for_before_anything_moves_ends
 
 
 def test_a_killed_run_loses_no_more_than_half_a_second(start, experiment, tmp_path):
-    arguments, output = experiment("real_time", 60.0, torque_nm=1000.0, speed_rad_s=50.0, watchdog_s=2.0)
+    arguments, output = experiment(
+        "real_time", 60.0, torque_nm=1000.0, speed_rad_s=50.0, watchdog_s=2.0, heartbeat_s=1.0
+    )
     process = start(arguments)
     wait_for_rows(process, output, 1)
     began = time.monotonic()

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+from collections.abc import Iterator
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Literal
@@ -12,6 +13,8 @@ from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.guided import guided, refuse_far_from_zero
 from pipelines.acquisition.check.look import RigReport, look, probes_of
 from pipelines.acquisition.embedded import embedded
+from pipelines.acquisition.heartbeat import refuse_short_heartbeat
+from pipelines.acquisition.line_rate import refuse_slow_lines
 from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.pace import urgent
 from pipelines.errors import DeviceError, InputError, SettingsError
@@ -83,6 +86,17 @@ def refuse_to_move_somebody(*, by_hand: bool, move: bool) -> None:
             )
 
 
+def unfit(rig: RigSettings, rate_hz: float | None) -> Iterator[Finding]:
+    """Yield why no run would begin with this rig file at a rate, whatever its devices answer."""
+    if rate_hz is None or rig.clock == "lockstep":
+        return
+    for refuse in (refuse_slow_lines, refuse_short_heartbeat):
+        try:
+            refuse(rig, rate_hz, with_sensors=True)
+        except SettingsError as error:
+            yield Finding("rig", str(error))
+
+
 def _counted(report: RigReport) -> float:
     """Return the rate at which the first drive was found to sample."""
     clock = report.devices[0].clock
@@ -97,6 +111,7 @@ async def _check(
     machine = Machine(rig, with_sensors=True)
     try:
         report = await look(machine, rate_hz, alone=alone)
+        report.findings += unfit(rig, rate_hz)
         if operator and all(device.latency for device in report.devices):
             report.by_hand = True
             try:

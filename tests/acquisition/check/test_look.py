@@ -57,6 +57,13 @@ def test_a_record_that_is_not_as_the_file_says_is_found(checked, was, believed, 
     assert "map.drive.servo.ring" in told(report)
 
 
+def test_a_rig_file_with_which_no_run_would_begin_is_found(checked):
+    assert "rig: plant.heartbeat_s: found 0.5, expected more than 3.05 s: for so long one lost reply" in told(
+        checked("real_time")
+    )
+    assert "heartbeat_s" not in told(checked("real_time", watchdog_s=1.0))
+
+
 def test_nothing_is_written_to_a_real_rig(checked):
     functions = set()
 
