@@ -40,6 +40,9 @@ class Stream:
         self._told = told
         self._held = {name: Held() for name in CHANGING}
         self._gone = 0.0
+        self._settle_s = rig.safety.settle_s
+        self._found_again: int | None = None
+        """The sample that came after the last one that was missed."""
         self._first: Reading | None = None
         self._last: Reading | None = None
         self._newest_at_first: int | None = None
@@ -101,6 +104,8 @@ class Stream:
             self.begin(found, now)
         elif found.sequence == before.sequence:
             return False
+        if found.sequence - before.sequence > self._cycle:
+            self._found_again = found.sequence
         why = (
             self._clock(before, found)
             or sample_violation(self._drive, before, found, self._rate)
@@ -159,16 +164,29 @@ class Stream:
         if not abs(speed) <= limit:
             return (
                 f"{self._label}: its angle leapt from {before.angle:.4f} to {found.angle:.4f} rad within "
-                f"{seconds:.4f} s, faster than its limit of {limit:g} rad/s; check the encoder, or the word order in "
-                "the rig file"
+                f"{seconds:.4f} s, faster than its limit of {limit:g} rad/s; {self._jerked(found)}check the encoder, "
+                "or the word order in the rig file"
             )
         told = 0.5 * (before.velocity + found.velocity)
         if samples == 1 and abs(speed - told) > SPEED_SHARE * limit:
             return (
                 f"{self._label}: its angle went on at {speed:.3f} rad/s while it told a speed of {told:.3f} rad/s; "
-                "check the encoder, or the registers of angle and velocity in the rig file"
+                f"{self._jerked(found)}check the encoder, or the registers of angle and velocity in the rig file"
             )
         return None
+
+    def _jerked(self, found: Reading) -> str:
+        """Return in words that the leg may have jerked, where its drive was told nothing shortly before; or nothing."""
+        if self._found_again is None:
+            return ""
+        seconds = (found.sequence - self._found_again) / self._rate
+        if seconds > self._settle_s:
+            return ""
+        when = f"{seconds:.3f} s before it" if seconds else "before it"
+        return (
+            f"samples were missed {when}, which may jerk a leg: see why answers are lost or late, or make the motion "
+            "slower; else "
+        )
 
     def _echo(self, before: Reading, found: Reading) -> str | None:
         """Hold the set-point that is in force against the one that was sent."""

@@ -71,6 +71,32 @@ def test_one_damaged_sample_ends_the_run_before_it_is_kept(hip, damage, words):
         take(hip, replace(moved(BEGINS + 400), **damage))
 
 
+REGISTERS = "check the encoder, or the "
+
+
+@pytest.mark.parametrize(
+    ("after", "when", "damage"),
+    [(0, "before it", {"angle": 0.9}), (35, "0.035 s before it", {"angle": 0.7}),
+     (35, "0.035 s before it", {"velocity": -2.0})],
+)  # fmt: skip
+def test_after_missed_samples_a_jerk_of_the_leg_is_named_before_the_registers(hip, after, when, damage):
+    swing(hip, BEGINS + 400)
+    again = BEGINS + 420
+    take(hip, *(moved(number) for number in range(again, again + after)))
+    with pytest.raises(DeviceError) as raised:
+        take(hip, replace(moved(again + after), **damage))
+    told = f"rad/s; samples were missed {when}, which may jerk a leg: see why answers are lost or late, or make the "
+    assert f"{told}motion slower; else {REGISTERS}" in str(raised.value)
+
+
+def test_samples_that_were_missed_long_before_are_no_reason(hip):
+    swing(hip, BEGINS + 100)
+    take(hip, *(moved(number) for number in range(BEGINS + 200, BEGINS + 1300)))
+    with pytest.raises(DeviceError) as raised:
+        take(hip, replace(moved(BEGINS + 1300), angle=0.7))
+    assert f"rad/s; {REGISTERS}" in str(raised.value)
+
+
 @pytest.mark.parametrize("name", ["angle", "velocity", "current"])
 def test_a_register_of_a_record_that_stands_still_while_the_joint_is_told_to_move_is_frozen(hip, name):
     # Slower than a quarter of the limit, or angle and speed would contradict each other before.
