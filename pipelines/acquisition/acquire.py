@@ -152,6 +152,7 @@ async def _record(
         plan = make_plan(rig, trajectory, start, run.duration_s, supervisor.rate)
         supervisor.take(plan, start)
         sampling = sampling_of(machine, supervisor.rate, supervisor.judge_records)
+        await _heeding(machine.empty_records(), stopped_by)
         try:
             with Journal(path, ["time_s", *columns_of(machine)], metadata) as journal:
                 loop = Loop(machine, supervisor, sampling, plan, journal, report, stopped_by)

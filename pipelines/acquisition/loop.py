@@ -203,6 +203,7 @@ class Loop:
             answers = await self._exchange(self.supervisor.rest(time.monotonic()))
             if row := self.supervisor.enabled(answers, time.monotonic() - began):
                 break
+            await self.machine.forget_records()  # else what comes meanwhile would be in the way once the leg moves
             await asyncio.sleep(1.0 / self._rate)
         self._enabled_at = self._reported = time.monotonic()
         self.supervisor.begin(row, self._enabled_at)

@@ -30,6 +30,9 @@ WATCH_PAUSE_S = 0.05
 STATUS_PAUSE_S = 0.002
 """Before a drive is asked again whether it has taken a control word."""
 
+EMPTYING_S = 10.0
+"""How long it may take to let go what has gathered in a drive's queue: thousands of records, a few with each read."""
+
 WATCH_S = 0.5
 """How long a drive is watched that may be enabled before the run: whoever drives it tells it something meanwhile."""
 DRIVEN_RAD = 0.005
@@ -131,6 +134,27 @@ class Drive:
         """Return samples of its ring not returned before, up to the ``newest`` known to be there, oldest first."""
         assert self.ring  # who drains has looked at the rig file
         return [self._of_ring(number, record) for number, record in await self.ring.drain(newest)]
+
+    async def forget_records(self) -> bool:
+        """Let go what its record has kept so far, as far as one drain reaches; tell whether that was all."""
+        return self.ring is None or await self.ring.forget()
+
+    async def empty_record(self) -> None:
+        """Let go all that its record has kept so far, before anything moves.
+
+        Raises
+        ------
+        DeviceError
+            There is no end of it.
+        """
+        until = time.monotonic() + EMPTYING_S
+        while not await self.forget_records():
+            if time.monotonic() > until:
+                raise DeviceError(
+                    f"{self.device.label}: its queue is not empty after {EMPTYING_S:g} s in which it was read without "
+                    "a pause, so it fills faster; raise the speed of its line, give each drive a line of its own, or "
+                    "let it record less often (record_rate_hz)"
+                )
 
     def _newest(self, sequence: float, sent: float | None) -> int:
         """Return the number of the sample that a reply to a request of then tells, which may be its newest."""
@@ -467,6 +491,15 @@ class Machine:
                 f"{' and '.join(found)}: enabled before the run began, by one that was killed perhaps; disabled now; "
                 "see to the leg, and to what else moves it, and start again"
             )
+
+    async def empty_records(self) -> None:
+        """Let go what the drives' own records have kept so far: a queue that nobody read is full of what is past."""
+        await all_answers(drive.empty_record() for drive in self.drives)
+
+    async def forget_records(self) -> None:
+        """Let go what has come to the drives' own records, without a pause for long; what is left waits."""
+        with suppress(Unanswered):
+            await all_answers(drive.forget_records() for drive in self.drives)
 
     def close(self) -> None:
         """Close every line."""

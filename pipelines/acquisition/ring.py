@@ -38,6 +38,11 @@ class Ring:
         self._next: int | None = None
         self._doubted: int | None = None
 
+    async def forget(self) -> bool:
+        """Begin anew with the records that come from now on; tell whether all others are gone."""
+        self._next = self._doubted = None
+        return True
+
     async def drain(self, newest: int) -> list[tuple[int, Record]]:
         """Return records not returned before, each with its sequence number, up to the ``newest`` known to be there.
 
@@ -102,6 +107,14 @@ class Queue:
         self._fetched: list[tuple[int, Record]] = []
         """Records that nobody else has any more, until a drain returns them."""
 
+    async def forget(self) -> bool:
+        """Let go what has gathered in it, as far as one drain reaches; tell whether that was all."""
+        self._began, self._fetched = None, []
+        for _ in range(MOST_READS):
+            if len(await self._read()) < self.block:
+                return True
+        return False
+
     async def drain(self, newest: int) -> list[tuple[int, Record]]:
         """Return records not returned before, each with its sequence number.
 
@@ -110,14 +123,16 @@ class Queue:
         if self._began is None:
             self._began = newest
         for _ in range(MOST_READS):
-            words = await self._device.read_fifo(self._address, self._words)
-            for start in range(0, len(words), self._words):
-                place = start + self._record.address
-                record = self._record.decode(words[place : place + self._record.count])
-                number = int(carried(record["sequence"], newest, self._span))
-                if number > self._began:
-                    self._fetched.append((number, record))
-            if len(words) < self.block * self._words:
+            found = await self._read()
+            numbered = [(int(carried(record["sequence"], newest, self._span)), record) for record in found]
+            self._fetched += [(number, record) for number, record in numbered if number > self._began]
+            if len(found) < self.block:
                 break
         records, self._fetched = self._fetched, []
         return records
+
+    async def _read(self) -> list[Record]:
+        """Return the oldest records, as many as one read brings, which lets them go."""
+        words = await self._device.read_fifo(self._address, self._words)
+        places = range(self._record.address, len(words), self._words)
+        return [self._record.decode(words[place : place + self._record.count]) for place in places]

@@ -1,18 +1,26 @@
 """Recorder mode: the drives sample by themselves, faster than set-points come, and every sample is drained."""
 
+import asyncio
+import time
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipelines.acquisition import sampling
+from pipelines.acquisition import machine, sampling
 from pipelines.acquisition.acquire import acquire
+from pipelines.acquisition.check.look import probes_of
+from pipelines.acquisition.check.rings import check_rings
+from pipelines.acquisition.machine import Machine
 from pipelines.contracts import RECORDING
 from pipelines.errors import DeviceError, SettingsError
 from pipelines.mechanics.trajectory import read_trajectory
-from pipelines.rig.ring import Ring
+from pipelines.rig.ring import QUEUE_RECORDS, Ring
 from pipelines.rig.server import Drive
+from pipelines.rig.servo import Servo
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import load_rig
+from tests.acquisition.conftest import free_port
 
 LOCKSTEP = {'clock = "real_time"': 'clock = "lockstep"'}
 QUEUE = {
@@ -168,6 +176,77 @@ def test_in_real_time_no_sample_is_lost_though_cycles_are(record_in_real_time):
     assert table.metadata["gaps"] == []
     assert np.diff(table.frame["sequence"]).tolist() == [1] * 1999
     assert_allclose(np.diff(table.frame["time_s"]), 1e-3, atol=2e-6)
+
+
+@pytest.fixture
+def with_full_queues(rig_file, serve, excitation, tmp_path):
+    """Serve drives in real time whose queues nobody has read since they were switched on; do something with them."""
+    excitation.write_text(excitation.read_text().replace("6.283185307179586", "1.2566370614359172"))
+    changes = {"watchdog_s": 1.0, "torque_nm": 300.0, "speed_rad_s": 30.0, "rest_rad": "[0.4, -0.6]"}
+
+    def run(do):
+        port = free_port()
+        rig = rig_file("recorder", port, QUEUE, **changes)
+        with serve(rig, port) as served:
+            queues = [drive.ring._queue for drive in served.rig.drives]
+            while any(len(queue) < QUEUE_RECORDS for queue in queues):
+                time.sleep(0.1)
+            return do(rig)
+
+    return run
+
+
+@pytest.fixture
+def recorded_from_queues(with_full_queues, excitation, tmp_path):
+    def run():
+        settings = RunSettings(name="test", run="exo_alone", purpose="train", duration_s=2.0)
+        with_full_queues(lambda rig: acquire(rig, settings, excitation, tmp_path / "test.parquet", 100.0))
+        return RECORDING.read(tmp_path / "test.parquet")
+
+    return run
+
+
+def test_queues_that_are_full_before_the_run_are_emptied_first(recorded_from_queues):
+    table = recorded_from_queues()
+    assert table.metadata["gaps"] == []
+    assert np.diff(table.frame["sequence"]).tolist() == [1] * 1999
+
+
+def test_what_comes_to_a_queue_while_the_drives_take_their_time_to_be_enabled_is_let_go(
+    recorded_from_queues, monkeypatch
+):
+    since, enabled = {}, Servo.enabled.fget
+
+    def slowly(servo):
+        if not enabled(servo):
+            return False
+        return time.monotonic() > since.setdefault(servo, time.monotonic()) + 0.7
+
+    monkeypatch.setattr(Servo, "enabled", property(slowly))
+    assert recorded_from_queues().metadata["gaps"] == []
+    assert since
+
+
+def test_a_check_empties_full_queues_first(with_full_queues):
+    async def checked(path):
+        rig = Machine(load_rig(path), with_sensors=False, samples_per_cycle=10)
+        await rig.connect()
+        try:
+            return await check_rings(rig, probes_of(rig), 100.0)
+        finally:
+            rig.close()
+
+    assert with_full_queues(lambda path: asyncio.run(checked(path))) == []
+
+
+def test_a_queue_that_fills_faster_than_it_is_read_is_refused_before_the_drives_are_enabled(record, monkeypatch):
+    served = []
+    monkeypatch.setattr(machine, "EMPTYING_S", 0.2)
+    monkeypatch.setattr(Ring, "taken", lambda ring: [0] * 30)
+    monkeypatch.setattr(Servo, "hear", lambda servo, reference, control: served.append(control))
+    with pytest.raises(DeviceError, match=r"drive hip .*: its queue is not empty after 0\.2 s .* record less often"):
+        record(shipped="recorder", watchdog_s=20.0, replace=LOCKSTEP | QUEUE)
+    assert set(served) == {0}  # disabled
 
 
 def test_clocks_that_drift_are_found_corrected_and_told(record_in_real_time):

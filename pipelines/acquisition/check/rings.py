@@ -45,6 +45,7 @@ async def _judged(machine: Machine, j: int, drive: Drive, drives: Sequence[Probe
     """Return what is wrong with one drive's record."""
     told, told_by_block, records = Told(), dict[int, Reading](), list[Reading]()
     stream = Stream(machine.rig, j, cycle_hz, told)
+    await drive.empty_record()
     for _ in range(DRAINS):
         await asyncio.gather(*(probe.step() for probe in drives))
         reading = await drive.look()
