@@ -9,6 +9,7 @@ import asyncio
 import gc
 import logging
 import os
+import signal
 import sys
 import threading
 from collections import defaultdict
@@ -26,6 +27,7 @@ from pipelines.errors import SettingsError, about
 from pipelines.mechanics.motion import CUFFS
 from pipelines.registers import Block
 from pipelines.rig.clocks import OwnClock
+from pipelines.rig.ended import ended_by_signals
 from pipelines.rig.listening import listening
 from pipelines.rig.plant import JOINTS, Plant, Samples
 from pipelines.rig.ring import Ring, fifo_request
@@ -380,9 +382,9 @@ def serve_file(
     until_input_ends: bool,
     bind: str = "127.0.0.1",
 ) -> None:
-    """Serve the rig in a file until Ctrl-C or, if asked, until standard input is closed.
+    """Serve the rig in a file until Ctrl-C, another signal or, if asked, until standard input is closed.
 
-    The latter ties the rig to the process that started it: an operating system closes the pipe whatever
+    The last ties the rig to the process that started it: an operating system closes the pipe whatever
     becomes of that process.
     """
     rig = load_rig(path)
@@ -390,7 +392,7 @@ def serve_file(
     build_plant(rig, path, run, seed, sample_rate_hz).run(np.zeros((1, len(JOINTS))), np.zeros(len(JOINTS), bool))
     plant = build_plant(rig, path, run, seed, sample_rate_hz)
 
-    async def until_stopped() -> None:
+    async def until_stopped() -> list[int]:
         until = asyncio.Event()
         if until_input_ends:
             loop = asyncio.get_running_loop()
@@ -400,12 +402,15 @@ def serve_file(
                 loop.call_soon_threadsafe(until.set)
 
             threading.Thread(target=wait, daemon=True).start()
-        await serve(rig, plant, port, announce, until, bind, sample_rate_hz)
+        with ended_by_signals(until) as came:
+            await serve(rig, plant, port, announce, until, bind, sample_rate_hz)
+        return came
 
     if rig.clock == "real_time":
         gc.freeze()  # else looking through all that was imported would cost several samples now and then
         with suppress(PermissionError, AttributeError):  # Linux grants it to privileged users
             os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
-    with suppress(KeyboardInterrupt):
-        asyncio.run(until_stopped())
+    for number in asyncio.run(until_stopped()):
+        if number != signal.SIGINT:  # Ctrl-C is how it is meant to end; who else asked for it is told so
+            signal.raise_signal(number)
