@@ -20,7 +20,7 @@ from serial.tools import list_ports
 
 from pipelines.acquisition.reply import check_replies
 from pipelines.errors import DeviceError, SettingsError
-from pipelines.settings.line import LineSettings, NetworkLine, RtuLine, RtuOverTcpLine, TlsLine
+from pipelines.settings.line import LineSettings, NetworkLine, RtuLine, RtuOverTcpLine, TlsLine, refuse_passphrase
 from pipelines.settings.rig import DeviceSettings, RigSettings
 
 BAD_SETTINGS: tuple[type[Exception], ...] = (ValueError,)
@@ -50,7 +50,9 @@ class Line:
 
     def __init__(self, settings: LineSettings, timeout_s: float, name: str | None = None) -> None:
         self.place = settings.place
-        self.client = _client(settings, timeout_s, self._told)
+        # Once: files are read, and a lost connection is no time for that.
+        self._tls = _tls_context(settings) if isinstance(settings, TlsLine) else None
+        self.client = _client(settings, self._tls, timeout_s, self._told)
         self.client.set_max_no_responses(sys.maxsize)  # the watchdog decides for how long silence is borne
         check_replies(self.client, self._hear)
         self.devices: list[str] = []
@@ -238,9 +240,7 @@ class Line:
             if isinstance(self._settings, RtuLine):
                 serial.Serial(self.place, exclusive=True).close()
             elif isinstance(self._settings, TlsLine):
-                opening = asyncio.open_connection(
-                    self._settings.host, self._settings.port, ssl=_tls_context(self._settings)
-                )
+                opening = asyncio.open_connection(self._settings.host, self._settings.port, ssl=self._tls)
                 _, writer = await asyncio.wait_for(opening, self._timeout_s)
                 writer.close()
         except OSError as error:
@@ -255,7 +255,9 @@ def lines_of(rig: RigSettings) -> Callable[[DeviceSettings], Line]:
     return lambda device: shared[device.line] if device.line is not None else Line(rig.line_of(device), timeout_s)
 
 
-def _client(settings: LineSettings, timeout_s: float, told: Callable[[bool], None]) -> ModbusBaseClient:
+def _client(
+    settings: LineSettings, tls: ssl.SSLContext | None, timeout_s: float, told: Callable[[bool], None]
+) -> ModbusBaseClient:
     """Return the client of a line, not yet connected."""
     # Never a second try: a set-point that comes late is no set-point, and an exchange may move the leg.
     common: Mapping[str, Any] = {"timeout": timeout_s, "retries": 0, "reconnect_delay": 0, "trace_connect": told}
@@ -265,7 +267,8 @@ def _client(settings: LineSettings, timeout_s: float, told: Callable[[bool], Non
             stopbits=settings.stop_bits, **common,
         )  # fmt: skip
     if isinstance(settings, TlsLine):
-        client = AsyncModbusTlsClient(settings.host, port=settings.port, sslctx=_tls_context(settings), **common)
+        assert tls  # such a line has one
+        client = AsyncModbusTlsClient(settings.host, port=settings.port, sslctx=tls, **common)
         # pymodbus takes each record for one whole frame, whatever length the frame tells; records do not promise that.
         client.ctx.framer = FramerSocket(DecodePDU(False))
         return client
@@ -280,11 +283,10 @@ def _tls_context(settings: TlsLine) -> ssl.SSLContext:
         context = ssl.create_default_context(cafile=settings.ca)
         if settings.certificate:
             file = settings.certificate
-            context.load_cert_chain(settings.certificate, settings.key)
+            context.load_cert_chain(settings.certificate, settings.key, refuse_passphrase(settings.key))
     except OSError as error:  # SSLError is one
         raise SettingsError(
-            f"{file}: is no certificate that can be used ({error.strerror or error}); give PEM files, the key without "
-            "a passphrase"
+            f"{file}: is no certificate that can be used ({error.strerror or error}); give PEM files"
         ) from error
     return context
 

@@ -15,7 +15,7 @@ from pymodbus.simulator import SimDevice
 from pipelines.errors import DeviceError, SettingsError
 from pipelines.rig.guard import guarded
 from pipelines.rig.null_modem import null_modem
-from pipelines.settings.line import LineSettings, NetworkLine, RtuLine, RtuOverTcpLine, TlsLine
+from pipelines.settings.line import LineSettings, NetworkLine, RtuLine, RtuOverTcpLine, TlsLine, refuse_passphrase
 
 
 @asynccontextmanager
@@ -124,7 +124,7 @@ def _tls_context(line: TlsLine) -> ssl.SSLContext:
         )
     context, file = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER), line.rig_certificate
     try:
-        context.load_cert_chain(line.rig_certificate, line.rig_key)
+        context.load_cert_chain(line.rig_certificate, line.rig_key, refuse_passphrase(line.rig_key))
         if line.certificate:
             context.verify_mode, file = ssl.CERT_REQUIRED, line.ca or line.certificate
             context.load_verify_locations(file)

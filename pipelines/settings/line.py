@@ -1,10 +1,12 @@
 """A line: the connection that one device or several share, by TCP, RTU on a serial port, RTU over TCP or TLS."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
+from pipelines.errors import SettingsError
 from pipelines.settings.base import Settings
 
 FIXED_SILENCE_BAUD, FIXED_SILENCE_S = 19200, 0.00175
@@ -91,6 +93,18 @@ class TlsLine(NetworkLine):
         """Files that it needs, by key."""
         names = ("ca", "certificate", "key", "rig_certificate", "rig_key")
         return {name: file for name in names if (file := getattr(self, name)) is not None}
+
+
+def refuse_passphrase(key: Path | None) -> Callable[[], str]:
+    """Return what refuses a key that wants a passphrase: whoever asked for one would hold up a moving leg."""
+
+    def refuse() -> str:
+        raise SettingsError(
+            f"{key}: is protected by a passphrase, expected a key without one, as nobody is asked while a leg moves; "
+            f"`openssl pkey -in {key} -out FILE` makes one, to be kept where nobody else may read it"
+        )
+
+    return refuse
 
 
 class RtuLine(Line):

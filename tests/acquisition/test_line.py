@@ -4,6 +4,7 @@ import asyncio
 import errno
 import re
 import shutil
+import ssl
 import subprocess
 import time
 
@@ -14,10 +15,11 @@ from pymodbus.server.base import ModbusBaseServer
 
 from pipelines.acquisition.acquire import acquire
 from pipelines.acquisition.device import Device
-from pipelines.acquisition.line import Line, _explained
+from pipelines.acquisition.line import Line, _explained, lines_of
 from pipelines.acquisition.machine import Machine
 from pipelines.contracts import RECORDING
 from pipelines.errors import DeviceError, SettingsError, Unanswered
+from pipelines.rig.listening import _tls_context
 from pipelines.rig.null_modem import null_modem
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.line import RtuLine, RtuOverTcpLine
@@ -41,6 +43,8 @@ def certificates(tmp_path_factory):
              f"{name}.pem"],
             cwd=folder, check=True, capture_output=True,
         )  # fmt: skip
+    locked = ["openssl", "pkey", "-in", "own.key", "-aes256", "-passout", "pass:secret", "-out", "locked.key"]
+    subprocess.run(locked, cwd=folder, check=True, capture_output=True)
     return folder
 
 
@@ -300,6 +304,26 @@ def test_a_certificate_that_is_none_is_refused(on_line, tmp_path):
     (tmp_path / "ca.pem").write_text("nonsense")
     why = connecting(on_line("transport = 'tls'\nca = 'ca.pem'\n"))
     assert why.startswith(f"{tmp_path}/ca.pem: is no certificate that can be used")
+
+
+def test_a_key_with_a_passphrase_is_refused_and_nobody_is_asked_for_it(on_line, line_of, certificates):
+    locked, expected = str(certificates / "locked.key"), f"{certificates}/locked.key: is protected by a passphrase, "
+    assert connecting(on_line(line_of("tls", key=locked))).startswith(expected)
+    with pytest.raises(SettingsError) as refused:
+        _tls_context(load_rig(on_line(line_of("tls", rig_key=locked))).line["leg"])
+    assert str(refused.value).startswith(expected)
+
+
+def test_a_line_that_does_not_come_back_reads_no_certificates_in_the_middle_of_a_stop(on_line, line_of, monkeypatch):
+    rig = load_rig(on_line(line_of("tls")))
+
+    async def come_back():
+        line = lines_of(rig)(rig.drive[0])
+        monkeypatch.setattr(ssl, "create_default_context", lambda **files: pytest.fail("reads files"))
+        await line.connect()
+
+    with pytest.raises(DeviceError, match=r"^line leg .*: no connection \("):
+        asyncio.run(come_back())
 
 
 def test_what_is_written_to_one_end_of_a_null_modem_comes_out_of_the_other():
