@@ -55,7 +55,8 @@ class Servo:
     @property
     def status(self) -> int:
         """The status word; a bit that the map gives no meaning stays 0."""
-        is_enabled, mask = self._map.enabled_value, self._map.enabled_mask
+        # A bit that means a fault does not say that the drive is merely disabled, though it is 0 while it is enabled.
+        is_enabled, mask = self._map.enabled_value, self._map.enabled_mask & ~self._map.fault_mask
         word = is_enabled if self.enabled else is_enabled ^ mask
         # The lowest bit that means a fault: which of them it is, the map does not tell.
         return word | (self._map.fault_mask & -self._map.fault_mask if self.fault else 0)

@@ -10,6 +10,7 @@ from pipelines.acquisition.machine import Machine
 from pipelines.errors import DeviceError, SettingsError
 from pipelines.rig.server import Drive
 from pipelines.rig.servo import Servo
+from pipelines.settings import datasets
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import load_rig
 from tests.acquisition.conftest import free_port
@@ -35,6 +36,19 @@ def heard(monkeypatch):
 def test_a_run_enables_halts_and_disables_and_nothing_else(record, heard):
     record()
     assert heard() == [[DISABLE, ENABLE, HALT, DISABLE]] * 2
+
+
+def test_the_shipped_template_records_a_run_where_a_virtual_rig_plays_it(tmp_path, excitation):
+    rigs, path, output = datasets() / "rigs", tmp_path / "lab.toml", tmp_path / "test.parquet"
+    template, plant = (rigs / "lab.toml").read_text(), (rigs / "plain.toml").read_text().partition("[plant]\n")[2]
+    embedded = template.replace('name = "lab"\n', 'name = "lab"\nembedded = true\nclock = "lockstep"\n')
+    path.write_text(f"{embedded}\n[plant]\n{plant}".replace("watchdog_s = 0.1 ", "watchdog_s = 20.0 "))
+    excitation.write_text(
+        'unit = "rad"\nomega_rad_s = 6.283185307179586\ntheta0_rad = [0.2, -0.4]\n'
+        "a = [[0.02], [0.02]]\nb = [[0.0], [0.0]]\n"
+    )
+    settings = RunSettings(name="test", run="exo_alone", purpose="train", duration_s=1.0)
+    assert acquire(path, settings, excitation, output, 100.0).samples == 100
 
 
 def test_a_drive_that_knows_no_halt_is_held_by_its_set_point(record, heard):

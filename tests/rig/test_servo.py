@@ -41,3 +41,17 @@ def test_set_points_that_come_irregularly_do_not_swing_the_drive_up(servo, cycle
     # At most at its highest speed for as long as it goes on by itself, and until it has slowed down.
     fastest = 0.02 * 2 * np.pi
     assert np.abs(path).max() < 0.02 + fastest * EXTRAPOLATED * cycle / RATE + fastest**2 / 8.0
+
+
+def test_a_drive_of_the_shipped_template_reports_no_fault_while_it_is_merely_disabled():
+    registers = load_rig(datasets() / "rigs" / "lab.toml").map.drive["servo"]
+    assert registers.enabled_mask & registers.fault_mask  # as CiA 402 has it
+    drive = Servo(registers, 0.0, (-3.0, 3.0), RATE, 8.0, None)
+    drive.hear(0.0, registers.disable)
+    assert not drive.status & registers.fault_mask
+    assert drive.status & registers.enabled_mask != registers.enabled_value
+    drive.hear(0.0, registers.enable)
+    assert drive.status & registers.enabled_mask == registers.enabled_value
+    drive.fault = True
+    assert drive.status & registers.fault_mask
+    assert drive.status & registers.enabled_mask != registers.enabled_value
