@@ -1,13 +1,13 @@
 """The commands of exoid, and the one place where an error becomes a line and an exit code.
 
-0 is success, 1 a fault of exoid itself, 2 the user's to mend, 3 a device's, 130 a stop by Ctrl-C, 143 one by SIGTERM.
+0 is success, 1 a fault of exoid itself, 2 the user's to mend, 3 a device's, 130 a stop by Ctrl-C, 129, 131 and 143 one by
+SIGHUP, SIGQUIT and SIGTERM.
 """
 
 import errno
 import glob
 import io
 import os
-import signal
 import sys
 import tempfile
 import time
@@ -42,6 +42,7 @@ from exoid_cli.rig_group import rig
 from exoid_cli.run import run as run_
 from exoid_cli.settings import settings
 from exoid_cli.show import show
+from exoid_cli.signals import signals
 from exoid_cli.simulate import simulate
 from exoid_cli.status import status
 from pipelines import __version__
@@ -101,16 +102,17 @@ def options(
     console.heed(quiet=quiet, json=json)
 
 
-INTERRUPTED, TERMINATED, UNHEARD = 128 + signal.SIGINT, 128 + signal.SIGTERM, 128 + 13
-"""Exit codes of a stop by a signal, as shells have them; the last one's is SIGPIPE, which Windows does not know."""
+INTERRUPTED = 130
+"""What typer makes of KeyboardInterrupt."""
+UNHEARD = 128 + 13
+"""Exit code of a stop by SIGPIPE, as shells have it; Windows does not know it."""
 
 
 def main() -> NoReturn:
     """Run exoid as the shell's command."""
     if not (sys.warnoptions or os.environ.get("EXOID_DEBUG")):
         warnings.simplefilter("ignore")  # of Python's libraries, about exoid's own lines: the tests heed them
-    # As an exception: what is half written is cleared away, as it is after Ctrl-C.
-    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(TERMINATED))
+    signals.heed()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(encoding="utf-8")  # Windows' pipes have one that knows no N·m
@@ -131,30 +133,33 @@ def run(arguments: Sequence[str]) -> int:
     try:
         code = _command_line(arguments)
         sys.stdout.flush()  # not at the interpreter's end, where it would fail with a traceback
+        signals.ignore()
         return code
     except BrokenPipeError:
         return _unheard()
     except ExoidError as error:
-        console.fail(str(error))
-        return error.exit_code
+        return _failed(str(error), error.exit_code)
     except TyperException as error:
-        console.fail(usage.told(error))
-        return error.exit_code
+        return _failed(usage.told(error), error.exit_code)
     except KeyboardInterrupt:
-        console.fail("stopped by Ctrl-C")
-        return INTERRUPTED
+        return _failed(signals.told(), signals.exit_code)
     except SystemExit as stop:
         if isinstance(stop.__context__, BrokenPipeError):  # which click and rich make a failure of ours
             return _unheard()
-        if stop.code == TERMINATED:
-            console.fail("stopped by SIGTERM")
         raise
     except OSError as error:
-        console.fail(_about_the_system(error))
-        return 2
+        return _failed(_about_the_system(error), 2)
     except Exception as error:
-        console.fail(f"exoid itself failed: {type(error).__name__}: {error}; please report it, {_keep_traceback()}")
-        return 1
+        return _failed(
+            f"exoid itself failed: {type(error).__name__}: {error}; please report it, {_keep_traceback()}", 1
+        )
+
+
+def _failed(text: str, code: int) -> int:
+    """Tell how exoid ends; called while the error is being handled, which keeps signals from coming between."""
+    console.fail(text)
+    signals.ignore()
+    return code
 
 
 def _unheard() -> int:

@@ -96,7 +96,13 @@ app.main()
 
 
 @pytest.mark.parametrize(
-    ("number", "line"), [(signal.SIGINT, "exoid: stopped by Ctrl-C\n"), (signal.SIGTERM, "exoid: stopped by SIGTERM\n")]
+    ("number", "line"),
+    [
+        (signal.SIGINT, "exoid: stopped by Ctrl-C\n"),
+        (signal.SIGTERM, "exoid: stopped by SIGTERM\n"),
+        (signal.SIGHUP, "exoid: stopped by SIGHUP\n"),
+        (signal.SIGQUIT, "exoid: stopped by SIGQUIT\n"),
+    ],
 )
 def test_a_signal_in_the_middle_of_a_command_leaves_what_was_there_and_says_so_in_one_line(tmp_path, number, line):
     path = tmp_path / "verdict.json"
@@ -105,6 +111,36 @@ def test_a_signal_in_the_middle_of_a_command_leaves_what_was_there_and_says_so_i
     done = subprocess.run(command, capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (128 + number, "", line)
     assert [(file.name, file.read_text()) for file in tmp_path.iterdir()] == [("verdict.json", "old")]
+
+
+IMPATIENT = """
+import atexit, os, signal
+from exoid_cli import app
+from pipelines.errors import DeviceError
+
+NUMBERS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")]
+
+def signals():
+    for number in NUMBERS:
+        os.kill(os.getpid(), number)
+
+@app.app.command("stopped")
+def stopped():
+    try:
+        raise DeviceError("USE THE EMERGENCY STOP: made up")
+    finally:
+        signals()
+
+fail = app.console.fail
+app.console.fail = lambda text: (signals(), fail(text), signals())
+atexit.register(signals)
+app.main()
+"""
+
+
+def test_what_a_device_did_is_told_with_its_exit_code_however_many_signals_come_meanwhile():
+    done = subprocess.run([sys.executable, "-c", IMPATIENT, "stopped"], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (3, "exoid: USE THE EMERGENCY STOP: made up\n")
 
 
 def test_a_fault_of_exoid_keeps_its_traceback_in_a_file(exoid, monkeypatch, tmp_path):

@@ -1,0 +1,59 @@
+"""Signals that ask exoid to end: the first one ends it, and none keeps from the user what is being told already."""
+
+import signal
+import sys
+from collections.abc import Iterator
+from types import FrameType
+
+from pipelines.errors import ExoidError
+
+NAMES = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "SIGHUP", "SIGQUIT": "SIGQUIT"}
+"""Signals that end exoid where the system has them, and what a user calls them."""
+
+
+class Signals:
+    """The signals of one process, whatever they come in the midst of."""
+
+    def __init__(self) -> None:
+        self.came = signal.SIGINT
+        """The last one that asked exoid to end."""
+        self._heeded = list[signal.Signals]()
+
+    def heed(self) -> None:
+        """Raise KeyboardInterrupt at each from now on, so that what is half written is cleared away."""
+        known = [signal.Signals[name] for name in NAMES if name in signal.Signals.__members__]
+        # What nohup or a shell's background ignores stays ignored.
+        self._heeded = [number for number in known if signal.getsignal(number) is not signal.SIG_IGN]
+        for number in self._heeded:
+            signal.signal(number, self._interrupt)
+
+    def ignore(self) -> None:
+        """Let no signal change how exoid ends: all is told, its exit code is known."""
+        # By the system: Python's own handlers are gone before its process is.
+        for number in self._heeded:
+            signal.signal(number, signal.SIG_IGN)
+
+    def told(self) -> str:
+        """Return in words what ended exoid."""
+        return f"stopped by {NAMES[self.came.name]}"
+
+    @property
+    def exit_code(self) -> int:
+        """As shells have it."""
+        return 128 + self.came
+
+    def _interrupt(self, number: int, frame: FrameType | None) -> None:
+        if not any(isinstance(error, ExoidError | KeyboardInterrupt) for error in _on_their_way()):
+            self.came = signal.Signals(number)
+            raise KeyboardInterrupt
+
+
+def _on_their_way() -> Iterator[BaseException]:
+    """Yield the exceptions in whose wake something is being cleared away or told just now."""
+    error = sys.exception()
+    while error:
+        yield error
+        error = error.__context__
+
+
+signals = Signals()
