@@ -1,7 +1,7 @@
 """The commands of exoid, and the one place where an error becomes a line and an exit code.
 
-0 is success, 1 a fault of exoid itself, 2 the user's to mend, 3 a device's, 130 a stop by Ctrl-C, 129, 131 and 143 one by
-SIGHUP, SIGQUIT and SIGTERM.
+0 is success, 1 a fault of exoid itself, 2 the user's to mend, 3 a device's, 130 a stop by Ctrl-C, 129, 131 and 143 one
+by SIGHUP, SIGQUIT and SIGTERM.
 """
 
 import errno
