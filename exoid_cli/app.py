@@ -35,7 +35,6 @@ from exoid_cli.identify import identify
 from exoid_cli.import_ import import_
 from exoid_cli.init import init
 from exoid_cli.lasting import outlast_terminals
-from exoid_cli.lost_interrupts import interrupts_told
 from exoid_cli.recover import recover
 from exoid_cli.report import report
 from exoid_cli.rig_group import rig
@@ -150,6 +149,8 @@ def run(arguments: Sequence[str]) -> int:
     except OSError as error:
         return _failed(_about_the_system(error), 2)
     except Exception as error:
+        if signals.came:  # whatever made that of it
+            return _failed(signals.told(), signals.exit_code)
         return _failed(
             f"exoid itself failed: {type(error).__name__}: {error}; please report it, {_keep_traceback()}", 1
         )
@@ -172,8 +173,7 @@ def _unheard() -> int:
 def _command_line(arguments: Sequence[str]) -> int:
     command = typer.main.get_command(app)
     # Not standalone: typer would print a box of several lines for a mistyped option.
-    with interrupts_told():
-        code = command.main(args=list(arguments) or ["--help"], prog_name="exoid", standalone_mode=False)
+    code = command.main(args=list(arguments) or ["--help"], prog_name="exoid", standalone_mode=False)
     if code == INTERRUPTED:
         raise KeyboardInterrupt  # of which typer makes an exit code, and says nothing
     return code or 0

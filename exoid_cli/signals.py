@@ -15,8 +15,8 @@ class Signals:
     """The signals of one process, whatever they come in the midst of."""
 
     def __init__(self) -> None:
-        self.came = signal.SIGINT
-        """The last one that asked exoid to end."""
+        self.came: signal.Signals | None = None
+        """The last one that asked exoid to end; compilers and imports take KeyboardInterrupt for their own failure."""
         self._heeded = list[signal.Signals]()
 
     def heed(self) -> None:
@@ -26,6 +26,7 @@ class Signals:
         self._heeded = [number for number in known if signal.getsignal(number) is not signal.SIG_IGN]
         for number in self._heeded:
             signal.signal(number, self._interrupt)
+        sys.unraisablehook = _unraisable
 
     def ignore(self) -> None:
         """Let no signal change how exoid ends: all is told, its exit code is known."""
@@ -35,17 +36,23 @@ class Signals:
 
     def told(self) -> str:
         """Return in words what ended exoid."""
-        return f"stopped by {NAMES[self.came.name]}"
+        return f"stopped by {NAMES[(self.came or signal.SIGINT).name]}"
 
     @property
     def exit_code(self) -> int:
         """As shells have it."""
-        return 128 + self.came
+        return 128 + (self.came or signal.SIGINT)
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
         if not any(isinstance(error, ExoidError | KeyboardInterrupt) for error in _on_their_way()):
             self.came = signal.Signals(number)
             raise KeyboardInterrupt
+
+
+def _unraisable(told: "sys.UnraisableHookArgs") -> None:
+    """Say nothing of an interruption that fell into a callback of compiled code, such as the compiler's."""
+    if told.exc_type is not KeyboardInterrupt:
+        sys.__unraisablehook__(told)
 
 
 def _on_their_way() -> Iterator[BaseException]:

@@ -143,6 +143,42 @@ def test_what_a_device_did_is_told_with_its_exit_code_however_many_signals_come_
     assert (done.returncode, done.stderr) == (3, "exoid: USE THE EMERGENCY STOP: made up\n")
 
 
+MISTAKEN = """
+import ctypes, os, signal
+from exoid_cli import app
+from pipelines.errors import DeviceError
+
+def interrupt():
+    os.kill(os.getpid(), signal.SIGINT)
+    signal.pause()
+
+@app.app.command("compile")
+def compiles(how: str):
+    if how == "importing":
+        try:
+            interrupt()
+        except KeyboardInterrupt:
+            raise ImportError("a part of it is missing")
+    ctypes.CFUNCTYPE(None)(interrupt)()  # as LLVM calls back at the end of a compilation
+    raise DeviceError("made up") if how == "moving" else RuntimeError("no compiled object yet")
+
+app.main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("how", "code", "line"),
+    [
+        ("importing", 130, "exoid: stopped by Ctrl-C\n"),
+        ("compiling", 130, "exoid: stopped by Ctrl-C\n"),
+        ("moving", 3, "exoid: made up\n"),  # what a device did is true nevertheless
+    ],
+)
+def test_what_an_import_or_the_compiler_makes_of_ctrl_c_is_told_as_ctrl_c(how, code, line):
+    done = subprocess.run([sys.executable, "-c", MISTAKEN, "compile", how], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (code, "", line)
+
+
 def test_a_fault_of_exoid_keeps_its_traceback_in_a_file(exoid, monkeypatch, tmp_path):
     def fails(command):
         raise ZeroDivisionError("division by zero")
