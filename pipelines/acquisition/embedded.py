@@ -30,7 +30,7 @@ _ON_ITS_OWN: dict[str, Any] = (
 def embedded(rig: RigSettings, path: Path, run: RunSettings, sample_rate_hz: float) -> Iterator[RigSettings]:
     """Run the virtual rig of a file; yields the rig's settings with the places where its devices are."""
     command = [
-        sys.executable, "-m", "exoid_cli.app", "rig", "serve", str(path), "--run", run.run, "--seed", str(run.seed),
+        sys.executable, "-m", "exoid_cli", "rig", "serve", str(path), "--run", run.run, "--seed", str(run.seed),
         "--sample-rate-hz", str(sample_rate_hz), "--port", "0", "--until-input-ends",
     ]  # fmt: skip
     with tempfile.TemporaryFile() as complaints:

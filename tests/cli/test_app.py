@@ -4,6 +4,8 @@ import os
 import signal
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import pytest
 import typer
@@ -177,6 +179,31 @@ app.main()
 def test_what_an_import_or_the_compiler_makes_of_ctrl_c_is_told_as_ctrl_c(how, code, line):
     done = subprocess.run([sys.executable, "-c", MISTAKEN, "compile", how], capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (code, "", line)
+
+
+EARLY = """
+import os, sys
+from importlib.metadata import EntryPoint
+
+class Impatient:
+    def find_spec(self, name, *more):
+        if name == "typer":
+            os.kill(os.getpid(), int(sys.argv.pop()))
+
+sys.meta_path.insert(0, Impatient())
+EntryPoint("exoid", sys.argv.pop(1), "console_scripts").load()()
+"""
+
+
+@pytest.mark.parametrize(
+    ("number", "line"), [(signal.SIGINT, "exoid: stopped by Ctrl-C\n"), (signal.SIGTERM, "exoid: stopped by SIGTERM\n")]
+)
+def test_a_signal_while_exoid_is_still_being_loaded_ends_it_in_one_line(number, line):
+    settings = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())
+    entry = settings["project"]["scripts"]["exoid"]
+    command = [sys.executable, "-c", EARLY, entry, "--version", str(int(number))]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (128 + number, "", line)
 
 
 def test_a_fault_of_exoid_keeps_its_traceback_in_a_file(exoid, monkeypatch, tmp_path):

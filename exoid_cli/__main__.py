@@ -1,0 +1,27 @@
+"""The entry of exoid: whatever asks it to end while Python still loads what it is made of ends it in one line, too."""
+
+import os
+import signal
+
+EARLY = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM"}
+"""Signals that are heeded from the first on, and what a user calls them; by the others the system ends exoid."""
+
+
+def _end(number: int, frame: object) -> None:
+    # Nothing is to be cleared away yet, and an exception would be taken for an import's own failure.
+    os.write(2, f"exoid: stopped by {EARLY[signal.Signals(number).name]}\n".encode())
+    os._exit(128 + number)
+
+
+def main() -> None:
+    """Run exoid as the shell's command."""
+    for name in EARLY:
+        if signal.getsignal(number := signal.Signals[name]) is not signal.SIG_IGN:
+            signal.signal(number, _end)
+    from exoid_cli.app import main as run
+
+    run()
+
+
+if __name__ == "__main__":
+    main()
