@@ -11,6 +11,14 @@ NAMES = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "SIGHUP", "SIGQUIT"
 """Signals that end exoid where the system has them, and what a user calls them."""
 
 
+class Interrupted(KeyboardInterrupt):
+    """A signal asked exoid to end.
+
+    Python notes a KeyboardInterrupt proper that leaves ``exec``, as compilers and dataclasses use it, and under
+    ``python -m`` dies of SIGINT in the end, whatever the exit code was to be.
+    """
+
+
 class Signals:
     """The signals of one process, whatever they come in the midst of."""
 
@@ -46,12 +54,12 @@ class Signals:
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
         if not any(isinstance(error, ExoidError | KeyboardInterrupt) for error in _on_their_way()):
             self.came = signal.Signals(number)
-            raise KeyboardInterrupt
+            raise Interrupted
 
 
 def _unraisable(told: "sys.UnraisableHookArgs") -> None:
     """Say nothing of an interruption that fell into a callback of compiled code, such as the compiler's."""
-    if told.exc_type is not KeyboardInterrupt:
+    if not issubclass(told.exc_type, KeyboardInterrupt):
         sys.__unraisablehook__(told)
 
 

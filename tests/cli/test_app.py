@@ -161,6 +161,8 @@ def compiles(how: str):
             interrupt()
         except KeyboardInterrupt:
             raise ImportError("a part of it is missing")
+    if how == "executing":
+        exec("interrupt()")
     ctypes.CFUNCTYPE(None)(interrupt)()  # as LLVM calls back at the end of a compilation
     raise DeviceError("made up") if how == "moving" else RuntimeError("no compiled object yet")
 
@@ -172,12 +174,15 @@ app.main()
     ("how", "code", "line"),
     [
         ("importing", 130, "exoid: stopped by Ctrl-C\n"),
+        ("executing", 130, "exoid: stopped by Ctrl-C\n"),
         ("compiling", 130, "exoid: stopped by Ctrl-C\n"),
         ("moving", 3, "exoid: made up\n"),  # what a device did is true nevertheless
     ],
 )
-def test_what_an_import_or_the_compiler_makes_of_ctrl_c_is_told_as_ctrl_c(how, code, line):
-    done = subprocess.run([sys.executable, "-c", MISTAKEN, "compile", how], capture_output=True, text=True)
+def test_what_an_import_or_the_compiler_makes_of_ctrl_c_is_told_as_ctrl_c(tmp_path, how, code, line):
+    (tmp_path / "mistaken.py").write_text(MISTAKEN)
+    command = [sys.executable, "-m", "mistaken", "compile", how]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (code, "", line)
 
 
