@@ -198,7 +198,10 @@ async def _heeding(work: Coroutine[Any, Any, T], stopped_by: Sequence[str]) -> T
 
 @contextmanager
 def _signals() -> Iterator[list[str]]:
-    """Collect the names of signals that ask for a stop, so that the loop and nothing else acts on them."""
+    """Collect the names of signals that ask for a stop, so that the loop and nothing else acts on them.
+
+    One that came too late to stop this run acts at its end: no other run is to begin after it.
+    """
     # A terminal that is closed must not leave a drive enabled either.
     # Ctrl-Z would leave it to the drives' own watchdogs to stop the leg.
     told = {
@@ -206,15 +209,22 @@ def _signals() -> Iterator[list[str]]:
     }  # fmt: skip
     # Windows knows two of them.
     names = {signal.Signals[name]: word for name, word in told.items() if name in signal.Signals.__members__}
-    came, before = list[str](), {}
+    came, late, before = list[str](), list[int](), {}
+
+    def hear(number: int, frame: object) -> None:
+        came.append(names[signal.Signals(number)])
+        late.append(number)
+
     with suppress(ValueError):  # outside a process's main thread nobody can catch signals, and nobody is sent them
         for number in names:
-            before[number] = signal.signal(number, lambda number, frame: came.append(names[signal.Signals(number)]))
+            before[number] = signal.signal(number, hear)
     try:
         yield came
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+    for number in late[:1]:
+        signal.raise_signal(number)
 
 
 def _ending(output: Path, supervisor: Supervisor) -> tuple[type[ExoidError], str]:

@@ -1,5 +1,6 @@
 """Recording on a virtual rig, over real Modbus TCP."""
 
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pipelines.acquisition.acquire import acquire
+from pipelines.acquisition.recorded import write_recording
+from pipelines.contracts import RECORDING
 from pipelines.mechanics.leg import cuff_torque
 from pipelines.mechanics.motion import geometry_of
 from pipelines.mechanics.trajectory import read_trajectory
@@ -29,6 +32,17 @@ def test_every_sample_of_the_run_is_there_and_tells_its_time(record):
     assert_allclose(table.frame["time_s"], np.arange(400) / 200, atol=2e-6)
     assert table.metadata["gaps"] == []
     assert table.metadata["period_s"] == pytest.approx(1.0)
+
+
+def test_a_signal_that_comes_too_late_to_stop_a_run_lets_no_other_begin(record, monkeypatch, tmp_path):
+    def interrupted(*given):
+        signal.raise_signal(signal.SIGINT)
+        write_recording(*given)
+
+    monkeypatch.setattr("pipelines.acquisition.acquire.write_recording", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        record()
+    assert [len(RECORDING.read(path).frame) for path in tmp_path.rglob("*.parquet")] == [200]
 
 
 def test_the_recorded_set_points_are_the_trajectory_at_each_samples_end(record, excitation):
