@@ -15,7 +15,8 @@ from pipelines.acquisition.machine import Machine
 from pipelines.contracts import RECORDING
 from pipelines.errors import DeviceError, SettingsError
 from pipelines.mechanics.trajectory import read_trajectory
-from pipelines.rig.ring import QUEUE_RECORDS, Ring
+from pipelines.rig import ring
+from pipelines.rig.ring import Ring
 from pipelines.rig.server import Drive
 from pipelines.rig.servo import Servo
 from pipelines.settings.acquire import RunSettings
@@ -179,17 +180,20 @@ def test_in_real_time_no_sample_is_lost_though_cycles_are(record_in_real_time):
 
 
 @pytest.fixture
-def with_full_queues(rig_file, serve, excitation, tmp_path):
+def with_full_queues(rig_file, serve, excitation, monkeypatch):
     """Serve drives in real time whose queues nobody has read since they were switched on; do something with them."""
     excitation.write_text(excitation.read_text().replace("6.283185307179586", "1.2566370614359172"))
-    changes = {"watchdog_s": 1.0, "torque_nm": 300.0, "speed_rad_s": 30.0, "rest_rad": "[0.4, -0.6]"}
+    monkeypatch.setattr(ring, "QUEUE_RECORDS", 1000)
+    # Slow, for a busy computer.
+    slow = {"record_rate_hz = 1000.0": "record_rate_hz = 200.0", "[plant]\n": "[plant]\nsample_rate_hz = 40.0\n"}
+    changes = {"watchdog_s": 1.0, "torque_nm": 300.0, "speed_rad_s": 30.0, "rest_rad": "[0.4, -0.6]", "control_s": 9.0}
 
     def run(do):
         port = free_port()
-        rig = rig_file("recorder", port, QUEUE, **changes)
+        rig = rig_file("recorder", port, QUEUE | slow, **changes)
         with serve(rig, port) as served:
             queues = [drive.ring._queue for drive in served.rig.drives]
-            while any(len(queue) < QUEUE_RECORDS for queue in queues):
+            while any(len(queue) < ring.QUEUE_RECORDS for queue in queues):
                 time.sleep(0.1)
             return do(rig)
 
@@ -200,7 +204,7 @@ def with_full_queues(rig_file, serve, excitation, tmp_path):
 def recorded_from_queues(with_full_queues, excitation, tmp_path):
     def run():
         settings = RunSettings(name="test", run="exo_alone", purpose="train", duration_s=2.0)
-        with_full_queues(lambda rig: acquire(rig, settings, excitation, tmp_path / "test.parquet", 100.0))
+        with_full_queues(lambda rig: acquire(rig, settings, excitation, tmp_path / "test.parquet", 40.0))
         return RECORDING.read(tmp_path / "test.parquet")
 
     return run
@@ -209,7 +213,7 @@ def recorded_from_queues(with_full_queues, excitation, tmp_path):
 def test_queues_that_are_full_before_the_run_are_emptied_first(recorded_from_queues):
     table = recorded_from_queues()
     assert table.metadata["gaps"] == []
-    assert np.diff(table.frame["sequence"]).tolist() == [1] * 1999
+    assert np.diff(table.frame["sequence"]).tolist() == [1] * 399
 
 
 def test_what_comes_to_a_queue_while_the_drives_take_their_time_to_be_enabled_is_let_go(
@@ -220,7 +224,7 @@ def test_what_comes_to_a_queue_while_the_drives_take_their_time_to_be_enabled_is
     def slowly(servo):
         if not enabled(servo):
             return False
-        return time.monotonic() > since.setdefault(servo, time.monotonic()) + 0.7
+        return time.monotonic() > since.setdefault(servo, time.monotonic()) + 4.8
 
     monkeypatch.setattr(Servo, "enabled", property(slowly))
     assert recorded_from_queues().metadata["gaps"] == []
@@ -229,10 +233,10 @@ def test_what_comes_to_a_queue_while_the_drives_take_their_time_to_be_enabled_is
 
 def test_a_check_empties_full_queues_first(with_full_queues):
     async def checked(path):
-        rig = Machine(load_rig(path), with_sensors=False, samples_per_cycle=10)
+        rig = Machine(load_rig(path), with_sensors=False, samples_per_cycle=5)
         await rig.connect()
         try:
-            return await check_rings(rig, probes_of(rig), 100.0)
+            return await check_rings(rig, probes_of(rig), 40.0)
         finally:
             rig.close()
 
