@@ -148,7 +148,7 @@ async def _record(
     report(Progress(duration_s=run.duration_s))
     try:
         supervisor.check()
-        start = await _ready(machine, reset_faults, stopped_by)
+        start = await _ready(machine, supervisor.rate, reset_faults, stopped_by)
         plan = make_plan(rig, trajectory, start, run.duration_s, supervisor.rate)
         supervisor.take(plan, start)
         sampling = sampling_of(machine, supervisor.rate, supervisor.judge_records)
@@ -167,7 +167,7 @@ async def _record(
         machine.close()
 
 
-async def _ready(machine: Machine, reset_faults: bool, stopped_by: Sequence[str]) -> NDArray:
+async def _ready(machine: Machine, rate_hz: float, reset_faults: bool, stopped_by: Sequence[str]) -> NDArray:
     """Connect, make sure that every drive is idle, and return where the leg stands, (J,) rad."""
     await _heeding(machine.connect(), stopped_by)
     await _heeding(machine.refuse_driven(), stopped_by)
@@ -175,6 +175,7 @@ async def _ready(machine: Machine, reset_faults: bool, stopped_by: Sequence[str]
     if reset_faults:
         await machine.reset_faults()
     await machine.make_idle()
+    await _heeding(machine.refuse_other_rate(rate_hz), stopped_by)
     start = np.array((await _heeding(machine.look(), stopped_by)).angle)
     if why := check_start(machine.rig, start):
         raise DeviceError(why)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.acquisition.clocks import Bounds
-from pipelines.acquisition.counter import Counter
+from pipelines.acquisition.counter import RATE_TOLERANCE, Counter, keeps_time
 from pipelines.acquisition.device import Device
 from pipelines.acquisition.line import Line, lines_of
 from pipelines.acquisition.patience import Patience
@@ -32,6 +32,9 @@ STATUS_PAUSE_S = 0.002
 
 EMPTYING_S = 10.0
 """How long it may take to let go what has gathered in a drive's queue: thousands of records, a few with each read."""
+
+RATE_S = 0.5
+"""How long a drive's counter and clock are watched before a run."""
 
 WATCH_S = 0.5
 """How long a drive is watched that may be enabled before the run: whoever drives it tells it something meanwhile."""
@@ -138,6 +141,38 @@ class Drive:
     async def forget_records(self) -> bool:
         """Let go what its record has kept so far, as far as one drain reaches; tell whether that was all."""
         return self.ring is None or await self.ring.forget()
+
+    async def refuse_other_rate(self, rate_hz: float, setting: str) -> None:
+        """Refuse a drive that does not take so many samples a second, by this computer's clock or by its own.
+
+        Raises
+        ------
+        DeviceError
+            Names the ``setting`` that tells the rate.
+        """
+        asked = time.perf_counter()
+        first = await self.look()
+        answered = time.perf_counter()
+        await asyncio.sleep(RATE_S)
+        asked_again = time.perf_counter()
+        last = await self.look()
+        longest, shortest = time.perf_counter() - asked, asked_again - answered
+        samples, seconds = last.sequence - first.sequence, last.time - first.time
+        # A sample more or less at either end; how late replies are does not matter.
+        fewest = shortest * rate_hz * (1.0 - RATE_TOLERANCE) - 1.0
+        most = longest * rate_hz * (1.0 + RATE_TOLERANCE) + 1.0
+        if not fewest <= samples <= most:
+            raise DeviceError(
+                f"{self.device.label}: its sample counter goes up by {samples / (0.5 * (shortest + longest)):.4g} a "
+                f"second, expected {rate_hz:g}; correct {setting}, or the rate that is set in the drive; nothing was "
+                "moved"
+            )
+        if not keeps_time(samples, seconds, rate_hz):
+            raise DeviceError(
+                f"{self.device.label}: its clock went on by {seconds:.6f} s while its counter went on by {samples} "
+                f"samples of {1.0 / rate_hz:.6f} s; correct the unit of time in the rig file, or {setting}; nothing "
+                "was moved"
+            )
 
     async def empty_record(self) -> None:
         """Let go all that its record has kept so far, before anything moves.
@@ -491,6 +526,14 @@ class Machine:
                 f"{' and '.join(found)}: enabled before the run began, by one that was killed perhaps; disabled now; "
                 "see to the leg, and to what else moves it, and start again"
             )
+
+    async def refuse_other_rate(self, cycle_hz: float) -> None:
+        """Refuse drives that do not sample at the rate that is wanted; in lockstep each exchange is a sample."""
+        if self.rig.clock == "lockstep":
+            return
+        setting = "acquire.sample_rate_hz" if self.rig.sampling == "cyclic" else "record_rate_hz in the rig file"
+        rate_hz = cycle_hz * self.samples_per_cycle
+        await all_answers(drive.refuse_other_rate(rate_hz, setting) for drive in self.drives)
 
     async def empty_records(self) -> None:
         """Let go what the drives' own records have kept so far: a queue that nobody read is full of what is past."""

@@ -1,6 +1,7 @@
 """What stops a run: the leg slows down, the drives are disabled, the record is kept, one line says why."""
 
 import json
+import re
 import time
 from dataclasses import replace
 
@@ -16,6 +17,7 @@ from pipelines.contracts import RECORDING
 from pipelines.contracts.beside import journal_of
 from pipelines.errors import DeviceError, ExoidError, InputError
 from pipelines.rig.server import READ_WRITE, Drive, Sensor
+from pipelines.rig.servo import Servo
 from pipelines.settings.rig import load_rig
 from tests.acquisition.journals import read_journal
 
@@ -283,6 +285,30 @@ def test_a_fault_bit_ends_the_run(stopped):
 def test_a_clock_in_another_unit_than_the_rig_file_says_is_noticed(stopped):
     why = stopped(replace={"seed = 1": "sample_rate_hz = 100.0\nseed = 1"})
     assert "samples 100 times a second by its own clock, expected 200" in why
+
+
+@pytest.mark.parametrize("rate_hz", [80.0, 100.0, 400.0])
+def test_drives_that_sample_at_another_rate_are_refused_before_they_are_enabled(stopped, monkeypatch, rate_hz):
+    words, hear = set(), Servo.hear
+
+    def remember(servo, reference, control):
+        words.add(control)
+        hear(servo, reference, control)
+
+    monkeypatch.setattr(Servo, "hear", remember)
+    why = stopped(shipped="real_time", rate_hz=rate_hz)
+    assert re.match(
+        rf"drive (hip|knee) .*: its sample counter goes up by (19\d|20\d)(\.\d)? a second, expected {rate_hz:g}; "
+        r"correct acquire.sample_rate_hz, or the rate that is set in the drive; nothing was moved",
+        why,
+    )
+    assert words == {0}  # disabled
+
+
+def test_a_clock_that_does_not_keep_time_is_refused_before_the_drives_are_enabled(stopped):
+    why = stopped(shipped="real_time", believed={'unit = "us"': 'unit = "ms"'})
+    assert "s while its counter went on by" in why
+    assert "nothing was moved" in why
 
 
 def shows(device, sample):
