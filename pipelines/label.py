@@ -49,4 +49,5 @@ def title_in_words(effect: Effect) -> str:
 def in_words(effect: Effect) -> str:
     """Return an effect and where it is: ``cogging at the knee``."""
     title = title_in_words(effect)
+    title = f"per-run {title}" if effect.each_run else title
     return f"{title} at {the(effect.joint)}" if effect.joint else title

@@ -66,11 +66,12 @@ def fill(
     where: list[slice] = []
     columns = [untouched]
     at = baseline.size
-    effects = list(proposals(baseline.machine, baseline.kinds))
+    effects = list(proposals(baseline.machine, [run.motion.run for run in runs]))
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
         for candidate in worth_a_look(effect, scan):
-            made = expanded(signatures(candidate, runs, baseline, untouched, weights), candidate, runs)
+            shared = signatures(candidate, runs, baseline, untouched, weights)
+            made = expanded(shared, effect, candidate.signature_apart, runs)
             if not all(np.isfinite(column).all() for column in made):  # a shape that tears the motion apart
                 continue
             candidates.append(candidate)

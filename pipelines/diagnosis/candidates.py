@@ -45,6 +45,15 @@ class Candidate:
         """Return the candidate as a term of a run's model, its amplitudes nought."""
         return Term(self.effect, np.append(np.zeros(len(self.effect.linear)), self.shapes[run]))
 
+    def moved(self, i: int, step: float, runs: Sequence[int] | None = None) -> "Candidate":
+        """Return the candidate with shape parameter ``i`` larger by a step, in some runs or in all."""
+        return self.with_own(i, [now[i] + step * (runs is None or r in runs) for r, now in enumerate(self.shapes)])
+
+    def with_own(self, i: int, values: Sequence[float]) -> "Candidate":
+        """Return the candidate with a value of shape parameter ``i`` for each run."""
+        shapes = zip(self.shapes, values, strict=True)
+        return replace(self, shapes=tuple((*shape[:i], float(value), *shape[i + 1 :]) for shape, value in shapes))
+
     def reshaped(self, i: int, value: float, runs: Sequence[int] | None = None) -> "Candidate":
         """Return the candidate with another value of shape parameter ``i``, in some runs or in all."""
         within = range(len(self.shapes)) if runs is None else runs
@@ -64,6 +73,17 @@ class Candidate:
         """Which linear parameters have a column of their own for each run; none of one that bends."""
         return [p.per_run and not self.bends for p in self.effect.linear]
 
+    @property
+    def signature_apart(self) -> list[bool]:
+        """The same of the columns of ``signatures``."""
+        return [self.effect.per_run] if self.bends else self.apart
+
+    @property
+    def own_bend(self) -> int | None:
+        """Which shape parameter bends each run in a way of its own, None where none does."""
+        own = (i for i, p in enumerate(self.effect.shape) if p.per_run and self.bends)
+        return next(own, None)
+
 
 def bends_motion(effect: Effect) -> bool:
     """Tell whether an effect changes kinematics or readings rather than adding torque of its own."""
@@ -80,12 +100,14 @@ def lowest(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> float:
 
 
 def proposals(machine: Machine, kinds: Sequence[str]) -> Iterator[Effect]:
-    """Yield every effect at every place of a machine where it can be, in the kinds of run at hand."""
+    """Yield every effect at every place of a machine where it can be, in the kinds of each run at hand."""
     for effect in EFFECTS:
         if effect.name in BASELINE or not set(effect.acts_in) & set(kinds):
             continue
         for joint in effect.possible(machine):
             yield effect(joint=joint, on=machine)
+            if effect.may_differ and len(kinds) > 1:
+                yield effect(joint=joint, on=machine, each_run=True)
             if effect.name in WORN and "with_human" in kinds:
                 yield effect(joint=joint, run="with_human", on=machine)
 
@@ -164,9 +186,8 @@ def torque_columns(candidate: Candidate, number: int, run: Run) -> NDArray:
     return np.concatenate([own, own if effect.on_limb else np.zeros_like(own)], axis=1)
 
 
-def expanded(columns: Sequence[NDArray], candidate: Candidate, runs: Sequence[Run]) -> list[NDArray]:
-    """Give linear parameters that each run has for itself a column for each run the effect acts in, (m, O, k')."""
-    effect, apart = candidate.effect, candidate.apart
+def expanded(columns: Sequence[NDArray], effect: Effect, apart: Sequence[bool], runs: Sequence[Run]) -> list[NDArray]:
+    """Give those of an effect's columns that are ``apart`` one for each run the effect acts in, (m, O, k')."""
     if not any(apart):
         return list(columns)
     acting = [r for r, run in enumerate(runs) if effect.explains(run.motion)]

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.bank import Bank
+from pipelines.diagnosis.candidates import Candidate
 from pipelines.diagnosis.fit import Fit, fit, refined, residuals_on
 from pipelines.diagnosis.floor import Floor, independent_share
 from pipelines.diagnosis.search import Scored, Scorer, cost, known_besides, log_likelihood, search
@@ -51,14 +52,19 @@ class Choice:
     """Sets as worthy as the named one that training hardly tells from it, best first."""
     freer: Fit | None = None
     """The named set with one of its causes in two shapes at once, where that was tried."""
+    anew: Ranked | None = None
+    """The named set with another value in every run of what may differ from run to run."""
     refuted: frozenset[tuple[str, ...]] = frozenset()
     """Sets that explain the training runs and fail on others."""
 
     def next_best(self) -> "Choice | None":
         """Return the choice with the named set refuted and the next of those as good; None where there is none.
 
-        So runs that are never fitted decide only between explanations that are as good as one another.
+        So runs that are never fitted decide only between explanations that are as good as one another. A joint that
+        was by chance zeroed alike before all training runs is still the same cause.
         """
+        if self.anew is not None:
+            return replace(self, named=self.anew, freer=None, anew=None)
         return replace(self._instead(self.standby[0]), standby=self.standby[1:]) if self.standby else None
 
     def just(self, causes: Sequence[str]) -> "Choice | None":
@@ -85,7 +91,8 @@ class Choice:
 
     def _instead(self, named: Ranked) -> "Choice":
         """Return the choice of another set, the one named so far refuted."""
-        return replace(self, named=named, standby=(), freer=None, refuted=self.refuted | {self.named.labels})
+        refuted = self.refuted | {self.named.labels}
+        return replace(self, named=named, standby=(), freer=None, anew=None, refuted=refuted)
 
     def alone(self, cause: str) -> float:
         """Return what a cause gains in log likelihood with no other beside it."""
@@ -125,7 +132,16 @@ def choose(bank: Bank, floor: Floor, evidence: Mapping[str, float]) -> Choice:
             break
         named, *others = sorted(worthy, key=lambda r: -r.score)
         freer, standby = [], [r for r in others if r.score > named.score - NEEDED]
-    return Choice(named, levels, ranked, independent, tuple(standby), freer[0].fit if freer else None)
+    anew = _anew(named, scorer, empty)
+    return Choice(named, levels, ranked, independent, tuple(standby), freer[0].fit if freer else None, anew)
+
+
+def _anew(named: Ranked, scorer: Scorer, empty: Fit) -> Ranked | None:
+    """Return a set with another value in every run of what may differ from run to run; None where nothing may."""
+    own = {c.label: c for c in scorer.bank.candidates if c.effect.each_run}
+    causes = [own.get(cause.label, cause) for cause in named.fit.causes]
+    alike = all(ours.effect == theirs.effect for ours, theirs in zip(causes, named.fit.causes, strict=True))
+    return None if alike else _ranked(scorer, causes, empty)
 
 
 def _freer(level: dict[tuple[str, ...], Scored], named: Ranked) -> list[Scored]:
@@ -160,12 +176,18 @@ def _finalists(level: dict[tuple[str, ...], Scored], named: Ranked, scorer: Scor
 
 
 def _rank(scorer: Scorer, scored: Scored, empty: Fit) -> Ranked:
+    """Refine and score a set that the search found."""
+    return _ranked(scorer, [scorer.bank.candidates[i] for i in scored.chosen], empty)
+
+
+def _ranked(scorer: Scorer, causes: Sequence[Candidate], empty: Fit) -> Ranked:
     """Refine a set's shapes and score it on what it was fitted to, less a price for every parameter."""
     bank, independent = scorer.bank, scorer.independent
-    best = refined([bank.candidates[i] for i in scored.chosen], bank.runs, bank.baseline, bank.weights)
+    best = refined(causes, bank.runs, bank.baseline, bank.weights)
     gain = log_likelihood(best.rms, empty.rms, independent, scorer.imperfect)
     # One that bends the motion has no amplitude of its own, but its shape is as free as one.
-    columns = len(best.values) - len(empty.values) + sum(c.bends for c in best.causes)
+    bends = sum(c.bends if c.own_bend is None else best.acting(c) for c in best.causes)
+    columns = len(best.values) - len(empty.values) + bends
     besides = known_besides(best.causes, scorer.evidence)
     return Ranked(best, gain + besides - cost(best.causes, columns, independent))
 

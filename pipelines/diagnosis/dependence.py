@@ -150,7 +150,7 @@ def dependences(runs: Sequence[Run], residuals: Sequence[NDArray]) -> list[Depen
     for j, joint in enumerate(joints):
         shares = {v: variable_share(v, runs, residuals, j) for v in VARIABLES if knows(v, runs, j)}
         made = [Dependence(joint, v.name, s, _sentence(joint, joints, v.words, s)) for v, s in shares.items()]
-        frequency, share = tone(runs, residuals, j)
+        frequency, share = tone(runs, [run.with_fast(r) for run, r in zip(runs, residuals, strict=True)], j)
         words = f"a tone of {frequency:.2f} Hz that is no harmonic of the motion"
         made.append(Dependence(joint, "tone", share, _sentence(joint, joints, words, share)))
         found += sorted(made, key=_rank, reverse=True)

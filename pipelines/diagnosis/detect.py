@@ -226,7 +226,7 @@ def detectability(
     """
     sight = Sight.of(runs, baseline, floor)
     # What the wearer may carry instead of the machine goes by the same name; the machine's is reported.
-    effects = [e for e in proposals(baseline.machine, baseline.kinds) if e.run is None]
+    effects = [e for e in proposals(baseline.machine, baseline.kinds) if e.run is None and not e.each_run]
     looks: dict[Effect, list[Look]] = {}
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
@@ -307,7 +307,7 @@ def _added(candidate: Candidate, sight: Sight, power: float) -> Look:
     effect = candidate.effect
     columns = [torque_columns(candidate, r, run) for r, run in enumerate(sight.runs)]
     direction = _direction(effect, columns, sight)
-    span = sight.left(expanded(columns, candidate, sight.runs))
+    span = sight.left(expanded(columns, effect, candidate.apart, sight.runs))
     left = sight.left(direction)[:, 0]
     growth, by = _growth(effect, left, sight.rows(direction)[:, 0], span.shape[1], sight, power)
     size, unit = float(np.sqrt(growth)), sight.rms(effect, direction)
@@ -361,7 +361,7 @@ def _bent(candidate: Candidate, sight: Sight, power: float) -> Look:
     """Size an effect that bends the motion or a reading: step until it is just seen."""
     effect, parameter = candidate.effect, candidate.effect.shape[0]
     start = candidate.shapes[0][0]
-    zero = neutral(parameter)
+    zero = parameter.neutral
 
     def at(x: float) -> tuple[float, str, NDArray, list[NDArray], float]:
         value = zero + np.sign(start - zero) * np.exp(x)
@@ -388,11 +388,6 @@ def _bent(candidate: Candidate, sight: Sight, power: float) -> Look:
         _squared(left) if seen else np.inf, _unit(left), _orthonormal(left[:, np.newaxis]),
         np.zeros((len(left), 0)), plausible=True,
     )  # fmt: skip
-
-
-def neutral(parameter: Parameter) -> float:
-    """Return the value of a parameter at which its effect is not there (a stiffness: the end it never reaches)."""
-    return 1.0 if parameter.unit == "1" and parameter.typical[0] > 0 else 0.0
 
 
 def _bend(candidate: Candidate, sight: Sight) -> list[NDArray]:

@@ -24,7 +24,7 @@ from pipelines.diagnosis.choice import (
 from pipelines.diagnosis.examined import Examined, Extended, heard_in
 from pipelines.diagnosis.faults import Fault, excluding, find_faults
 from pipelines.diagnosis.fit import Fit, fit, residuals_on
-from pipelines.diagnosis.fitted_model import model_of_run
+from pipelines.diagnosis.fitted_model import model_of_run, values_of_each_run
 from pipelines.diagnosis.floor import Floor, noise_floor
 from pipelines.diagnosis.gain import Gain, errors_of, gain
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, like_trained, observe, with_load
@@ -36,6 +36,7 @@ from pipelines.diagnosis.thinned import thinned
 from pipelines.diagnosis.ties import ALIKE
 from pipelines.diagnosis.uncertainty import Uncertainty, uncertainty
 from pipelines.dynamics.replay import replay
+from pipelines.effects import Effect
 from pipelines.errors import ExoidError, InputError
 from pipelines.estimation.angle_noise import CUTOFF_HZ, is_loud
 from pipelines.estimation.collinearity import collinearities, profiled
@@ -43,7 +44,6 @@ from pipelines.label import effect_labelled
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.origin import giving
 from pipelines.mechanics.scale import on_one_scale
-from pipelines.mechanics.slow_motion import below
 from pipelines.model import unrealizable
 
 SEARCH_SHARE = 0.75
@@ -111,6 +111,16 @@ class Diagnosis:
         return tuple(sorted(self.likely, key=order))
 
     @cached_property
+    def effects(self) -> dict[str, Effect]:
+        """The named effects as they were fitted, by label."""
+        return {cause.label: cause.effect for cause in self.choice.named.fit.causes}
+
+    @cached_property
+    def each_run(self) -> dict[str, list[dict[str, Any]]]:
+        """What each run has for itself of the named causes, by label."""
+        return values_of_each_run(self.choice.named.fit, self.baseline, (*self.train, *self.validate))
+
+    @cached_property
     def gains(self) -> dict[str, Gain]:
         """What each named cause gains on the validation runs beside the others, by its label."""
         return {label: gain(without.errors, self.after.errors) for label, without in self.without.items()}
@@ -155,13 +165,12 @@ def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = s
     sound = [thinned(motion) for motion in excluding(motions, faults)]
     train, validate = _dealt(sound)
     if noisy := is_loud([run.motion for run in train]):
-        sound = [below(motion, CUTOFF_HZ) for motion in sound]
-        train, validate = _dealt(sound)
+        train, validate = _dealt(sound, CUTOFF_HZ)
     if not any(fault.spoils for fault in faults):
         _refuse_without_floor(validate)
     look = partial(_look, faults=faults, noisy_angles=noisy, report=report)
     first = look(train, validate)
-    if first.spoilt or not (first.status == "unknown_cause" or (first.unsteady and _rings(first))):
+    if noisy or first.spoilt or not (first.status == "unknown_cause" or (first.unsteady and _rings(first))):
         return first
     second = look(*_dealt([slower(m) for m in sound]))
     # Slow motion shows a transmission that rang too loud, and what was only hidden in noise; what failed as anything
@@ -222,7 +231,7 @@ def _look(
     )  # fmt: skip
 
 
-def _dealt(motions: Sequence[Motion]) -> tuple[tuple[Run, ...], tuple[Run, ...]]:
+def _dealt(motions: Sequence[Motion], cutoff_hz: float | None = None) -> tuple[tuple[Run, ...], tuple[Run, ...]]:
     listed = ", ".join(f"{m.file} ({m.run}, {m.purpose})" for m in motions) or "none"
     for purpose, why in (("train", "causes are searched there"), ("validate", "the gain is measured there")):
         if not any(m.purpose == purpose for m in motions):
@@ -234,7 +243,7 @@ def _dealt(motions: Sequence[Motion]) -> tuple[tuple[Run, ...], tuple[Run, ...]]
             f"{strangers[0]} is the only kind of run without one to train on: {listed}; "
             "record a train run of that kind, or leave it out"
         )
-    runs = [observe(m) for m in motions]
+    runs = [observe(m, cutoff_hz) for m in motions]
     return (
         tuple(run for run in runs if run.motion.purpose == "train"),
         tuple(run for run in runs if run.motion.purpose == "validate"),

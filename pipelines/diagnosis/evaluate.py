@@ -1,7 +1,7 @@
 """What a model leaves of the validation runs, which no fit has seen.
 
-Shared parameters come from training. What is tied to wall time, an onset or a phase, each validation run
-fits for itself: on one half of its seconds to be scored on the other, and the other way round.
+Shared parameters come from training. What is tied to wall time, an onset or a phase, or set anew at each start, each
+validation run fits for itself: on one half of its seconds to be scored on the other, and the other way round.
 """
 
 from collections.abc import Iterable, Sequence
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates import Candidate, columns_under
-from pipelines.diagnosis.fit import Fit, laden
+from pipelines.diagnosis.fit import NEWTON_STEPS, Fit, farthest, laden, step_of
 from pipelines.diagnosis.observations import Baseline, Run
 from pipelines.diagnosis.scan import ALWAYS, NEVER
 from pipelines.model import Term
@@ -99,7 +99,7 @@ def _learn(fit: Fit, run: Run, baseline: Baseline, masks: Sequence[NDArray]) -> 
 
     def look_at(instants: Iterable[float]) -> None:
         for instant in set(instants) - set(tried):
-            begun = _beginning(terms, *dated, instant)
+            begun = _with_shape(terms, *dated, instant)
             tried[instant] = _learn_amplitudes(fit, begun, run, baseline, masks)
 
     instants = np.linspace(run.time[0], run.time[-1], COARSE + 2)[1:-1]
@@ -125,33 +125,59 @@ def _likeliest(tried: dict[float, tuple[float, NDArray, NDArray, list[Term]]]) -
 def _learn_amplitudes(
     fit: Fit, terms: list[Term], run: Run, baseline: Baseline, masks: Sequence[NDArray]
 ) -> list[tuple[float, NDArray, NDArray, list[Term]]]:
-    """Fit the run's own amplitudes to terms of given shapes: of each mask squared error, values, residual, terms."""
+    """Fit the run's own amplitudes and bends to each mask: squared error, values, residual (m, O), terms."""
     shared, own = _shared_values(fit, baseline)
-    columns, measured = columns_under(terms, run, baseline)
+    plain = columns_under(terms, run, baseline)
+    bending = [(number, i) for number, cause in enumerate(fit.causes) if (i := cause.own_bend) is not None]
     made = []
     for learnt in masks:
+        bent, (columns, measured) = terms, plain
+        for _ in range(NEWTON_STEPS if bending else 0):
+            slopes = [_slope(fit, bent, place, shared, run, baseline, (columns, measured)) for place in bending]
+            wide = np.concatenate([columns[:, :, own], *slopes], axis=2)
+            steps = _solved(wide, measured - columns @ shared, learnt, fit.weights)[int(own.sum()) :]
+            for (number, i), step in zip(bending, steps, strict=True):
+                least, largest = farthest(fit.causes[number].effect.shape[i])
+                bent = _with_shape(bent, number, i, float(np.clip(bent[number].shape[i] + step, least, largest)))
+            columns, measured = columns_under(bent, run, baseline)
         values = shared.copy()
-        if own.any():
-            root = np.sqrt(fit.weights) * learnt
-            A = (columns[:, :, own] * root[:, :, np.newaxis]).reshape(-1, int(own.sum()))
-            values[own] = np.linalg.lstsq(A, ((measured - columns @ shared) * root).ravel(), rcond=1e-9)[0]
+        values[own] = _solved(columns[:, :, own], measured - columns @ shared, learnt, fit.weights)
         left = measured - columns @ values
         squares = float(np.sum(fit.weights * np.sum(np.where(learnt, left, 0.0) ** 2, axis=0)))
-        made.append((squares, values, left, terms))
+        made.append((squares, values, left, bent))
     return made
 
 
+def _solved(columns: NDArray, left: NDArray, learnt: NDArray, weights: NDArray) -> NDArray:
+    """Return the amplitudes (k,) of columns (m, O, k) that explain most of what is left (m, O) where it is learnt."""
+    root = np.sqrt(weights) * learnt
+    A = (columns * root[:, :, np.newaxis]).reshape(root.size, columns.shape[2])
+    return np.asarray(np.linalg.lstsq(A, (left * root).ravel(), rcond=1e-9)[0])
+
+
+def _slope(
+    fit: Fit, terms: list[Term], place: tuple[int, int], values: NDArray, run: Run, baseline: Baseline,
+    plain: tuple[NDArray, NDArray],
+) -> NDArray:  # fmt: skip
+    """Return the column (m, O, 1) of a shape of one term, as ``fit.slope`` does of all runs."""
+    number, i = place
+    step = step_of(fit.causes[number], i)
+    ahead, read = columns_under(_with_shape(terms, number, i, terms[number].shape[i] + step), run, baseline)
+    columns, measured = plain
+    return (((ahead @ values - read) - (columns @ values - measured)) / step)[:, :, np.newaxis]
+
+
+def _with_shape(terms: list[Term], number: int, i: int, value: float) -> list[Term]:
+    """Return the terms with another shape of one of them."""
+    values = terms[number].values.copy()
+    values[len(terms[number].effect.linear) + i] = value
+    return [replace(t, values=values) if k == number else t for k, t in enumerate(terms)]
+
+
 def _onset(fit: Fit) -> tuple[int, int] | None:
-    """Return which cause has an onset of its own in each run, and its place among the cause's values, if any has."""
+    """Return which cause has an onset of its own in each run, and which of its shapes that is, if any has."""
     for number, cause in enumerate(fit.causes):
         for i, parameter in enumerate(cause.effect.shape):
-            if parameter.per_run:
-                return number, len(cause.effect.linear) + i
+            if parameter.per_run and not cause.bends:
+                return number, i
     return None
-
-
-def _beginning(terms: list[Term], number: int, at: int, instant: float) -> list[Term]:
-    """Return the terms with one that begins at an instant."""
-    values = terms[number].values.copy()
-    values[at] = instant
-    return [replace(t, values=values) if k == number else t for k, t in enumerate(terms)]

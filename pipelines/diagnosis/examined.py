@@ -54,7 +54,8 @@ class Extended:
     @cached_property
     def tone(self) -> NDArray:
         """(J,) N·m rms of the strongest line at each joint."""
-        return strongest_tone(self.runs, self.residuals)[: len(self.runs[0].motion.joints)]
+        whole = [run.with_fast(left) for run, left in zip(self.runs, self.residuals, strict=True)]
+        return strongest_tone(self.runs, whole)[: len(self.runs[0].motion.joints)]
 
     @cached_property
     def perceived(self) -> dict[str, float]:
@@ -87,7 +88,7 @@ class Examined:
         wanders = bool(np.any(slow_scatter(validate, after.residuals)[:J] > WANDERING))
         effects = [cause.effect for cause in made.causes]
         doubtful = hums and not standing.is_minor(after.tone)
-        foreign = (doubtful or (wanders and not any(e.per_run for e in effects))) and not standing.rings(effects)
+        foreign = (doubtful or (wanders and not any(e.goes_with_time for e in effects))) and not standing.rings(effects)
         # Play rings on as it likes, and a wearer pushes at will: what no model follows there is no reason to doubt
         # what was heard and felt in these runs too.
         sure = tuple(cause.label for cause in made.causes if before.perceived.get(cause.label, 0.0) > NEEDED)

@@ -28,6 +28,10 @@ BEYOND = 5.0
 """Times what is typical, from which an amplitude is doubted."""
 MOST_OF_ALL = 0.5
 """Share of all of a joint's torque above which such an amplitude only stands because something else takes it away."""
+NEWTON_STEPS = 3
+"""Of Gauss and Newton along what bends each run in its own way, which the torque is nearly linear in."""
+STEP = 0.01
+"""Of a difference along a shape parameter, as a share of its typical range."""
 REACH = 1.6
 """How far a sweep looks from where a shape parameter stands, as a factor or a share of its range."""
 
@@ -122,7 +126,8 @@ def stacked_columns(
     # ``columns_under`` puts sensors' columns last.
     for cause in sorted(causes, key=_last_sensors):
         width = len(cause.effect.linear)
-        parts.append(expanded([columns[:, :, at : at + width] for columns, _ in made], cause, runs))
+        own = [columns[:, :, at : at + width] for columns, _ in made]
+        parts.append(expanded(own, cause.effect, cause.apart, runs))
         at += width
     return [(np.concatenate([part[r] for part in parts], axis=2), measured) for r, (_, measured) in enumerate(made)]
 
@@ -145,11 +150,12 @@ def refined(causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline
             loads = best.values
             runs = [with_load(run, baseline, loads) for run in runs]
             best = fit(best.causes, runs, baseline, weights, loads)
+        best = _bent_each_run(best, runs, baseline, weights)
         for number, cause in enumerate(best.causes):
             for i, parameter in enumerate(cause.effect.shape):
                 if parameter.forms and cause.bends and cause.effect.swings:
                     best = _best_form(best, number, i, runs, baseline, weights)
-                if parameter.forms or parameter.default is not None:
+                if parameter.forms or parameter.default is not None or i == cause.own_bend:
                     continue
                 for which in _together(parameter, len(runs)):
                     best = _along(best, number, i, which, runs, baseline, weights, sweep)
@@ -159,6 +165,75 @@ def refined(causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline
 def _together(parameter: Parameter, runs: int) -> list[list[int]]:
     """Return the runs that share a value of the parameter."""
     return [[r] for r in range(runs)] if parameter.per_run else [list(range(runs))]
+
+
+def _bent_each_run(best: Fit, runs: Sequence[Run], baseline: Baseline, weights: NDArray) -> Fit:
+    """Improve the shape parameters by which causes bend each run in a way of its own: all at once, in all runs."""
+    places = [(number, i) for number, cause in enumerate(best.causes) if (i := cause.own_bend) is not None]
+    if not places:
+        return best
+    straight = list(best.causes)
+    for number, i in places:
+        straight[number] = straight[number].reshaped(i, straight[number].effect.shape[i].neutral)
+    tried = [best, fit(straight, runs, baseline, weights, best.loads)]
+    made = min(tried, key=lambda f: f.cost)
+    for _ in range(NEWTON_STEPS):
+        made = fit(_stepped(made, places, runs, baseline, weights), runs, baseline, weights, best.loads)
+        tried.append(made)
+    return min(tried, key=lambda f: f.cost)
+
+
+def _stepped(
+    made: Fit, places: Sequence[tuple[int, int]], runs: Sequence[Run], baseline: Baseline, weights: NDArray
+) -> list[Candidate]:
+    """Return a fit's causes after a step of Gauss and Newton along shapes (cause, parameter) that each run has."""
+    plain = stacked_columns(made.causes, runs, baseline)
+    wide = [[columns] for columns, _ in plain]
+    for number, i in places:
+        slopes = [s[:, :, np.newaxis] for s in slope(made, (number, i, -1), runs, baseline, plain)]
+        for parts, own in zip(wide, expanded(slopes, made.causes[number].effect, [True], runs), strict=True):
+            parts.append(own)
+    gram = gram_of_runs(runs, [np.concatenate(parts, axis=2) for parts in wide], [y for _, y in plain])
+    steps = iter(solve(gram, weights)[len(made.values) :])
+    causes = list(made.causes)
+    for number, i in places:
+        cause = causes[number]
+        least, largest = farthest(cause.effect.shape[i])
+        causes[number] = cause.with_own(i, [
+            float(np.clip(shape[i] + next(steps), least, largest)) if cause.effect.explains(run.motion) else shape[i]
+            for shape, run in zip(cause.shapes, runs, strict=True)
+        ])  # fmt: skip
+    return causes
+
+
+def slope(
+    made: Fit, place: tuple[int, int, int], runs: Sequence[Run], baseline: Baseline,
+    plain: Sequence[tuple[NDArray, NDArray]],
+) -> list[NDArray]:  # fmt: skip
+    """Return what a shape does to the prediction, per unit of it, (m, O) of each run.
+
+    ``place`` is (cause, shape parameter, run), run -1 for all; ``plain`` are the fit's own columns and torques.
+    """
+    number, i, run = place
+    cause = made.causes[number]
+    step = step_of(cause, i, max(run, 0))
+    moved = cause.moved(i, step, None if run < 0 else [run])
+    causes = [moved if k == number else c for k, c in enumerate(made.causes)]
+    ahead = stacked_columns(causes, runs, baseline)
+    return [((c @ made.values - y) - (d @ made.values - z)) / step for (c, y), (d, z) in zip(ahead, plain, strict=True)]
+
+
+def step_of(cause: Candidate, i: int, run: int = 0) -> float:
+    """Return the step of a difference along a shape parameter, as large as in one run its value asks for."""
+    low, high = cause.effect.shape[i].typical
+    return STEP * (abs(cause.shapes[run][i]) if low > 0 and high / low > 4 else high - low)
+
+
+def farthest(parameter: Parameter) -> tuple[float, float]:
+    """Return the least and the largest value that a fit may give to a shape parameter of either sign."""
+    low, high = parameter.typical
+    beyond = 0.5 * (high - low)
+    return low - beyond, high + beyond
 
 
 def _best_form(best: Fit, number: int, i: int, runs: Sequence[Run], baseline: Baseline, weights: NDArray) -> Fit:
@@ -229,5 +304,5 @@ def _scale(
         reach = share * 2 * float(np.log(REACH))
         bottom = min(max(np.log(now) - reach, np.log(low / REACH)), np.log(now))
         return lambda x: float(np.exp(x)), bottom, max(min(np.log(now) + reach, np.log(high * REACH)), np.log(now))
-    reach, beyond = share * 0.25 * (high - low), 0.5 * (high - low)
-    return float, min(max(now - reach, low - beyond), now), max(min(now + reach, high + beyond), now)
+    reach, (least, largest) = share * 0.25 * (high - low), farthest(parameter)
+    return float, min(max(now - reach, least), now), max(min(now + reach, largest), now)

@@ -1,6 +1,8 @@
 """A fit as a model, as replays and control loops take it: the one that ``parameters.parquet`` tells of."""
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -27,3 +29,18 @@ def model_of_run(made: Fit, baseline: Baseline, run: Run) -> Model:
         return model
     own = {term.effect.label: term.values for term in settled(made, run, baseline)[0]}
     return Model(tuple(replace(t, values=own.get(t.effect.label, t.values)) for t in model))
+
+
+def values_of_each_run(made: Fit, baseline: Baseline, runs: Sequence[Run]) -> dict[str, list[dict[str, Any]]]:
+    """Return what each run has for itself of the causes that have such values, by label, as ``verdict.json`` tells."""
+    told: dict[str, list[dict[str, Any]]] = {c.label: [] for c in made.causes if c.effect.per_run}
+    for run in runs if told else ():
+        for term in settled(made, run, baseline)[0]:
+            effect, motion = term.effect, run.motion
+            own = {
+                p.name: float(value)
+                for p, value in zip(effect.parameters, effect.physical(term.values), strict=True) if p.per_run
+            }  # fmt: skip
+            if own and effect.explains(motion):
+                told[effect.label].append({"file": motion.file, "purpose": motion.purpose, "values": own})
+    return told

@@ -20,6 +20,7 @@ from pipelines.estimation.regression import away_from_reversals, away_from_turns
 from pipelines.mechanics.leg import LEG, cuff_torque
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.motion import CUFFS, Motion
+from pipelines.mechanics.slow_motion import at_edges, filtered
 from pipelines.signals.blocks import BlockAverage
 
 FOLD_S = 10.0
@@ -50,10 +51,28 @@ class Run:
     """(m,) number of the fold: whole periods, dealt out in turn."""
     period: NDArray
     """(m,) number of the excitation's period, -1 where it does not repeat."""
+    cutoff_hz: float | None = None
+    """Above which neither torque nor columns are looked at; None where all that blocks pass is."""
+    fast: NDArray | None = None
+    """(m, O) N·m of the torque that blocks pass and the cut-off does not."""
 
     def average(self, full_rate: NDArray) -> NDArray:
         """Put (n, ...) at full rate behind the regression filter: (m, ...)."""
-        return self.block.mean(full_rate, self.starts)
+        return self.block.mean(self.slow(full_rate), self.starts)
+
+    def slow(self, full_rate: NDArray) -> NDArray:
+        """Return what (n, ...) at full rate holds below the cut-off, where there is one."""
+        return full_rate if self.cutoff_hz is None else filtered(self.motion, full_rate, self.cutoff_hz)
+
+    def with_fast(self, residual: NDArray) -> NDArray:
+        """Return what is left (m, O) with what is faster than the cut-off: no column foretells it, and it may hum."""
+        return residual if self.fast is None else residual + self.fast
+
+    @property
+    def bandwidth_hz(self) -> float:
+        """Frequency at which the regression filter has lost half the power."""
+        passed = self.block.cutoff_hz(self.motion.sample_rate_hz)
+        return passed if self.cutoff_hz is None else min(passed, self.cutoff_hz)
 
     def measured_at(self, link: Motion) -> NDArray:
         """Return what was measured where the links move otherwise than the encoders say, (m, O) N·m."""
@@ -82,24 +101,27 @@ def cuff_torque_of(motion: Motion, q: NDArray) -> NDArray | None:
     return cuff_torque(thigh, shank, q, g)
 
 
-def observe(motion: Motion) -> Run:
-    """Put one motion behind the regression filter."""
+def observe(motion: Motion, cutoff_hz: float | None = None) -> Run:
+    """Put one motion behind the regression filter, which may let nothing pass that is faster than a cut-off."""
     block = block_average(motion)
     starts = block.starts(motion.segment)
     time = block.mean(motion.time, starts)
-    valid = block.all(motion.valid, starts)
+    trusted = motion.valid if cutoff_hz is None else motion.valid & ~at_edges(motion, cutoff_hz)
+    valid = block.all(trusted, starts)
     usable = valid[:, np.newaxis] & block.all(away_from_reversals(motion), starts)
-    measured = block.mean(motion.torque, starts)
+    outputs = [motion.torque]
     cuffs = cuff_torque_of(motion, motion.q)
     if cuffs is None:
-        measured = np.hstack([measured, np.full_like(measured, np.nan)])
+        outputs.append(np.full_like(motion.torque, np.nan))
         usable = np.hstack([usable, np.zeros_like(usable)])
     else:
-        felt = block.mean(cuffs, starts)
-        known = np.isfinite(felt)
-        measured = np.hstack([measured, np.where(known, felt, 0.0)])
+        known = np.isfinite(block.mean(cuffs, starts))
+        outputs.append(cuffs)
         steady = block.all(away_from_turns(motion), starts)
         usable = np.hstack([usable, (valid & steady)[:, np.newaxis] & known])
+    whole = np.hstack(outputs)
+    slow = whole if cutoff_hz is None else filtered(motion, np.nan_to_num(whole), cutoff_hz)
+    measured, fast = (block.mean(np.nan_to_num(x), starts) for x in (slow, whole - slow))
     length = motion.period_s or FOLD_S
     number = np.floor(time / length + 1e-9).astype(int)
     # A short run has no whole period for each fold: its stretches are dealt out instead.
@@ -110,11 +132,13 @@ def observe(motion: Motion) -> Run:
         starts=starts,
         time=time,
         state=(block.mean(motion.q, starts), block.mean(motion.dq, starts), block.mean(motion.ddq, starts)),
-        measured=np.nan_to_num(measured),
+        measured=measured,
         usable=usable,
         valid=valid,
         fold=np.floor((time - time[0]) / part).astype(int) % FOLDS if part < length else number % FOLDS,
         period=number if motion.period_s else np.full(len(time), -1),
+        cutoff_hz=cutoff_hz,
+        fast=None if cutoff_hz is None else fast,
     )
 
 

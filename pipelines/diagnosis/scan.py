@@ -136,8 +136,7 @@ def values_of(parameter: Parameter, count: int) -> NDArray:
         # Away from the ends, where an effect that bends the motion does nothing or tears it apart.
         return np.geomspace(low, high, count + 2)[1:-1] if count < FEW else np.geomspace(low, high, count)
     values = np.linspace(low, high, count + 2)[1:-1] if count < FEW else np.linspace(low, high, count)
-    neutral = 1.0 if parameter.unit == "1" and low > 0 else 0.0
-    return values[np.abs(values - neutral) > 0.02 * (high - low)]
+    return values[np.abs(values - parameter.neutral) > 0.02 * (high - low)]
 
 
 def _peaks(gains: NDArray, shapes: Sequence[tuple[float, ...]], effect: Effect) -> list[int]:

@@ -144,8 +144,8 @@ def one_way(candidate: Candidate, width: int) -> NDArray:
     """Tell which of a candidate's columns may only have a positive amplitude, (width,) bool."""
     effect = candidate.effect
     if candidate.bends:
-        # Its one column is the effect at a shape: turned over, it would be a spring that pushes.
-        return np.array([all(p.typical[0] > 0 and p.unit != "1" for p in effect.shape if p.default is None)])
+        # A column is the effect at a shape: turned over, it would be a spring that pushes.
+        return np.full(width, all(p.typical[0] > 0 and p.unit != "1" for p in effect.shape if p.default is None))
     positive = [p.typical[0] >= 0 for p in effect.linear]
     return np.array(positive) if len(positive) == width else np.zeros(width, dtype=bool)
 

@@ -86,7 +86,7 @@ class Standing:
         rings = any(effect.rings for effect in effects)
         if len(effects) > 2:
             return not plain or left < FOREIGN / 3 or (rings and self._share_left < FOREIGN)
-        return not plain or left < FOREIGN or rings or any(effect.per_run for effect in effects)
+        return not plain or left < FOREIGN or rings or any(effect.goes_with_time for effect in effects)
 
     @property
     def _share_left(self) -> float:

@@ -44,7 +44,7 @@ def strongest_tone(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray
 
 def _band_hz(run: Run) -> float:
     """Return the frequency below which the joints' speeds have nearly all of their power."""
-    speed = run.motion.dq[run.motion.valid]
+    speed = run.slow(run.motion.dq)[run.motion.valid]
     power = np.sum(np.abs(np.fft.rfft(speed - speed.mean(axis=0), axis=0)) ** 2, axis=1)
     share = np.cumsum(power) / max(power.sum(), np.finfo(float).tiny)
     return float(np.searchsorted(share, MOVING) * run.motion.sample_rate_hz / len(speed))

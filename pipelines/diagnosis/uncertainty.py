@@ -7,15 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates import Candidate
-from pipelines.diagnosis.fit import Fit, laden, stacked_columns
+from pipelines.diagnosis.fit import Fit, laden, slope, stacked_columns
 from pipelines.diagnosis.observations import Baseline, Run
 from pipelines.diagnosis.slow import slow_error
 from pipelines.estimation.long_run import long_run_covariance
 
 ALIKE_S = 0.5
 """How long what a model gets wrong stays alike: it goes with the motion, whose fastest parts are about 1 Hz."""
-STEP = 0.01
-"""Of a difference along a shape parameter, as a share of its typical range."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +41,7 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
     columns = [c for c, _ in plain]
     left = [y - c @ fit.values for c, y in plain]
     places = _shapes(fit.causes, len(runs), fitted=True)
-    slopes = [_slope(fit, place, runs, baseline, plain) for place in places]
+    slopes = [slope(fit, place, runs, baseline, plain) for place in places]
     wide = [np.concatenate([c, *(s[r][:, :, np.newaxis] for s in slopes)], axis=2) for r, c in enumerate(columns)]
     weights = fit.weights
     gram = sum(np.einsum("mo,o,moi,moj->ij", run.usable, weights, a, a) for run, a in zip(runs, wide, strict=True))
@@ -57,7 +55,7 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
         filling = filling + np.einsum("mo,o,moi,moj->ij", run.usable, alike * (weights * misfit) ** 2, a, a)
     for place in _shapes(fit.causes, len(runs), fitted=False):
         low, high = fit.causes[place[0]].effect.shape[place[1]].typical
-        assumed = _slope(fit, place, runs, baseline, plain)
+        assumed = slope(fit, place, runs, baseline, plain)
         pull = sum(
             np.einsum("mo,o,moi,mo->i", run.usable, weights, a, s)
             for run, a, s in zip(runs, wide, assumed, strict=True)
@@ -72,16 +70,6 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
     return Uncertainty(covariance, critical, tuple(places), gram)
 
 
-def _slope(
-    fit: Fit, place: tuple[int, int, int], runs: Sequence[Run], baseline: Baseline,
-    plain: Sequence[tuple[NDArray, NDArray]],
-) -> list[NDArray]:  # fmt: skip
-    """Return what a shape does to the prediction, per unit of it, (m, O) of each run."""
-    moved, step = _moved(fit.causes, *place)
-    ahead = stacked_columns(moved, runs, baseline)
-    return [((c @ fit.values - y) - (d @ fit.values - z)) / step for (c, y), (d, z) in zip(ahead, plain, strict=True)]
-
-
 def _shapes(causes: Sequence[Candidate], runs: int, fitted: bool) -> list[tuple[int, int, int]]:
     """Return each shape that is fitted, or not, as (cause, shape parameter, run); run -1 where all share it."""
     return [
@@ -91,12 +79,3 @@ def _shapes(causes: Sequence[Candidate], runs: int, fitted: bool) -> list[tuple[
         if (parameter.default is None) == fitted and not parameter.forms
         for run in (range(runs) if parameter.per_run else (-1,))
     ]
-
-
-def _moved(causes: Sequence[Candidate], number: int, i: int, run: int) -> tuple[list[Candidate], float]:
-    cause = causes[number]
-    low, high = cause.effect.shape[i].typical
-    now = cause.shapes[max(run, 0)][i]
-    step = STEP * (abs(now) if low > 0 and high / low > 4 else high - low)
-    moved = cause.reshaped(i, now + step, None if run < 0 else [run])
-    return [moved if k == number else c for k, c in enumerate(causes)], step

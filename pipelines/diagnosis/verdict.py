@@ -51,7 +51,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "acquisition_at_fault": bool(d.spoilt),
         "caveats": _caveats(d),
         "scoring": {
-            "bandwidth_hz": first.block.cutoff_hz(first.motion.sample_rate_hz),
+            "bandwidth_hz": first.bandwidth_hz,
             "mask": mask_in_words(d.baseline.machine),
             "samples": int(d.after.errors.counts.sum()),
         },
@@ -85,7 +85,7 @@ def _depends_on(before: Sequence[Dependence], after: Sequence[Dependence]) -> di
 
 
 def _cause(d: Diagnosis, label: str) -> dict[str, Any]:
-    effect = effect_labelled(label)
+    effect = d.effects[label]
     alike = d.alike(label)
     worth = d.gains[label]
     named_joint = d.baseline.joints[worth.joint]
@@ -112,12 +112,9 @@ def _cause(d: Diagnosis, label: str) -> dict[str, Any]:
             _tie(effect, other, p, d) for other, p in sorted(alike.items(), key=lambda t: -t[1]) if other != label
         ],
         "evidence": _evidence(d, label, effect, worth.value, named_joint, alike),
-        "fitted_on_validate": [p.name for p in effect.parameters if _of_a_run(effect, p.name)],
+        "fitted_on_validate": [p.name for p in effect.parameters if p.per_run],
+        "each_run": d.each_run.get(label, []),
     }
-
-
-def _of_a_run(effect: Effect, name: str) -> bool:
-    return any(p.name == name and p.per_run for p in (*effect.linear, *effect.shape, *(effect.reported or ())))
 
 
 def _rows(frame: pd.DataFrame, effect: Effect) -> list[dict[str, Any]]:
@@ -164,6 +161,8 @@ def _evidence(d: Diagnosis, label: str, effect: Effect, worth: float, joint: str
     ]
     if _may_be_chance(d, label):
         sentences.append("that gain may be chance: its 95 % interval includes nought")
+    if effect.each_run:
+        sentences.append(_set_anew(d, label, effect))
     if label in d.perceived:
         sentences.append(PERCEIVED[effect.name])
     others = {k: p for k, p in d.likely[label].items() if k not in alike}
@@ -176,6 +175,16 @@ def _evidence(d: Diagnosis, label: str, effect: Effect, worth: float, joint: str
     sentences.append(f"it looks like {effect.looks_like}")
     sentences.append(f"to make sure: {effect.confirm}")
     return sentences
+
+
+def _set_anew(d: Diagnosis, label: str, effect: Effect) -> str:
+    """Say what each run has of a cause that is another in every run."""
+    (parameter,) = (p for p in effect.parameters if p.per_run)
+    told = [f"{one['values'][parameter.name]:+.3g} in {one['file']}" for one in d.each_run[label]]
+    return (
+        f"its {parameter.name} is another in each run, as of a joint that is zeroed anew at every start: "
+        f"{', '.join(told)} ({parameter.unit})"
+    )
 
 
 def _may_be_chance(d: Diagnosis, label: str) -> bool:
@@ -291,10 +300,15 @@ def _remains(d: Diagnosis, told: int) -> str:
 
 def _in_words(cause: dict[str, Any]) -> str:
     """Return a cause, those that could stand in its place, and how probable all of these are together."""
-    listed = (cause, *cause["indistinguishable_from"])
-    alike = [in_words(effect_named(one["effect"])(joint=one["joint"])) for one in listed]
+    alike = [in_words(_effect_of(one)) for one in (cause, *cause["indistinguishable_from"])]
     likely = f"{cause['probability']:.2f}"
     if len(alike) == 1:
         return f"{alike[0]} (probability {likely})"
     *most, last = [*alike[:MENTIONED], *([f"{len(alike) - MENTIONED} more"] if len(alike) > MENTIONED else [])]
     return f"{', '.join(most)} or {last}, which these data cannot tell apart (together {likely})"
+
+
+def _effect_of(told: dict[str, Any]) -> Effect:
+    """Return the effect of a cause, or of one that could stand in its place, as the verdict tells it."""
+    effect = effect_named(told["effect"])
+    return effect(joint=told["joint"], each_run=effect.may_differ and bool(told.get("each_run")))

@@ -72,6 +72,11 @@ class Parameter:
     of_joint: bool = True
     """False where its unit is not the joint's: the phase of a rhythm is an angle at a prismatic joint too."""
 
+    @property
+    def neutral(self) -> float:
+        """Value at which its effect is not there; of a stiffness, the end that it never reaches."""
+        return 1.0 if self.unit == "1" and self.typical[0] > 0 else 0.0
+
     def at(self, machine: Machine, joint: str) -> "Parameter":
         """Return the parameter as it is at a joint of a machine."""
         if not self.of_joint:
@@ -94,6 +99,8 @@ class Effect(ABC):
     """The only kind of run whose torque it explains; None for all it acts in."""
     on: Machine = THE_LEG
     """The machine that has it."""
+    each_run: bool = False
+    """True where its shape is another in every run; only of effects that ``may_differ``."""
 
     name: ClassVar[str]
     title: ClassVar[str]
@@ -132,6 +139,8 @@ class Effect(ABC):
     """kg·m² on the motor's side of ``spring``."""
     known_to: ClassVar[float] = 0.0
     """Relative standard error that the effect's approximation of itself adds to its first shape, whatever the data."""
+    may_differ: ClassVar[bool] = False
+    """True where what it is may change from run to run and not within one: what is set anew at every start."""
     at_cuff: ClassVar[bool] = False
     """True where ``spring`` stands between machine and limb, not between motor and link."""
     swings: ClassVar[bool] = False
@@ -144,12 +153,14 @@ class Effect(ABC):
     torque_reading: ClassVar[Callable[..., Any] | None] = None
 
     def __post_init__(self) -> None:
-        """Say in the machine's own units and equations what the class says of a leg."""
+        """Say in the machine's own units and equations what the class says of a leg, and what each run has."""
+        if self.each_run:
+            object.__setattr__(self, "shape", tuple(replace(p, per_run=True) for p in type(self).shape))
         if self.on == THE_LEG:
             return
         if self.joint:
             for role in ("linear", "shape", "reported"):
-                declared = getattr(type(self), role)
+                declared = getattr(self, role)
                 made = declared and tuple(p.at(self.on, self.joint) for p in declared)
                 object.__setattr__(self, role, made)
         if self.name in THE_LEG.mechanism.reactions:
@@ -197,6 +208,11 @@ class Effect(ABC):
     def per_run(self) -> bool:
         """Tell whether each run has some value of it for itself, as an onset or a phase."""
         return any(p.per_run for p in self.fitted)
+
+    @property
+    def goes_with_time(self) -> bool:
+        """Tell whether its torque goes with wall time, as a rhythm's and a drift's do: more than a zero set anew."""
+        return self.per_run and not self.each_run
 
     @property
     def rings(self) -> bool:

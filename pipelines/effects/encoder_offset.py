@@ -9,7 +9,7 @@ from pipelines.mechanics.motion import Motion
 
 
 class EncoderOffset(Effect):
-    """The measured angle is the true one plus a constant."""
+    """The measured angle is the true one plus a constant; another at each start, where the joint is zeroed there."""
 
     name = "encoder_offset"
     title = "Encoder offset"
@@ -19,6 +19,7 @@ class EncoderOffset(Effect):
     looks_like = "gravity torque that leads or lags the angle: a residual like the cosine of the link's angle"
     confirm = "let the machine hang freely, its links in line, and read its angles: each should be zero"
     by_angle = True
+    may_differ = True
     shape = (Parameter("offset", "rad", "measured less true angle", "q_o", (-0.15, 0.15)),)
 
     @reading

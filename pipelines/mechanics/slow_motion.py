@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.mechanics.motion import Motion
 from pipelines.signals.low_pass import derivative, low_pass, shortest
@@ -16,20 +17,35 @@ def edge(rate_hz: float, cutoff_hz: float) -> int:
     return int(np.ceil(EDGE_PERIODS * rate_hz / cutoff_hz))
 
 
+def at_edges(motion: Motion, cutoff_hz: float) -> NDArray:
+    """Tell which samples a filter lacks one side of, (n,) bool; all of a stretch that is too short for it."""
+    rate = motion.sample_rate_hz
+    unsure, near = edge(rate, cutoff_hz), np.zeros(len(motion), dtype=bool)
+    for stretch in motion.segments():
+        if stretch.stop - stretch.start < shortest(rate, cutoff_hz):
+            near[stretch] = True
+        near[stretch.start : stretch.start + unsure] = True
+        near[max(stretch.start, stretch.stop - unsure) : stretch.stop] = True
+    return near
+
+
+def filtered(motion: Motion, x: NDArray, cutoff_hz: float) -> NDArray:
+    """Return what (n, ...) along a motion holds below a cut-off."""
+    slow = np.array(x, dtype=float)
+    for stretch in motion.segments():
+        if stretch.stop - stretch.start >= shortest(motion.sample_rate_hz, cutoff_hz):
+            slow[stretch] = low_pass(slow[stretch], motion.sample_rate_hz, cutoff_hz)
+    return slow
+
+
 def below(motion: Motion, cutoff_hz: float) -> Motion:
     """Return what a motion holds below a cut-off; it must have been faster."""
     rate = motion.sample_rate_hz
-    q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
-    valid = motion.valid.copy()
-    unsure = edge(rate, cutoff_hz)
+    q, dq, ddq = filtered(motion, motion.q, cutoff_hz), motion.dq.copy(), motion.ddq.copy()
     for stretch in motion.segments():
-        if stretch.stop - stretch.start < shortest(rate, cutoff_hz):
-            valid[stretch] = False
-            continue
-        q[stretch] = low_pass(motion.q[stretch], rate, cutoff_hz)
-        dq[stretch], ddq[stretch] = (derivative(q[stretch], rate, order) for order in (1, 2))
-        valid[stretch.start : stretch.start + unsure] = False
-        valid[max(stretch.start, stretch.stop - unsure) : stretch.stop] = False
+        if stretch.stop - stretch.start >= shortest(rate, cutoff_hz):
+            dq[stretch], ddq[stretch] = (derivative(q[stretch], rate, order) for order in (1, 2))
+    valid = motion.valid & ~at_edges(motion, cutoff_hz)
     return replace(
         motion, q=q, dq=dq, ddq=ddq, valid=valid, cutoff_hz=cutoff_hz,
         # What a fit to the faster motion estimated is not that of this one.

@@ -80,7 +80,9 @@ def all_columns(bank: Bank) -> list[NDArray]:
     """Return the columns that were multiplied out, (m, O, c) for each training run."""
     untouched = [run.average(bank.baseline.columns(run.motion, run.motion, run.motion)) for run in bank.runs]
     made = [
-        expanded(signatures(c, bank.runs, bank.baseline, untouched, bank.weights), c, bank.runs)
+        expanded(
+            signatures(c, bank.runs, bank.baseline, untouched, bank.weights), c.effect, c.signature_apart, bank.runs
+        )
         for c in bank.candidates
     ]
     return [np.concatenate([untouched[r], *(one[r] for one in made)], axis=2) for r in range(len(bank.runs))]
