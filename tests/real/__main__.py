@@ -40,7 +40,10 @@ def measured(found: dict[str, Diagnosed], data: Path) -> dict[str, str]:
         made["timing"] = tables.timing(found)
     if "A0-fourier" in found:
         made["A0-orders"] = tables.by_order(found["A0-fourier"])
+        made["A0-reversals"] = tables.reversals(found["A0-fourier"])
     for key, one in found.items():
+        if any(cause["each_run"] for cause in one.verdict["causes"]):
+            made[f"{key}-each-run"] = tables.of_each_run(one)
         made |= {f"{key}-depends": tables.depends(one), f"{key}-says": f"> {one.verdict['summary']}"}
     return made
 

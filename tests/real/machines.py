@@ -14,12 +14,15 @@ from pipelines.contracts import PARAMETERS
 from pipelines.dynamics.replay import replay
 from pipelines.effects.rotor_inertia import RotorInertia
 from pipelines.effects.torque_offset import TorqueOffset
+from pipelines.label import cause_label
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.read import read_motions
-from pipelines.model import Model, Term, baseline, model_from_parameters
+from pipelines.model import Model, Term, baseline, model_from_parameters, term_from
 from pipelines.settings.datasets import datasets
 from pipelines.settings.filter import FilterSettings
+from pipelines.signals.low_pass import ORDER
+from tests.real.relative_error import slow_values
 
 
 @dataclass(frozen=True)
@@ -81,12 +84,40 @@ class Diagnosed:
 
     @property
     def model(self) -> Model:
-        """The extended model."""
+        """The extended model, with what each run has for itself as in the first."""
         return model_from_parameters(self.parameters, self.motions[0].run, self.motions[0].machine)
+
+    def model_of(self, motion: Motion) -> Model:
+        """Return the extended model with what a run has for itself."""
+        own = {
+            cause_label(cause): one["values"]
+            for cause in self.verdict["causes"]
+            for one in cause["each_run"]
+            if one["file"] == motion.file
+        }
+        return Model(tuple(_with_values(term, own.get(term.effect.label, {})) for term in self.model))
+
+    def refitted(self, order: int = ORDER) -> dict[str, Model]:
+        """Return the extended model of each run, by its file, by least squares below 5 Hz on the runs to train on.
+
+        What a run has for itself stays what the diagnosis found.
+        """
+        of_runs = {motion.file: self.model_of(motion) for motion in self.motions}
+        own = {cause_label(cause) for cause in self.verdict["causes"] if cause["each_run"]}
+        free = [effect.label not in own for effect, _ in self.model.linear_parameters]
+        trained = of_purpose(self.motions, "train")
+        values = slow_values([of_runs[motion.file] for motion in trained], trained, free, order)
+        return {file: model.with_linear(np.where(free, values, model.linear_values)) for file, model in of_runs.items()}
 
     def strayed(self, motion: Motion) -> NDArray:
         """Return the rms angle error (J,) of 1 s simulations of the extended model under a run's torque."""
-        return replay(self.model, motion).rmse
+        return replay(self.model_of(motion), motion).rmse
+
+
+def _with_values(term: Term, values: dict[str, float]) -> Term:
+    """Return a term with some of its parameters at other values, by the names that files use."""
+    names = [p.name for p in term.effect.parameters]
+    return term_from(term.effect, dict(zip(names, term.effect.physical(term.values), strict=True)) | values)
 
 
 def diagnosed(logs: Logs, data: Path, folder: Path, figures: bool = False) -> Diagnosed:

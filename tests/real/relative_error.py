@@ -56,9 +56,26 @@ def slow_error(predicted: NDArray, motion: Motion, order: int = ORDER) -> Torque
 
 def slow_fit(model: Model, motions: Sequence[Motion], order: int = ORDER) -> Model:
     """Return the model by ordinary least squares below 5 Hz, as the README of the data fits it."""
-    A = np.concatenate([_slow(model.regressor(motion), motion, order) for motion in motions])
-    b = np.concatenate([_slow(motion.torque, motion, order) for motion in motions])
-    return model.with_linear(np.linalg.lstsq(A.reshape(-1, A.shape[-1]), b.ravel(), rcond=None)[0])
+    return model.with_linear(slow_values([model] * len(motions), motions, [True] * len(model.linear_parameters), order))
+
+
+def slow_values(
+    models: Sequence[Model], motions: Sequence[Motion], free: Sequence[bool], order: int = ORDER
+) -> NDArray:
+    """Return the linear values (p,) of models, one for each motion, by ordinary least squares below 5 Hz.
+
+    Those that are not ``free`` stay what they are in each run.
+    """
+    chosen = np.asarray(free)
+    parts, rights = [], []
+    for model, motion in zip(models, motions, strict=True):
+        columns, values = model.regressor(motion), model.linear_values
+        parts.append(_slow(columns[:, :, chosen], motion, order))
+        rights.append(_slow(motion.torque - columns[:, :, ~chosen] @ values[~chosen], motion, order))
+    A, b = np.concatenate(parts), np.concatenate(rights)
+    values = models[0].linear_values.copy()
+    values[chosen] = np.linalg.lstsq(A.reshape(-1, A.shape[-1]), b.ravel(), rcond=None)[0]
+    return values
 
 
 def fitted(model: Model, motion: Motion) -> Model:

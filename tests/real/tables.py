@@ -2,15 +2,21 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.effects.presliding_hysteresis import PreslidingHysteresis
+from pipelines.label import cause_label
 from pipelines.mechanics.motion import Motion
+from pipelines.model import Model, effect_named
 from tests.real.machines import LOGS, Diagnosed, of_purpose, symmetric, with_rotor
 from tests.real.published import EMPS, EMPS_ERRORS, double_pendulum, their_torque
 from tests.real.relative_error import TorqueError, decimated_error, fitted, slow_error, slow_fit
 
+TRAVELS = np.concatenate([[0.0], np.geomspace(1e-5, 0.03, 36)])
+"""rad or m over which friction may build up; 0 where it does so at once."""
 SHIFTS_S = np.linspace(-0.012, 0.012, 13)
 """By which a prediction is moved along the stamps; positive where the angles are older than their stamps."""
 
@@ -29,17 +35,20 @@ def verdicts(found: Mapping[str, Diagnosed]) -> str:
 
 def _verdict(title: str, d: Diagnosed) -> tuple[str, ...]:
     told = d.verdict
-    causes = [
-        f"{c['effect']}@{c['joint']}" + "".join(f" or {t['effect']}@{t['joint']}" for t in c["indistinguishable_from"])
-        + f" ({c['probability']:.2f})"
-        for c in told["causes"]
-    ]  # fmt: skip
+    causes = [f"{_label(c)} ({c['probability']:.2f})" for c in told["causes"]]
     units = {joint: unit["torque"] for joint, unit in told["units"].items()}
 
     def errors(key: str) -> str:
         return ", ".join(f"{told[key][joint]:.3g} {unit}" for joint, unit in units.items())
 
     return title, told["status"], "; ".join(causes) or "–", errors("baseline_rmse_nm"), errors("extended_rmse_nm")
+
+
+def _label(cause: Mapping[str, Any]) -> str:
+    """Return a cause's label and those of what could stand in its place."""
+    labels = [cause_label(one) for one in (cause, *cause["indistinguishable_from"])]
+    set_anew = effect_named(cause["effect"]).may_differ and bool(cause["each_run"])
+    return "per-run " * set_anew + " or ".join(labels)
 
 
 def emps(found: Mapping[str, Diagnosed]) -> str:
@@ -82,13 +91,13 @@ def pendulum(name: str, found: Mapping[str, Diagnosed], data: Path) -> str:
         if not key.startswith(name):
             continue
         trained = of_purpose(d.motions, "train")
-        plain, refitted = slow_fit(with_rotor(d.motions[0]), trained), slow_fit(d.model, trained)
+        plain, refitted = slow_fit(with_rotor(d.motions[0]), trained), d.refitted()
         for motion in d.motions:
             predicted = (
                 their_torque(theirs, motion),
                 plain.torque(motion),
-                d.model.torque(motion),
-                refitted.torque(motion),
+                d.model_of(motion).torque(motion),
+                refitted[motion.file].torque(motion),
             )
             errors = [text for torque in predicted for text in _both(slow_error(torque, motion))]
             rows.append((motion.file.removesuffix(".parquet"), motion.purpose, *errors))
@@ -102,14 +111,77 @@ def by_order(d: Diagnosed) -> str:
     trained, (held_out,) = of_purpose(d.motions, "train"), of_purpose(d.motions, "validate")
     rows = []
     for order in (1, 2, 3, 4):
-        plain, refitted = (slow_fit(model, trained, order) for model in (with_rotor(trained[0]), d.model))
-        errors = [slow_error(model.torque(held_out), held_out, order).percent for model in (plain, d.model, refitted)]
+        plain = slow_fit(with_rotor(trained[0]), trained, order)
+        errors = [slow_error(plain.torque(motion), motion, order).percent for motion in (*trained, held_out)]
+        for model in (d.model_of(held_out), d.refitted(order)[held_out.file]):
+            errors.append(slow_error(model.torque(held_out), held_out, order).percent)
         rows.append((str(order), *(" / ".join(f"{e:.1f}" for e in error) for error in errors)))
-    return table(("order of the filter", "least squares, %", "extended, %", "refitted, %"), rows)
+    headings = ("order of the filter", "least squares, 70 %, %", "least squares, %", "extended, %", "refitted, %")
+    return table(headings, rows)
+
+
+def built_up(named: Mapping[str, Model], motion: Motion, travels: Sequence[float]) -> NDArray:
+    """Return the torque (n, J) of a run's model whose Coulomb friction builds up over a travel after each reversal."""
+    model = named[motion.file]
+    torque = model.torque(motion)
+    for (effect, parameter), value in zip(model.linear_parameters, model.linear_values, strict=True):
+        if parameter.name == "coulomb":
+            j = motion.joints.index(effect.joint)
+            if travels[j] > 0.0:
+                share = PreslidingHysteresis(effect.joint, on=motion.machine).columns(motion, (travels[j],))[:, j, 0]
+                torque[:, j] += value * (share - np.sign(motion.dq[:, j]))
+    return torque
+
+
+def reversals(d: Diagnosed) -> str:
+    """Return what friction that builds up after each reversal, over a travel that training tells, would take away."""
+    named = {motion.file: d.model_of(motion) for motion in d.motions}
+    trained, held_out = of_purpose(d.motions, "train"), of_purpose(d.motions, "validate")
+    joints = d.motions[0].joints
+
+    def over(travels: Sequence[float], among: Sequence[Motion]) -> NDArray:
+        return np.mean([slow_error(built_up(named, motion, travels), motion).percent for motion in among], axis=0)
+
+    tried = np.array([over([travel] * len(joints), trained) for travel in TRAVELS])
+    best = TRAVELS[tried.argmin(axis=0)]
+    rows = [
+        (
+            joint,
+            f"{1e3 * best[j]:.1f}",
+            *(f"{over(t, among)[j]:.2f}" for among in (trained, held_out) for t in (0.0 * best, best)),
+        )
+        for j, joint in enumerate(joints)
+    ]
+    unit = d.motions[0].machine.joints[0].unit("angle")
+    headings = (
+        "joint",
+        f"travel, m{unit}",
+        "at once, trained on, %",
+        "over the travel, %",
+        "at once, held out, %",
+        "over the travel, %",
+    )
+    return table(headings, rows)
 
 
 def _both(error: TorqueError) -> tuple[str, str]:
     return " / ".join(f"{e:.3f}" for e in error.rms), " / ".join(f"{e:.1f}" for e in error.percent)
+
+
+def of_each_run(d: Diagnosed) -> str:
+    """Return what each run has for itself of the named causes."""
+    own = [cause for cause in d.verdict["causes"] if cause["each_run"]]
+    headings = [
+        f"{name} of {cause_label(cause)}, {unit}"
+        for cause in own for name in cause["each_run"][0]["values"]
+        for unit in [p["unit"] for p in cause["parameters"] if p["name"] == name]
+    ]  # fmt: skip
+    rows = [
+        (one["file"].removesuffix(".parquet"), one["purpose"],
+         *(f"{v:+.3f}" for cause in own for v in cause["each_run"][k]["values"].values()))
+        for k, one in enumerate(own[0]["each_run"])
+    ]  # fmt: skip
+    return table(("run", "for", *headings), rows)
 
 
 def timing(found: Mapping[str, Diagnosed]) -> str:
@@ -117,7 +189,7 @@ def timing(found: Mapping[str, Diagnosed]) -> str:
     rows = []
     for d in found.values():
         for motion in d.motions if len(d.motions[0].joints) == 2 else []:
-            predicted = d.model.torque(motion)
+            predicted = d.model_of(motion).torque(motion)
             errors = np.array([slow_error(_shifted(predicted, motion, s), motion).rms for s in SHIFTS_S])
             best = errors.argmin(axis=0)
             gain = 1.0 - errors.min(axis=0) / errors[len(SHIFTS_S) // 2]
