@@ -210,11 +210,11 @@ def _signals() -> Iterator[list[str]]:
     }  # fmt: skip
     # Windows knows two of them.
     names = {signal.Signals[name]: word for name, word in told.items() if name in signal.Signals.__members__}
-    came, late, before = list[str](), list[int](), {}
+    came, late, before = list[str](), list[signal.Signals](), {}
 
     def hear(number: int, frame: object) -> None:
-        came.append(names[signal.Signals(number)])
-        late.append(number)
+        late.append(signal.Signals(number))
+        came.append(names[late[-1]])
 
     with suppress(ValueError):  # outside a process's main thread nobody can catch signals, and nobody is sent them
         for number in names:

@@ -4,6 +4,7 @@ import json
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from pipelines.acquisition.acquire import acquire
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.loop import Progress
 from pipelines.contracts import RECORDING
-from pipelines.errors import DeviceError, InputError, SettingsError
+from pipelines.errors import DeviceError, ExoidError, SettingsError
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import RigSettings
 
@@ -73,22 +74,18 @@ def guided(rig: RigSettings, start: Sequence[float], rate_hz: float, run: str) -
     run : str
         ``exo_alone`` or ``with_human``.
     """
-    folder = Path(tempfile.mkdtemp(prefix="exoid-check-"))
-    rig_file, excitation, output = folder / "rig.toml", folder / "excitation.toml", folder / "guided.parquet"
-    rig_file.write_text(_toml_file(_tight(rig, start)))
-    excitation.write_text(_toml_file(_motion(start)))
     settings = RunSettings(name="guided", run=run, purpose="train", duration_s=2 * PERIOD_S)
     seen: list[Progress] = []
     try:
-        acquire(rig_file, settings, excitation, output, rate_hz, report=seen.append)
-    except InputError:  # nothing has moved, and nothing is in the folder that anybody may want
-        shutil.rmtree(folder)
-        raise
-    except DeviceError as error:  # the folder stays: the message names a file in it
+        with _folder() as folder:
+            rig_file, excitation, output = folder / "rig.toml", folder / "excitation.toml", folder / "guided.parquet"
+            rig_file.write_text(_toml_file(_tight(rig, start)))
+            excitation.write_text(_toml_file(_motion(start)))
+            acquire(rig_file, settings, excitation, output, rate_hz, report=seen.append)
+            table = RECORDING.read(output)
+    except DeviceError as error:
         return [], [Finding("rig", f"the guided movement was stopped: {error}"), *_first_signs(rig, seen)]
-    table = RECORDING.read(output)
     frame, recorded_hz = table.frame, table.metadata["sample_rate_hz"]
-    shutil.rmtree(folder)
     reference = _sent(np.asarray(frame["time_s"], float), start)
     answers, findings = [], list[Finding]()
     for j, drive in enumerate(rig.drive):
@@ -99,6 +96,19 @@ def guided(rig: RigSettings, start: Sequence[float], rate_hz: float, run: str) -
         answers.append(Answer(drive.joint, float(gains[j]), delay, torque))
         findings += _judged(rig, j, gains, torque)
     return answers, findings
+
+
+@contextmanager
+def _folder() -> Iterator[Path]:
+    """Make a folder for as long as a block lasts; it stays where a message names a file in it, or exoid is at fault."""
+    folder = Path(tempfile.mkdtemp(prefix="exoid-check-"))
+    try:
+        yield folder
+    except (ExoidError, KeyboardInterrupt) as error:
+        if str(folder) not in str(error):
+            shutil.rmtree(folder)
+        raise
+    shutil.rmtree(folder)
 
 
 def _tight(rig: RigSettings, start: Sequence[float]) -> dict[str, Any]:

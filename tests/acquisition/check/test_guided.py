@@ -5,6 +5,7 @@ import tempfile
 import pytest
 
 from pipelines.acquisition.check import guided
+from pipelines.errors import DeviceError
 
 READ = 'angle = { address = 104, type = "int32", scale = 1e-6, unit = "rad" }'
 WRITE = 'reference = { address = 200, type = "int32", scale = 1e-6, unit = "rad" }'
@@ -77,6 +78,18 @@ def test_a_movement_that_the_rigs_limits_do_not_allow_is_told_beside_all_else_an
     assert "rig: " in told(report) and "rad" in told(report)
     assert len(report.devices) == 6
     assert not list(tmp_path.glob("exoid-check-*"))
+
+
+@pytest.mark.parametrize("named", [False, True], ids=["before the recording", "with samples"])
+def test_a_movement_that_is_stopped_leaves_only_what_the_message_names(checked, tmp_path, monkeypatch, named):
+    def stopped(rig_file, settings, excitation, output, *given, **named_too):
+        raise DeviceError(f"hip drive: no answer; the leg was stopped{f', samples are in {output}' if named else ''}")
+
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(guided, "acquire", stopped)
+    report = checked(options=MOVE, rest_rad="[0.0, 0.0]")
+    assert "rig: the guided movement was stopped: hip drive: no answer" in told(report)
+    assert bool(list(tmp_path.glob("exoid-check-*"))) is named
 
 
 def test_nothing_is_moved_where_something_is_wrong(checked):
