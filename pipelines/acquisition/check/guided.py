@@ -16,7 +16,7 @@ from pipelines.acquisition.acquire import acquire
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.loop import Progress
 from pipelines.contracts import RECORDING
-from pipelines.errors import DeviceError, ExoidError, SettingsError
+from pipelines.errors import DeviceError, ExoidError, InputError, SettingsError
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import RigSettings
 
@@ -100,12 +100,13 @@ def guided(rig: RigSettings, start: Sequence[float], rate_hz: float, run: str) -
 
 @contextmanager
 def _folder() -> Iterator[Path]:
-    """Make a folder for as long as a block lasts; it stays where a message names a file in it, or exoid is at fault."""
+    """Make a folder for as long as a block lasts; it stays where somebody may want what is in it."""
     folder = Path(tempfile.mkdtemp(prefix="exoid-check-"))
     try:
         yield folder
     except (ExoidError, KeyboardInterrupt) as error:
-        if str(folder) not in str(error):
+        # Of what was refused nothing has moved; of what was stopped, the message names the samples, if there are any.
+        if isinstance(error, InputError) or str(folder) not in str(error):
             shutil.rmtree(folder)
         raise
     shutil.rmtree(folder)
