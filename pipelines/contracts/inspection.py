@@ -1,7 +1,7 @@
 """What any exoid file is, where it came from, and what is in it, without knowing beforehand."""
 
 import json
-import tomllib
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ import pyarrow.compute as pc
 
 from pipelines.contracts import checks, contract_of, parquet, verdict
 from pipelines.errors import ContractError
+from pipelines.toml import read_toml
 
 ORIGIN = ("created_by", "created_at", "software", "inputs", "config")
 
@@ -93,7 +94,7 @@ DOCUMENTS = {
 
 
 def _document(path: Path) -> Inspection | None:
-    content = verdict.parsed(path) if path.suffix == ".json" and path.is_file() else _parsed(path, json.loads)
+    content = verdict.parsed(path) if path.suffix == ".json" and path.is_file() else _parsed(path, _read_json)
     if not isinstance(content, dict) or content.get("contract") not in DOCUMENTS:
         return None
     fault = _fault_of(content, path)
@@ -112,16 +113,20 @@ def _fault_of(content: dict[str, Any], path: Path) -> ContractError | None:
 
 
 def _trajectory_toml(path: Path) -> Inspection | None:
-    content = _parsed(path, tomllib.loads)
+    content = _parsed(path, read_toml)
     if not {"a", "b", "omega_rad_s"} <= content.keys():
         return None
     return Inspection(str(path), "trajectory as TOML", "Fourier coefficients of an excitation", {}, content)
 
 
-def _parsed(path: Path, parse: Any) -> dict[str, Any]:
+def _read_json(path: Path) -> Any:
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def _parsed(path: Path, read: Callable[[Path], Any]) -> dict[str, Any]:
     """Return the file's content as an object, empty where it is none."""
     try:
-        content = parse(path.read_text(encoding="utf-8"))
+        content = read(path)
     except (ValueError, FileNotFoundError, IsADirectoryError):
         return {}  # some other kind of file; its own reader says what is wrong with it
     return content if isinstance(content, dict) else {}

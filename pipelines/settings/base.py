@@ -9,6 +9,7 @@ from typing import Any, Self, TypeVar, get_args
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from pipelines.errors import SettingsError
+from pipelines.toml import read_toml
 from pipelines.validation import explain, similar_file
 
 
@@ -54,7 +55,7 @@ def _content(path: Path) -> dict[str, Any]:
     if path.is_dir():
         raise SettingsError(f"{path}: is a folder, expected a TOML file; name the file in it")
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return read_toml(path)
     except tomllib.TOMLDecodeError as error:
         raise SettingsError(f"{path}: is not valid TOML: {error}; mend that line") from error
     except UnicodeDecodeError as error:

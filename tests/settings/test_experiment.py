@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from pipelines.contracts.inspection import inspect
 from pipelines.errors import SettingsError
 from pipelines.settings import Experiment, datasets
 from pipelines.settings.base import models_in
@@ -19,6 +20,15 @@ TABLES = list(sections_of(Experiment))
 
 def test_the_default_file_says_what_the_defaults_are():
     assert Experiment.load(DEFAULT).model_dump() == Experiment().model_dump()
+
+
+def test_a_file_that_begins_with_a_byte_order_mark_is_read_as_any_other(tmp_path):
+    marked = tmp_path / "exoid.toml"
+    marked.write_text(DEFAULT.read_text(encoding="utf-8"), encoding="utf-8-sig")
+    assert Experiment.load(marked).model_dump() == Experiment.load(DEFAULT).model_dump()
+    motion = tmp_path / "motion.toml"
+    motion.write_text("omega_rad_s = 3.0\na = [[0.1]]\nb = [[0.1]]\n", encoding="utf-8-sig")
+    assert inspect(motion).contract == "trajectory as TOML"
 
 
 def test_files_are_named_relative_to_the_experiment(tmp_path):
