@@ -44,6 +44,17 @@ def refuse_unguarded(rig: RigSettings, sample_rate_hz: float) -> None:
             "safety.with_human.cuff_force_n: missing; a run with_human needs its own limit of the force on a cuff, no "
             f"higher than {rig.safety.cuff_force_n:g} N"
         )
+    refuse_seldom_read(rig, sample_rate_hz)
+
+
+def refuse_seldom_read(rig: RigSettings, sample_rate_hz: float) -> None:
+    """Refuse sensors that are asked so seldom that no watchdog would hold.
+
+    Raises
+    ------
+    SettingsError
+        Tells the sensor.
+    """
     for i, sensor in enumerate(rig.sensor):
         if sensor.every > rig.safety.watchdog_s * sample_rate_hz:
             raise SettingsError(

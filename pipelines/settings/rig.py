@@ -46,6 +46,9 @@ MOST_REGISTERS = {"read": 125, "write": 121, "record": 125}
 LONGEST_RAMP_S = 60.0
 """Longest way from rest into a motion, s."""
 
+MOST_EVERY = 1000
+"""Cycles from one reading of a sensor to the next: at 1000 cycles a second as long as the longest watchdog waits."""
+
 MOST_QUEUED = 31
 """Registers that one FC24 answer carries."""
 
@@ -437,7 +440,9 @@ class SensorSettings(DeviceSettings):
     """A cuff force sensor."""
 
     cuff: Literal["thigh_front", "thigh_back", "shank_front", "shank_back"] = Field(description="Where it sits.")
-    every: int = Field(1, ge=1, description="Cycles from one reading to the next; rows between hold no force.")
+    every: int = Field(
+        1, ge=1, le=MOST_EVERY, description="Cycles from one reading to the next; rows between hold no force."
+    )
 
 
 class ControllerSettings(Settings):

@@ -4,6 +4,7 @@ import asyncio
 import logging
 from collections.abc import Iterator
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -17,6 +18,7 @@ from pipelines.acquisition.heartbeat import refuse_short_heartbeat
 from pipelines.acquisition.line_rate import refuse_slow_lines
 from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.pace import urgent
+from pipelines.acquisition.somebody import refuse_seldom_read
 from pipelines.errors import DeviceError, InputError, SettingsError
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import RigSettings, load_rig
@@ -90,9 +92,12 @@ def unfit(rig: RigSettings, rate_hz: float | None) -> Iterator[Finding]:
     """Yield why no run would begin with this rig file at a rate, whatever its devices answer."""
     if rate_hz is None or rig.clock == "lockstep":
         return
-    for refuse in (refuse_slow_lines, refuse_short_heartbeat):
+    for refuse in (
+        partial(refuse_slow_lines, with_sensors=True), partial(refuse_short_heartbeat, with_sensors=True),
+        refuse_seldom_read,
+    ):  # fmt: skip
         try:
-            refuse(rig, rate_hz, with_sensors=True)
+            refuse(rig, rate_hz)
         except SettingsError as error:
             yield Finding("rig", str(error))
 

@@ -194,7 +194,7 @@ def _judged(
 ) -> list[Finding]:
     """Judge the answers of one device: those to itself alone, and those in cycles, sample after sample."""
     findings: list[Finding] = []
-    series = together if len(together.asked) else still
+    series = together if len(together.asked) > 1 else still  # of one answer alone no rate can be told
     assert report.latency
     seconds = float(series.answered[-1] - series.answered[0])
     if probe.in_lockstep and rate_hz:

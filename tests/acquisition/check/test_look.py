@@ -8,7 +8,9 @@ from contextlib import ExitStack
 import pytest
 
 from pipelines.acquisition.check.check import check_rig
+from pipelines.errors import SettingsError
 from pipelines.rig import server
+from pipelines.settings.rig import load_rig
 
 ANGLE = 'angle = { address = 104, type = "int32", scale = 1e-6, unit = "rad" }'
 TIME = 'time = { address = 102, type = "uint32", unit = "us" }'
@@ -152,6 +154,22 @@ def test_a_slow_device_and_a_slow_line_are_found(checked):
     assert "ms to answer, too long for a sample of 40 Hz (25 ms)" in said
     assert "rig: all devices can be asked" in said
     assert "raise `every` of the sensors" in said
+
+
+EVERY = 'map = "force"\n'
+
+
+@pytest.mark.parametrize("shipped", ["plain", "real_time"])
+def test_sensors_that_are_hardly_ever_due_are_judged_by_what_they_told_alone(checked, shipped):
+    report = checked(shipped, served={EVERY: f"{EVERY}every = 1000\n"})
+    assert [finding for finding in report.findings if finding.device.startswith("sensor")] == []
+    seldom = "rig: sensor[0].every: found 1000, which is 25 s at 40 Hz; expected a force at least every 10 s"
+    assert (seldom in told(report)) == (shipped == "real_time")
+
+
+def test_a_sensor_that_would_be_read_less_often_than_any_watchdog_waits_is_refused(rig_file):
+    with pytest.raises(SettingsError, match=r"sensor\[0\]\.every: found 100000, expected .*1000"):
+        load_rig(rig_file(replace={EVERY: f"{EVERY}every = 100000\n"}))
 
 
 @pytest.mark.parametrize("shipped", ["plain", "real_time"])
