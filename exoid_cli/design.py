@@ -53,7 +53,7 @@ def design(
     experiment = settings_in_force(config)
     settings = experiment.design.changed(criterion=criterion, harmonics=harmonics, seed=seed)
     experiment.mechanism.refuse_all_but_the_leg("`exoid design`")
-    geometry = geometry_from(experiment.mechanism) or Geometry()
+    geometry = geometry_from(experiment) or Geometry()
     if evaluate:
         _evaluate(evaluate, settings, geometry)
     elif output:

@@ -116,7 +116,7 @@ def _recorded(files: Sequence[Path], experiment: Any, power: float, report: Any)
     from pipelines.diagnosis.detect import detectability_of_recorded
     from pipelines.mechanics.read import geometry_from, read_motions, refuse_another_mechanism
 
-    motions = read_motions(files, experiment.filter, geometry_from(experiment.mechanism))
+    motions = read_motions(files, experiment.filter, geometry_from(experiment))
     refuse_another_mechanism(experiment.mechanism, motions)
     return detectability_of_recorded(motions, power, report)
 

@@ -56,7 +56,7 @@ def diagnose(
     tables = {"parameters": PARAMETERS, "residuals": RESIDUALS, "candidates": CANDIDATES}
     for name, contract in tables.items():
         contract.refuse_place(output / f"{name}.parquet")
-    motions = read_motions(files, settings.filter, geometry_from(settings.mechanism))
+    motions = read_motions(files, settings.filter, geometry_from(settings))
     refuse_another_mechanism(settings.mechanism, motions)
     open_folder(output)
     with console.progress("diagnosing", 1.0) as report:

@@ -46,7 +46,7 @@ def export(
     chosen = formats[to]
     model = model or place_of(config, lacking="no model is given").step("identify").target
     settings = settings_in_force(config)
-    made = exported(PARAMETERS.read(model), run, geometry_from(settings.mechanism))
+    made = exported(PARAMETERS.read(model), run, geometry_from(settings))
     path = _path(model, output, chosen.suffix)
     with console.working("writing the model"):
         files = {path.with_suffix(suffix): text for suffix, text in chosen.write(made, path.stem).items()}

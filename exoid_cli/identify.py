@@ -61,7 +61,7 @@ def identify(
     files, output = inputs_and_folder("identify", files, output, config, "no motion is given")
     settings = settings_in_force(config)
     estimator = estimator_named(method or settings.identify.method)
-    runs = read_runs(files, settings.filter, geometry_from(settings.mechanism))
+    runs = read_runs(files, settings.filter, geometry_from(settings))
     refuse_another_mechanism(settings.mechanism, runs)
     with console.working("fitting"):
         found = fit(runs, estimator)
@@ -95,7 +95,9 @@ def identify(
 
 
 def _report(found: "Identified", machine: "Machine") -> None:
-    rows, unit = found.parameters.to_dict("records"), machine.joints[0].unit("torque")
+    from pipelines.contracts.joints import either
+
+    rows, unit = found.parameters.to_dict("records"), either(joint.unit("torque") for joint in machine.joints)
     console.emit(
         {
             "parameters": rows,

@@ -85,6 +85,7 @@ def _whose(table: "Table") -> str:
 def _track(table: "Table", run: str, reference: Path | None, settings: "Experiment", output: Path) -> None:
     from pipelines.contracts import SIMULATION, describe
     from pipelines.contracts.atomic import write_text
+    from pipelines.contracts.joints import either
     from pipelines.dynamics.plant import plant_from_table
     from pipelines.dynamics.tracking import track
     from pipelines.errors import InputError
@@ -95,7 +96,7 @@ def _track(table: "Table", run: str, reference: Path | None, settings: "Experime
     from pipelines.workflow.graph import LOOP, SWEEP
 
     chosen = settings.simulate
-    plant = plant_from_table(table, run, geometry_from(settings.mechanism))
+    plant = plant_from_table(table, run, geometry_from(settings))
     if not reference and not plant.machine.is_exoskeleton:
         raise InputError(
             f"{table.path} is of {', '.join(plant.machine.names)}, expected hip and knee: the gait is a leg's; "
@@ -141,9 +142,8 @@ def _track(table: "Table", run: str, reference: Path | None, settings: "Experime
             "sweep": gains.to_dict("records"),
         }
     )
-    first = plant.joints[0]
-    settled = f"largest error after {chosen.settled_after_s:g} s ({first.unit('angle')})"
-    strongest = f"peak torque ({first.unit('torque')})"
+    settled = f"largest error after {chosen.settled_after_s:g} s ({either(j.unit('angle') for j in plant.joints)})"
+    strongest = f"peak torque ({either(j.unit('torque') for j in plant.joints)})"
     console.table(
         ("joint", settled, strongest),
         [(name, f"{e:.4f}", f"{t:.1f}") for name, e, t in zip(names, worst, peak, strict=True)],
@@ -161,7 +161,7 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
     from pipelines.mechanics.read import geometry_from, read_motion
     from pipelines.simulation import recorded
 
-    default = geometry_from(settings.mechanism)
+    default = geometry_from(settings)
     motion = read_motion(recording, settings.filter, default)
     plant = plant_from_table(table, motion.run, motion.geometry)
     with console.working(f"replaying {recording.name}"):
@@ -211,10 +211,13 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
 
 
 def _report_replay(result: dict[str, Any], joints: "tuple[Joint, ...]") -> None:
+    from pipelines.contracts.joints import either
+
+    angle, torque = (either(joint.unit(quantity) for joint in joints) for quantity in ("angle", "torque"))
     headings = {
-        "simulation_rmse_rad": f"1 s windows ({joints[0].unit('angle')})",
-        "closed_loop_rmse_rad": f"closed loop ({joints[0].unit('angle')})",
-        "closed_loop_rmse_nm": f"closed loop ({joints[0].unit('torque')})",
+        "simulation_rmse_rad": f"1 s windows ({angle})",
+        "closed_loop_rmse_rad": f"closed loop ({angle})",
+        "closed_loop_rmse_nm": f"closed loop ({torque})",
     }
     shown = [key for key in headings if key in result]
     console.table(

@@ -19,13 +19,13 @@ ERRORS = {
 
 def show_verdict(said: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
     """Print a verdict/1 document about a machine of these joints."""
-    from pipelines.contracts import HIP_AND_KNEE
+    from pipelines.contracts.joints import HIP_AND_KNEE, either
 
     console.say(said["summary"])
     for caveat in said["caveats"]:
         console.say(f"But {caveat}.")
     console.say("")
-    first, digits = joints[0], ".3f" if tuple(joints) == HIP_AND_KNEE else ".4g"
+    digits = ".3f" if tuple(joints) == HIP_AND_KNEE else ".4g"
     told = {key: words for key, words in ERRORS.items() if key in said}  # of older files one lacks
     console.table(
         ("joint", *told.values(), "excess left"),
@@ -33,7 +33,8 @@ def show_verdict(said: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
             (joint.name, *(f"{said[key][joint.name]:{digits}}" for key in told), _excess_left(said, joint.name))
             for joint in joints
         ],
-        title=f"{first.effort} error on runs no fit has seen, {first.unit('torque')}",
+        title=f"{either(joint.effort for joint in joints)} error on runs no fit has seen, "
+        f"{either(joint.unit('torque') for joint in joints)}",
         numbers=", ".join((*told.values(), "excess left")),
     )
     for cause in said["causes"]:

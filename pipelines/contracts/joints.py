@@ -1,6 +1,6 @@
 """The joints of a machine, and how their columns are named: ``<joint>_<quantity>_<unit>``."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -72,6 +72,16 @@ class Joint:
 
 
 HIP_AND_KNEE = (Joint("hip"), Joint("knee"))
+
+
+def in_words(joints: Iterable[Joint]) -> str:
+    """Return joints with their kinds, as messages have them."""
+    return ", ".join(f"{joint.name} ({joint.kind})" for joint in joints)
+
+
+def either(words: Iterable[str]) -> str:
+    """Return what each joint says, once: ``N`` of slides, ``N or N·m`` of a machine that slides and turns."""
+    return " or ".join(dict.fromkeys(words))
 
 
 def joints_of(metadata: Mapping[str, Any]) -> tuple[Joint, ...]:

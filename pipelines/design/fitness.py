@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pipelines.design.sines import VECTORIZED, sines
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.leg import regressor_rows
+from pipelines.mechanics.mechanisms.leg import regressor_rows
 
 CRITERIA = ("log_det", "condition", "scaled_condition")
 LOG_DET, CONDITION, SCALED_CONDITION = range(3)

@@ -10,9 +10,9 @@ from scipy.signal import lfilter
 from pipelines.errors import InputError
 from pipelines.estimation.regression import away_from_reversals
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.leg import INERTIAL
 from pipelines.mechanics.limits import Margin, margins
 from pipelines.mechanics.machine import THE_LEG
+from pipelines.mechanics.mechanisms.leg import INERTIAL
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.trajectory import Trajectory
 from pipelines.model import Model, Term, baseline

@@ -95,7 +95,8 @@ class Detectable:
     @property
     def unit(self) -> str:
         """Return the unit of its torque, N where the machine slides."""
-        return self.effect.on.joints[0].unit("torque")
+        machine, joint = self.effect.on, self.effect.joint
+        return (machine.joint(joint) if joint else machine.joints[0]).unit("torque")
 
     def size_in_words(self) -> str:
         """Write the smallest size with its unit, as tables and figures have it."""

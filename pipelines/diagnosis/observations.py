@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from pipelines.effects.friction import Friction
 from pipelines.estimation.regression import away_from_reversals, away_from_turns, block_average
-from pipelines.mechanics.leg import LEG, cuff_torque
 from pipelines.mechanics.machine import Machine
+from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque
 from pipelines.mechanics.motion import CUFFS, Motion
 from pipelines.mechanics.slow_motion import at_edges, filtered
 from pipelines.signals.blocks import BlockAverage

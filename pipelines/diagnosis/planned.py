@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.floor import Floor
 from pipelines.effects.friction import Friction
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.leg import LEG
+from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.trajectory import Trajectory
 from pipelines.settings.design import NoiseSettings

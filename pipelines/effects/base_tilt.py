@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from pipelines.effects.effect import Effect, Parameter, Side
 from pipelines.effects.kernel import reading
+from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.motion import Motion
 
 
@@ -24,6 +25,11 @@ class BaseTilt(Effect):
     by_angle = True
     whole_leg = True
     shape = (Parameter("tilt", "rad", "adds to the first joint's absolute angle", "t", (-0.15, 0.15)),)
+
+    @classmethod
+    def possible(cls, machine: Machine) -> list[str | None]:
+        """Return it where the first joint turns: a tilt adds to an angle, not to where a slide stands."""
+        return super().possible(machine) if machine.joints[0].kind == "revolute" else []
 
     @reading
     def reading(angle, values, joint):

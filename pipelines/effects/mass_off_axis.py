@@ -1,7 +1,7 @@
 """A segment whose centre of mass lies beside its axis."""
 
 from pipelines.effects.effect import Effect, Parameter, Parity, Side
-from pipelines.mechanics.leg import LEG
+from pipelines.mechanics.mechanisms.leg import LEG
 
 
 class MassOffAxis(Effect):

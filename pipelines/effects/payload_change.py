@@ -1,7 +1,7 @@
 """A mass that comes or goes during a run."""
 
 from pipelines.effects.effect import Effect, Parameter, Parity, Side
-from pipelines.mechanics.leg import LEG
+from pipelines.mechanics.mechanisms.leg import LEG
 
 
 class PayloadChange(Effect):

@@ -1,12 +1,16 @@
 """The rigid links of the machine, with all that moves along with them."""
 
 from pipelines.effects.effect import Effect, Parameter, Parity, Side
-from pipelines.mechanics.leg import LEG
 from pipelines.mechanics.mechanism import Mechanism
+from pipelines.mechanics.mechanisms.leg import LEG
 
 
 def _parameters(mechanism: Mechanism) -> tuple[Parameter, ...]:
     return tuple(Parameter(p.name, p.unit, p.meaning, p.name, p.typical) for p in mechanism.parameters)
+
+
+def _equation(mechanism: Mechanism) -> str:
+    return f"tau = M(q) ddq + C(q, dq) dq + G(q) = A(q, dq, ddq) ({', '.join(p.name for p in mechanism.parameters)})"
 
 
 class RigidBody(Effect):
@@ -15,7 +19,7 @@ class RigidBody(Effect):
     name = "rigid_body"
     title = "Rigid body"
     side = Side.STRUCTURE
-    equation = "tau = M(q) ddq + C(q, dq) dq + G(q) = A(q, dq, ddq) (X1, X2, X3, X4)"
+    equation = _equation(LEG)
     source = "Lagrange's equations of a planar double pendulum, docs/errata.md"
     looks_like = "what every fit starts with: torque in step with acceleration and with gravity"
     confirm = "weigh the links, or hold the machine still at several angles and read the torque"
@@ -29,3 +33,4 @@ class RigidBody(Effect):
         """Take the machine's own parameters."""
         super().__post_init__()
         object.__setattr__(self, "linear", _parameters(self.on.mechanism))
+        object.__setattr__(self, "equation", _equation(self.on.mechanism))

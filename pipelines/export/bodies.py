@@ -21,9 +21,9 @@ import numpy as np
 from pipelines.contracts import Joint
 from pipelines.errors import InputError
 from pipelines.export.exported import Exported
-from pipelines.mechanics.leg import LEG
 from pipelines.mechanics.mechanism import Mechanism
-from pipelines.mechanics.single import LIFT, PENDULUM, SLIDE, TURNTABLE
+from pipelines.mechanics.mechanisms.leg import LEG
+from pipelines.mechanics.mechanisms.single import LIFT, PENDULUM, SLIDE, TURNTABLE
 
 Vector = tuple[float, float, float]
 
@@ -71,8 +71,8 @@ def bodies(exported: Exported) -> tuple[Body, ...]:
     mechanism = exported.machine.mechanism
     if mechanism not in MADE:
         raise InputError(
-            f"{mechanism.name}: {mechanism.title} has no bodies that exoid could choose masses for, only "
-            f"{', '.join(sorted(known.title for known in MADE))}; export to c, matlab or json, which need no bodies"
+            f"{mechanism.name} ({mechanism.joints_in_words}) has no bodies that exoid could choose masses for; "
+            "export to c, matlab or json, which need no bodies"
         )
     return MADE[exported.machine.mechanism](exported)
 

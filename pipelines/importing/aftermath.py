@@ -4,8 +4,8 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from pipelines.contracts.joints import joints_of
-from pipelines.mechanics.machine import MECHANISMS
+from pipelines.contracts.joints import in_words, joints_of
+from pipelines.mechanics.machine import mechanisms_of
 from pipelines.settings.import_map import ImportMap
 
 NEEDED = {"train": "to fit to", "validate": "to judge on"}
@@ -45,10 +45,10 @@ def lacks(found: Metadata, made: Collection[str], map_path: Path) -> Iterator[st
 
 
 def _unknown_mechanism(told: Mapping[str, Any]) -> str:
-    kinds = tuple(joint.kind for joint in joints_of(told))
-    if any(mechanism.kinds == kinds for mechanism in MECHANISMS):
+    joints = joints_of(told)
+    if mechanisms_of(joints):
         return ""
     return (
-        f"`exoid run` ends at the motions of these: {', '.join(kinds)} make no mechanism that exoid could fit; leave "
+        f"`exoid run` ends at the motions of these: {in_words(joints)} make no mechanism that exoid could fit; leave "
         "joints out of the map"
     )

@@ -5,9 +5,10 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.contracts.joints import in_words
 from pipelines.importing.consistency import MOST, integral_agreement, mean_power
 from pipelines.importing.finding import Finding, counted
-from pipelines.mechanics.machine import MECHANISMS
+from pipelines.mechanics.machine import known_in_words, mechanisms_of
 from pipelines.settings.import_map import ImportMap, JointSettings
 
 ALIKE = 0.5
@@ -30,12 +31,13 @@ def look_at(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Fin
         yield from _slips(columns, joint)
         yield from _too_strong(columns, joint)
     yield from _power(columns, settings.joint)
-    if len(settings.joint) > 1 and settings.geometry.thigh_length_m is None:
+    joints = [joint.joint for joint in settings.joint]
+    known = mechanisms_of(joints)
+    if any(mechanism.has_length for mechanism in known) and settings.geometry.thigh_length_m is None:
         why = "later stages take that of exoid.toml, or of the paper's leg"
         yield Finding("geometry", "no thigh_length_m, from the first joint's axis to the second's", why)
-    kinds = tuple(joint.kind for joint in settings.joint)
-    if not any(mechanism.kinds == kinds for mechanism in MECHANISMS):
-        seen = f"{', '.join(kinds)}: two revolute ones in series or a single one make a mechanism that exoid knows"
+    if not known:
+        seen = f"{in_words(joints)}, and of the mechanisms that exoid knows none has these: {known_in_words()}"
         yield Finding("joints", seen, "kept; exoid filter takes them, exoid identify and exoid diagnose do not")
 
 

@@ -1,19 +1,56 @@
 """A machine: a mechanism whose joints have names, and what is usual at each of them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from importlib import import_module
+from itertools import combinations
+from pkgutil import iter_modules
 from typing import Any
 
-from pipelines.contracts.joints import HIP_AND_KNEE, Joint
+from pipelines.contracts.joints import HIP_AND_KNEE, Joint, in_words
 from pipelines.errors import InputError
+from pipelines.mechanics import mechanisms
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.leg import LEG
 from pipelines.mechanics.mechanism import Mechanism
-from pipelines.mechanics.single import LIFT, PENDULUM, SLIDE, TURNTABLE
+from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.mechanics.units import Scale
 
-MECHANISMS = (LEG, PENDULUM, TURNTABLE, LIFT, SLIDE)
-"""All that there are, in plain sight. Adding one is a file and a line here."""
+
+def _collected() -> tuple[Mechanism, ...]:
+    """Return every mechanism in the files of mechanisms/, in the order of their names, each once.
+
+    Raises
+    ------
+    InputError
+        Where a recording's joints and gravity could be those of two.
+    """
+    names = sorted(module.name for module in iter_modules(mechanisms.__path__))
+    modules = [import_module(f"{mechanisms.__name__}.{name}") for name in names]
+    found = dict.fromkeys(made for module in modules for made in vars(module).values() if isinstance(made, Mechanism))
+    for one, other in combinations(found, 2):
+        gravity = (one.has_gravity, other.has_gravity)
+        if one.kinds == other.kinds and (None in gravity or gravity[0] == gravity[1]):
+            raise InputError(
+                f"two mechanisms have the joints {', '.join(one.kinds)}: {one.name} ({one.joints_in_words}) and "
+                f"{other.name} ({other.joints_in_words}), and no recording could say of which it is; remove one of "
+                "their files from pipelines/mechanics/mechanisms, or let has_gravity tell them apart"
+            )
+    return tuple(found)
+
+
+MECHANISMS = _collected()
+"""All that there are. Adding one is a file in mechanisms/ and nothing else."""
+
+
+def mechanisms_of(joints: Iterable[Joint]) -> tuple[Mechanism, ...]:
+    """Return the mechanisms that have such joints, with gravity and without."""
+    kinds = tuple(joint.kind for joint in joints)
+    return tuple(mechanism for mechanism in MECHANISMS if mechanism.kinds == kinds)
+
+
+def known_in_words() -> str:
+    """Return what mechanisms there are, by what their joints are."""
+    return "; ".join(mechanism.joints_in_words for mechanism in MECHANISMS)
 
 
 @dataclass(frozen=True)
@@ -47,9 +84,9 @@ class Machine:
         return seconds * min(1.0, slowest)
 
     def told(self, geometry: Geometry) -> dict[str, float]:
-        """Return what a file says of the machine's geometry: one joint is at no distance from a second."""
+        """Return what a file says of the machine's geometry: no length where none is in its equations."""
         said = geometry.metadata()
-        return said if len(self.joints) > 1 else {"gravity_m_s2": said["gravity_m_s2"]}
+        return said if self.mechanism.has_length else {"gravity_m_s2": said["gravity_m_s2"]}
 
     def place(self, name: str) -> str:
         """Return what effects call the joint of a name: ``hip`` for a leg's first, whatever it is called."""
@@ -74,12 +111,11 @@ def machine_of(
     InputError
         Where no mechanism has such joints.
     """
-    kinds = tuple(joint.kind for joint in joints)
-    for mechanism in MECHANISMS:
-        if mechanism.kinds == kinds and mechanism.has_gravity in (None, geometry.gravity_m_s2 != 0.0):
+    for mechanism in mechanisms_of(joints):
+        if mechanism.has_gravity in (None, geometry.gravity_m_s2 != 0.0):
             return Machine(mechanism, tuple(joints), scales)
-    found = ", ".join(f"{joint.name} ({joint.kind})" for joint in joints)
     raise InputError(
-        f"{source or 'the machine'} has joints {found}, expected two revolute joints in series or a single "
-        "one, revolute or prismatic: exoid knows no other mechanism; correct the metadata, or record one joint alone"
+        f"{source or 'the machine'} has joints {in_words(joints)} and gravity {geometry.gravity_m_s2:g} m/s², expected "
+        f"those of a mechanism that exoid knows: {known_in_words()}; correct the metadata, record one joint alone, or "
+        "add a mechanism (docs/mechanisms.md)"
     )

@@ -30,9 +30,9 @@ class Mechanism:
     """Joints of given kinds and the rigid bodies between them: J joints, p inertial parameters."""
 
     name: str
-    """``leg`` or ``single``, as exoid.toml has it; what differs by kind of joint or gravity shares it."""
+    """As exoid.toml has it, ``leg``; what differs by kind of joint or gravity shares it."""
     title: str
-    """In a sentence: what machines it stands for."""
+    """What joints it has, and after a colon, if need be, what machines it stands for."""
     kinds: tuple[Kind, ...]
     """Of its joints, from the base on."""
     places: tuple[str, ...]
@@ -54,6 +54,13 @@ class Mechanism:
     program wants them."""
     absorbs: Mapping[str, str] = field(default_factory=dict, hash=False, compare=False)
     """Effects that its own parameters take up whole, by name, and which parameters those are."""
+    has_length: bool = False
+    """Whether the distance between the first two axes, ``thigh_length_m``, is in its equations."""
+
+    @property
+    def joints_in_words(self) -> str:
+        """What joints it has, as messages name it."""
+        return self.title.partition(":")[0]
 
     def regressor(self, q: NDArray, dq: NDArray, ddq: NDArray, geometry: Geometry) -> NDArray:
         """Return A along a motion, (n, J, p): torque (N·m, at a prismatic joint N) per unit of each parameter.

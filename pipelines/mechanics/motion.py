@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from pipelines.contracts.joints import joints_of
 from pipelines.contracts.table import Table
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.leg import cuff_torque
 from pipelines.mechanics.load import Load, load_along
 from pipelines.mechanics.machine import Machine, machine_of
+from pipelines.mechanics.mechanisms.leg import cuff_torque
 from pipelines.mechanics.units import Scale
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 

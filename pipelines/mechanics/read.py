@@ -5,33 +5,61 @@ from dataclasses import replace
 from pathlib import Path
 
 from pipelines.contracts import MOTION, RECORDING, contract_of
+from pipelines.contracts.joints import in_words
 from pipelines.contracts.provenance import sha256
 from pipelines.contracts.table import Rows
-from pipelines.errors import InputError
+from pipelines.errors import InputError, SettingsError, about
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.kinematics import filtered, motion_table
+from pipelines.mechanics.machine import MECHANISMS, mechanisms_of
 from pipelines.mechanics.motion import Motion, motion_from_table
 from pipelines.mechanics.run import Run, StoredRun
 from pipelines.mechanics.scale import on_one_scale
 from pipelines.mechanics.unseen import refuse_seen
+from pipelines.settings.experiment import Experiment
 from pipelines.settings.filter import FilterSettings
 from pipelines.settings.mechanism import MechanismSettings
+from pipelines.validation import suggestion
 
 
-def geometry_from(settings: MechanismSettings) -> Geometry | None:
-    """Return the geometry that exoid.toml gives where a recording is silent; None where it gives none."""
+def geometry_from(experiment: Experiment) -> Geometry | None:
+    """Return the geometry that exoid.toml gives where a recording is silent; None where it gives none.
+
+    Raises
+    ------
+    SettingsError
+        Where its [mechanism] is none that exoid knows.
+    """
+    settings = experiment.mechanism
     if not settings.model_fields_set:
         return None
+    with about(experiment.path):
+        _refuse_unknown_mechanism(settings)
     return Geometry(**settings.geometry)
+
+
+def _refuse_unknown_mechanism(settings: MechanismSettings) -> None:
+    names = list(dict.fromkeys(mechanism.name for mechanism in MECHANISMS))
+    if settings.name not in names:
+        raise SettingsError(
+            f"mechanism.name: found {settings.name!r}, expected a mechanism's name, or a file for a new one "
+            f"(docs/mechanisms.md); {suggestion(settings.name, names)}"
+        )
+    its = dict.fromkeys(mechanism.kinds for mechanism in MECHANISMS if mechanism.name == settings.name)
+    if settings.kinds not in its:
+        others = dict.fromkeys(mechanism.name for mechanism in mechanisms_of(settings.all_joints))
+        raise SettingsError(
+            f"mechanism.joints: found {in_words(settings.all_joints)}, expected {' or '.join(map(', '.join, its))} for "
+            f"{settings.name}; correct the joints{''.join(f', or set name to {name}' for name in others)}"
+        )
 
 
 def refuse_another_mechanism(settings: MechanismSettings, runs: Sequence[Run]) -> None:
     """Refuse runs of another mechanism than exoid.toml speaks of, if it speaks of one."""
     for run in runs if settings.model_fields_set else ():
         if run.machine.mechanism.kinds != settings.kinds:
-            found = ", ".join(f"{joint.name} ({joint.kind})" for joint in run.machine.joints)
             raise InputError(
-                f"{run.file} has joints {found}, expected those of exoid.toml's [mechanism]: "
+                f"{run.file} has joints {in_words(run.machine.joints)}, expected those of exoid.toml's [mechanism]: "
                 f"{', '.join(settings.kinds)}; correct its name and joints, or give no exoid.toml: "
                 "files say themselves what they are of"
             )

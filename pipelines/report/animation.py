@@ -6,12 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.contracts import Table
+from pipelines.contracts.joints import Kind
 from pipelines.report.measured import MODELS, replayed
 from pipelines.report.session import Session
 
 FRAMES_HZ = 50.0
 LONGEST_S = 40.0
 """Of a longer run the stretch is shown in which the first model is furthest off."""
+DRAWN: dict[tuple[Kind, ...], str] = {
+    ("revolute", "revolute"): "leg", ("revolute",): "pendulum", ("prismatic",): "slider",
+}  # fmt: skip
+"""Machines that there is a drawing of, by the kinds of their joints."""
 SHANK_TO_THIGH = 1.05
 """The shank's drawn length: no file tells it, and no torque depends on it."""
 
@@ -22,7 +27,7 @@ class Animation:
 
     run: str
     kind: str
-    """``leg``, ``pendulum`` or ``slider``."""
+    """How the machine is drawn, as in ``DRAWN``."""
     lengths: tuple[float, ...]
     """Of the links as drawn, m; of a slider how far it goes either way."""
     time: NDArray
@@ -33,15 +38,19 @@ class Animation:
 
 
 def animations(session: Session) -> list[Animation]:
-    """Return one for each replayed run of a machine of one or two joints."""
-    joints = session.joints
-    if not joints or len(joints) > 2:
+    """Return one for each replayed run of a machine that can be drawn."""
+    if not drawn_as(session):
         return []
     found = []
     for run, replays in replayed(session).items():
         tables = {model: session.table(one) for model, one in replays.items()}
         found.append(_animation(session, run, tables))
     return found
+
+
+def drawn_as(session: Session) -> str:
+    """Return how a session's machine is drawn; nothing where there is no drawing of it."""
+    return DRAWN.get(tuple(joint.kind for joint in session.joints), "")
 
 
 def _animation(session: Session, run: str, tables: dict[str, Table]) -> Animation:
@@ -71,10 +80,11 @@ def _frames(time: NDArray, off: NDArray) -> NDArray:
 
 
 def _machine(session: Session, table: Table, measured: NDArray) -> tuple[str, tuple[float, ...]]:
-    if session.joints[0].kind == "prismatic":
-        return "slider", (float(np.abs(measured).max()) or 1.0,)
-    if len(session.joints) == 1:
-        return "pendulum", (1.0,)
+    drawn = drawn_as(session)
+    if drawn == "slider":
+        return drawn, (float(np.abs(measured).max()) or 1.0,)
+    if drawn == "pendulum":
+        return drawn, (1.0,)
     geometry = table.metadata.get("plant", {}).get("geometry", {})
     thigh = geometry.get("thigh_length_m") or 0.4
-    return "leg", (thigh, SHANK_TO_THIGH * thigh)
+    return drawn, (thigh, SHANK_TO_THIGH * thigh)

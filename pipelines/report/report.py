@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from pipelines.contracts import Joint
+from pipelines.contracts.joints import either
 from pipelines.label import cause_label
 from pipelines.report import provenance
 from pipelines.report.acquisition import Run
 from pipelines.report.acquisition import runs as recordings
-from pipelines.report.animation import animations
+from pipelines.report.animation import animations, drawn_as
 from pipelines.report.bars import budget, causes_in_words, falls, label_in_words, labels_in_words, ties_of
 from pipelines.report.chart import Chart, thinned_alike
 from pipelines.report.control import control_charts, loops
@@ -115,7 +116,7 @@ def _page(session: Session, title: str | None, output: Path | None, values: int)
         "faults": faults_in_short(verdict) if verdict else ("", 0),
         "with_causes": _with_causes(verdict) if verdict else "",
         "quantity": quantity,
-        "torque_unit": session.joints[0].unit("torque") if session.joints else "N·m",
+        "torque_unit": either(joint.unit("torque") for joint in session.joints) or "N·m",
         "terms": terms(session),
         "mask": (verdict or {}).get("scoring", {}).get("mask") or "slow motion",
         "warnings": [*provenance.stale(session), *provenance.changed_settings(session)],
@@ -137,7 +138,7 @@ def _page(session: Session, title: str | None, output: Path | None, values: int)
         "control": _control(verdict) if verdict else None,
         "control_is_compared": "extended" in loops(session),
         "loops": drawn.control,
-        "is_leg": len(session.joints) == 2,
+        "is_leg": drawn_as(session) == "leg",
         "animations": shown,
         "damaged_verdict": session.has_damaged_verdict,
         "unreadable": list(session.unreadable.values()),
@@ -151,7 +152,7 @@ def _page(session: Session, title: str | None, output: Path | None, values: int)
 
 
 def _quantity(session: Session) -> str:
-    return session.joints[0].effort if session.joints else "torque"
+    return either(joint.effort for joint in session.joints) or "torque"
 
 
 def machine(session: Session, taken: Sequence[Run]) -> str:

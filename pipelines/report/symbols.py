@@ -31,9 +31,7 @@ def terms(session: Session) -> list[Explained]:
     for name, joint in rows:
         effect = bound(session, name, joint)
         if effect and name not in found:
-            of_leg = name == "rigid_body" and len(session.joints) > 1
-            equation = effect.equation if of_leg or name != "rigid_body" else ""
-            found[name] = Explained(effect.title, equation, parameters(effect))
+            found[name] = Explained(effect.title, effect.equation, parameters(effect))
     return list(found.values())
 
 

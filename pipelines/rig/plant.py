@@ -15,7 +15,7 @@ from pipelines.effects.kernel import Instant, reaction_at
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError, SettingsError
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.leg import LEG
+from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.model import Model, Term, effect_named, term_from
 from pipelines.rig.cuffs import cuff_forces
 from pipelines.settings.plant import PlantEffect, PlantSettings

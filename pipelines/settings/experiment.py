@@ -57,6 +57,11 @@ class Experiment(Settings):
         experiment._path = Path(path)
         return experiment
 
+    @property
+    def path(self) -> Path:
+        """The file that it was read from; exoid.toml where there is none."""
+        return self._path
+
     def file(self, name: str) -> Path:
         """Return the path of a file that the settings name."""
         return self._path.parent / name

@@ -1,15 +1,17 @@
 """``[mechanism]``: which mechanism the machine is, and its geometry where a recording does not say its own."""
 
-from typing import Literal, Self
+from typing import Self
 
 from pydantic import Field, model_validator
 
-from pipelines.contracts.joints import Kind
+from pipelines.contracts.joints import HIP_AND_KNEE, Joint, Kind, in_words
 from pipelines.errors import SettingsError
 from pipelines.settings.base import Settings
 from pipelines.settings.bounds import MOST_GRAVITY_M_S2
+from pipelines.validation import suggestion
 
-DEFAULT_NAMES = {"leg": ("hip", "knee"), "single": ("joint",)}
+USUAL_JOINTS = {"leg": HIP_AND_KNEE, "single": (Joint("joint"),)}
+"""Of the mechanisms whose joints may be left out."""
 
 
 class JointSettings(Settings):
@@ -22,12 +24,16 @@ class JointSettings(Settings):
 class MechanismSettings(Settings):
     """The mechanism, and its geometry where a recording does not say its own."""
 
-    name: Literal["leg", "single"] = Field(
-        "leg", description='"leg": two revolute joints in series, any double pendulum. "single": one joint.'
+    name: str = Field(
+        "leg",
+        pattern=r"^[a-z][a-z0-9_]*$",
+        description='"leg": two revolute joints in series, any double pendulum. "single": one joint. '
+        "Or a mechanism of your own, by its name.",
     )
     joints: tuple[JointSettings, ...] = Field(
         (),
-        description="Name and kind of each joint from the base on; without it hip and knee, or one revolute joint.",
+        description="Name and kind of each joint from the base on; a leg without it has hip and knee, a single one "
+        "revolute joint.",
     )
     thigh_length_m: float = Field(
         0.38952, gt=0.0, description="First joint's axis to the second's, hip to knee; the paper's leg."
@@ -40,23 +46,23 @@ class MechanismSettings(Settings):
     )
 
     @model_validator(mode="after")
-    def _joints_make_the_mechanism(self) -> Self:
-        kinds = [joint.kind for joint in self.joints]
-        if self.name == "leg" and kinds not in ([], ["revolute", "revolute"]):
-            raise ValueError(f"joints: found {', '.join(kinds)}, expected two revolute ones, which make a leg")
-        if self.name == "single" and len(kinds) > 1:
-            raise ValueError(f"joints: found {len(kinds)}, expected one")
-        if len({joint.name for joint in self.joints}) < len(kinds):
+    def _joints_are_given(self) -> Self:
+        """Whether they make the mechanism is for those to say who know all there are (``mechanics/read.py``)."""
+        if not self.joints and self.name not in USUAL_JOINTS:
+            raise ValueError(
+                f"name: found {self.name!r} without joints, which only {' and '.join(USUAL_JOINTS)} may leave out; "
+                f"add [[mechanism.joints]], or correct the name: {suggestion(self.name, list(USUAL_JOINTS))}"
+            )
+        if len({joint.name for joint in self.joints}) < len(self.joints):
             raise ValueError("joints: found a name twice, expected each once")
         return self
 
     def refuse_all_but_the_leg(self, command: str) -> None:
         """Refuse what a command that works on hip and knee alone cannot do."""
-        names = tuple(joint.name for joint in self.joints) or DEFAULT_NAMES[self.name]
-        if names != DEFAULT_NAMES["leg"]:
+        if (self.name, self.all_joints) != ("leg", HIP_AND_KNEE):
             raise SettingsError(
-                f"mechanism: found {self.name} with {', '.join(names)}, expected a leg with hip and knee: {command} is "
-                "for these alone; record other machines with their own tools, and give the recordings to "
+                f"mechanism: found {self.name} with {in_words(self.all_joints)}, expected a leg with hip and knee: "
+                f"{command} is for these alone; record other machines with their own tools, and give the recordings to "
                 "`exoid identify` and `exoid diagnose`"
             )
 
@@ -66,7 +72,11 @@ class MechanismSettings(Settings):
         return {"thigh_length_m": self.thigh_length_m, "gravity_m_s2": self.gravity_m_s2}
 
     @property
+    def all_joints(self) -> tuple[Joint, ...]:
+        """Those that are given, else the usual ones."""
+        return tuple(Joint(joint.name, joint.kind) for joint in self.joints) or USUAL_JOINTS[self.name]
+
+    @property
     def kinds(self) -> tuple[Kind, ...]:
         """Of its joints."""
-        named = self.joints or tuple(JointSettings(name=name) for name in DEFAULT_NAMES[self.name])
-        return tuple(joint.kind for joint in named)
+        return tuple(joint.kind for joint in self.all_joints)

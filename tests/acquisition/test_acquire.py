@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from pipelines.acquisition.acquire import acquire
 from pipelines.acquisition.recorded import write_recording
 from pipelines.contracts import RECORDING
-from pipelines.mechanics.leg import cuff_torque
+from pipelines.mechanics.mechanisms.leg import cuff_torque
 from pipelines.mechanics.motion import geometry_of
 from pipelines.mechanics.trajectory import read_trajectory
 from pipelines.rig.plant import Plant

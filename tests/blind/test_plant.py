@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.leg import LEG, cuff_torque, potential_energy
+from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque, potential_energy
 from tests.blind import loop
 from tests.blind.body import PAYLOAD_INERTIA, Body, Payload, Segment
 from tests.blind.excitation import FASTEST, HIGHEST, LOWEST, STEEPEST, random_excitation

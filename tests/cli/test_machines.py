@@ -51,7 +51,7 @@ def test_what_is_for_legs_alone_refuses_a_slide_in_one_line(exoid, recordings, t
     chosen.write_text('[mechanism]\nname = "single"\n[[mechanism.joints]]\nname = "axis"\nkind = "prismatic"\n')
     outcome = exoid("design", "--config", chosen, "-o", tmp_path / "a.parquet")
     assert (outcome.code, len(outcome.err.splitlines())) == (2, 1)
-    assert "mechanism: found single with axis, expected a leg with hip and knee: `exoid design`" in outcome.err
+    assert "mechanism: found single with axis (prismatic), expected a leg with hip and knee: `exoid" in outcome.err
     assert exoid("identify", "--config", chosen, *recordings, "-o", tmp_path / "identified").code == 0
     chosen.write_text('[mechanism]\nname = "leg"\n')
     outcome = exoid("identify", "--config", chosen, *recordings, "-o", tmp_path / "identified")

@@ -14,7 +14,7 @@ from pipelines.diagnosis.faults import excluding, find_faults
 from pipelines.diagnosis.faults.body import averages
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.kinematics import motion_table
-from pipelines.mechanics.leg import LEG
+from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.mechanics.motion import CUFFS, Motion, motion_from_table
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record

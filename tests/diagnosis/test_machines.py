@@ -18,7 +18,8 @@ from pipelines.errors import InputError
 from pipelines.identification import identify
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.kinematics import motion_table
-from pipelines.mechanics.machine import THE_LEG, machine_of
+from pipelines.mechanics.machine import THE_LEG, Machine, machine_of
+from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.mechanics.motion import motion_from_table
 from pipelines.mechanics.scale import on_one_scale
 from pipelines.model import Model, Term, baseline
@@ -113,6 +114,8 @@ def test_only_what_a_machine_can_have_and_show_is_a_candidate():
     gone = {"base_tilt", "mass_off_axis@table", "payload_change@table", "encoder_offset@table", "backlash@table"}
     assert not gone & labels(turntable)
     assert not {"torque_offset@lift", "coulomb_asymmetry@lift"} & labels(lift)
+    crane = Machine(replace(LEG, kinds=("prismatic", "revolute")), (Joint("trolley", "prismatic"), Joint("rod")))
+    assert "base_tilt" not in labels(crane)
     elbow = machine_of([Joint("shoulder"), Joint("elbow")], Geometry(0.3))
     renamed = {label.replace("shoulder", "hip").replace("elbow", "knee") for label in labels(elbow)}
     assert renamed == labels(THE_LEG)

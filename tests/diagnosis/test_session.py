@@ -101,7 +101,9 @@ def test_joints_that_take_turns_are_never_scored_and_refused(motions):
 def test_mechanisms_that_exoid_does_not_know_are_refused(motions):
     telescope = {"joints": [{"name": "hip", "kind": "revolute"}, {"name": "knee", "kind": "prismatic"}]}
     strange = [replace(m, metadata=m.metadata | telescope) for m in motions]
-    with pytest.raises(InputError, match=r"has joints hip \(revolute\), knee \(prismatic\), expected two"):
+    with pytest.raises(
+        InputError, match=r"has joints hip \(revolute\), knee \(prismatic\) and gravity 9\.8 m/s², expected those"
+    ):
         diagnose(strange)
 
 

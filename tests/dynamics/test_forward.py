@@ -12,7 +12,7 @@ from pipelines.effects.presliding_hysteresis import PreslidingHysteresis
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.leg import LEG, potential_energy
+from pipelines.mechanics.mechanisms.leg import LEG, potential_energy
 from pipelines.model import Model, Term
 
 X = np.array([2.6, 0.63, 1.78, 5.7])

@@ -13,7 +13,7 @@ from pipelines.effects.friction import Friction
 from pipelines.effects.joint_elasticity import JointElasticity
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.leg import LEG
+from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.model import Model, Term
 
 X = np.array([10.3016, 3.0157, 2.2664, 5.5354])

@@ -13,8 +13,8 @@ from pipelines.estimation.problem import Problem, Training
 from pipelines.estimation.realizable import Realizable, nearest
 from pipelines.identification import identify
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.leg import LEG
 from pipelines.mechanics.machine import MECHANISMS
+from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.run import Run
 from pipelines.model import Model, Term, baseline

@@ -6,7 +6,7 @@ import pytest
 from pipelines.errors import InputError
 from pipelines.export.bodies import bodies
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.leg import LEG as MECHANISM
+from pipelines.mechanics.mechanisms.leg import LEG as MECHANISM
 from tests.export.machines import LEG, machine, named
 
 LENGTH = 0.41

@@ -11,7 +11,7 @@ import pytest
 from pipelines.contracts.table import Table
 from pipelines.export import FORMATS, JSON, MJCF, URDF, exported
 from pipelines.mechanics.machine import MECHANISMS
-from pipelines.mechanics.single import LIFT, PENDULUM, SLIDE, TURNTABLE
+from pipelines.mechanics.mechanisms.single import LIFT, PENDULUM, SLIDE, TURNTABLE
 from pipelines.model import model_from_parameters
 from tests.export.machines import States, acceleration, torque
 from tests.export.test_mjcf import simulated

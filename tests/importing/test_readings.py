@@ -295,7 +295,9 @@ def test_joints_that_make_no_mechanism_are_told_before_anybody_waits_for_a_fit(i
     outcome = imported(write_csv(columns), map_text=text)
     assert outcome.code == 0, outcome.err
     assert "exoid identify and exoid diagnose do not" in " ".join(outcome.told.split())
-    assert "`exoid run` ends at the motions of these: revolute, revolute, revolute make no mechanism" in outcome.told
+    told = " ".join(outcome.told.split())
+    assert "elbow (revolute), wrist (revolute), and of the mechanisms that exoid knows none has these: two rev" in told
+    assert "`exoid run` ends at the motions of these: pivot (revolute), elbow (revolute), wrist (revolute) make" in told
     assert "does the rest" not in outcome.told
 
 

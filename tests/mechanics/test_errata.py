@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.leg import LEG, potential_energy, regressor_at
+from pipelines.mechanics.mechanisms.leg import LEG, potential_energy, regressor_at
 from pipelines.mechanics.trajectory import read_trajectory
 from pipelines.settings import datasets
 

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.leg import LEG, cuff_torque, potential_energy
+from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque, potential_energy
 
 GEOMETRY = Geometry()
 TABLE3 = np.array([10.3016, 3.0157, 2.2664, 5.5354])

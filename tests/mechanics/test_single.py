@@ -8,9 +8,10 @@ from scipy.integrate import solve_ivp
 from pipelines.contracts.joints import Joint
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.leg import LEG
+from pipelines.mechanics.instant import Instant
 from pipelines.mechanics.machine import MECHANISMS, machine_of
-from pipelines.mechanics.single import LIFT, PENDULUM, SLIDE, TURNTABLE
+from pipelines.mechanics.mechanisms.leg import LEG
+from pipelines.mechanics.mechanisms.single import LIFT, PENDULUM, SLIDE, TURNTABLE
 from pipelines.mechanics.units import UNITS, unit_at
 
 EARTH, LEVEL = Geometry(gravity_m_s2=9.81), Geometry(gravity_m_s2=0.0)
@@ -42,6 +43,17 @@ def test_the_parts_of_a_mechanism_add_up_to_its_regressor(mechanism):
         assert_allclose(parts + mechanism.gravity_torque(q, X, EARTH), whole, atol=1e-12)
 
 
+@every
+def test_the_torque_at_an_instant_is_that_along_a_motion(mechanism):
+    joints, geometry = len(mechanism.kinds), EARTH.array()
+    draw = np.random.default_rng(6)
+    X = draw.uniform(0.5, 3.0, len(mechanism.parameters))
+    for q, dq, ddq in draw.uniform(-2, 2, (20, 3, joints)):
+        torque, none = np.zeros(joints), np.zeros(joints)
+        mechanism.reactions["rigid_body"](Instant(0.0, q, dq, ddq, none, none), np.zeros(0), X, geometry, -1, torque)
+        assert_allclose(torque, mechanism.regressor(q[None], dq[None], ddq[None], EARTH)[0] @ X, atol=1e-12)
+
+
 def test_a_slide_and_a_turntable_are_inertia_alone_and_a_lift_has_weight():
     q, dq, ddq = np.random.default_rng(5).normal(size=(3, 7, 1))
     for mechanism in (SLIDE, TURNTABLE):
@@ -66,7 +78,9 @@ def test_joints_and_gravity_decide_the_mechanism(kinds, geometry, expected):
 
 def test_a_mechanism_that_is_not_known_is_refused_with_what_there_is():
     with pytest.raises(
-        InputError, match=r"a\.parquet has joints x \(prismatic\), y \(revolute\), expected two revolute"
+        InputError,
+        match=r"a\.parquet has joints x \(prismatic\), y \(revolute\) and gravity 9\.81 m/s², expected those of a mech"
+        r"anism that exoid knows: two revolute joints in series, .*; one level prismatic joint; ",
     ):
         machine_of([Joint("x", "prismatic"), Joint("y")], EARTH, "a.parquet")
 

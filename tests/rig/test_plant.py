@@ -5,7 +5,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from pipelines.contracts import RECORDING
 from pipelines.errors import SettingsError
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.leg import LEG, cuff_torque
+from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
 from pipelines.settings.plant import PlantEffect, PlantSettings

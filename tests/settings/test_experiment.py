@@ -79,12 +79,17 @@ def test_the_settings_page_is_current():
         ("[design.bounds.hip]\nvelocity_rad_s = 1\n", "design.bounds.hip.angle_rad: missing; add it"),
         ("run = []", "run: found no run, expected at least one; add a [[run]]"),
         (
-            '[[mechanism.joints]]\nname = "axis"\nkind = "prismatic"\n',
-            "mechanism: joints: found prismatic, expected two revolute ones, which make a leg",
+            '[[mechanism.joints]]\nname = "a"\n[[mechanism.joints]]\nname = "a"\n',
+            "mechanism: joints: found a name twice, expected each once",
         ),
         (
-            '[mechanism]\nname = "single"\n[[mechanism.joints]]\nname = "a"\n[[mechanism.joints]]\nname = "b"\n',
-            "mechanism: joints: found 2, expected one",
+            '[mechanism]\nname = "sinlge"\n',
+            "mechanism: name: found 'sinlge' without joints, which only leg and single may leave out; "
+            "add [[mechanism.joints]], or correct the name: did you mean single?",
+        ),
+        (
+            '[mechanism]\nname = "Stage"\n',
+            "mechanism.name: found 'Stage', expected text matching '^[a-z][a-z0-9_]*$'",
         ),
         (RUN + RUN, "run: found the name a twice, expected each once; rename one run"),
         (RUN.replace("name", "nam"), "run[0].nam: unknown key; did you mean name? (and 1 more)"),

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from pipelines.dynamics.tracking import track
 from pipelines.mechanics.gait import gait
-from pipelines.mechanics.leg import LEG
+from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.settings.simulate import SimulateSettings
 from pipelines.simulation.sweep import sweep
 

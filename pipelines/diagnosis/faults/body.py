@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from pipelines.mechanics.leg import LEG, cuff_torque
+from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque
 from pipelines.mechanics.motion import Motion
 from pipelines.signals.blocks import BlockAverage
 

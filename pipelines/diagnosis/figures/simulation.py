@@ -7,6 +7,7 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pipelines.contracts.joints import either
 from pipelines.diagnosis.diagnose import Diagnosis
 from pipelines.diagnosis.examined import Extended
 from pipelines.diagnosis.figures.palette import AFTER, BEFORE, MEASURED
@@ -50,10 +51,9 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
     for error in axes[1]:
         low, high = error.get_ylim()
         error.set_ylim(max(low, -FAR_MRAD), min(high, FAR_MRAD))
-    # All joints of the mechanisms there are, are of one kind.
-    angle, torque = (said["units"][joints[0]][quantity] for quantity in ("angle", "torque"))
-    first = d.baseline.machine.joints[0]
-    where, push = first.place, first.effort
+    angle, torque = (either(said["units"][joint][quantity] for joint in joints) for quantity in ("angle", "torque"))
+    where = either(joint.place for joint in d.baseline.machine.joints)
+    push = either(joint.effort for joint in d.baseline.machine.joints)
     words = (f"{where}, {angle}", f"{where} error, m{angle}", f"{push}, {torque}", f"{push} error, {torque}")
     for row, label in zip(axes, words, strict=True):
         row[0].set_ylabel(label)

@@ -137,6 +137,7 @@ LEG = Mechanism(
     reactions={"rigid_body": _rigid_body, "mass_off_axis": _mass_off_axis, "payload_change": _payload_change},
     broken=_broken,
     inertia_forms=_inertia_forms,
+    has_length=True,
 )
 
 
