@@ -86,7 +86,7 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
             raise InputError(
                 f"{files}: {the(joint.name)} moves for {lasts:.1f} s (faster than {reversal_speeds(machine)[j]:.2g} "
                 f"{joint.unit('velocity')} and away from reversals), expected {least:.2g} s {together}; "
-                f"excite {'both joints' if len(machine.joints) == 2 else 'it'}, or record longer; "
+                f"excite {('it', 'both joints', 'all joints')[min(len(machine.joints), 3) - 1]}, or record longer; "
                 f"if it did move, check its encoder, and the units of angle and time in {settings_of(motions[0])}"
             )
     if (lasts := _seconds(motions, [m.all(axis=1) for m in moving])) < least:

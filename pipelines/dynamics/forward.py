@@ -97,14 +97,20 @@ def _mass_and_rest(a, w, first, last, t, angle, speed, direction, load, memory, 
 
 
 @njit(cache=True, inline="always")
-def _solve(M, b, x):
-    """Solve M x = b for one or two joints."""
+def _solve(M, b, scratch, x):
+    """Solve M x = b, without a loop for one or two joints; ``scratch`` has room for more."""
     if b.shape[0] == 1:
         x[0] = b[0] / M[0, 0]
-    else:
+    elif b.shape[0] == 2:
         determinant = M[0, 0] * M[1, 1] - M[0, 1] * M[1, 0]
         x[0] = (M[1, 1] * b[0] - M[0, 1] * b[1]) / determinant
         x[1] = (M[0, 0] * b[1] - M[1, 0] * b[0]) / determinant
+    else:
+        for row in range(b.shape[0]):
+            x[row] = b[row]
+            for column in range(b.shape[0]):
+                scratch[row, column] = M[row, column]
+        _eliminate(scratch, x)
 
 
 @njit(cache=True, inline="always")
@@ -162,7 +168,10 @@ def _accelerate_both(a, w, state, drive, rates):
 
 @njit(**HOT)
 def _eliminate(A, b):
-    """Solve A x = b in place by Gaussian elimination with partial pivoting; ``b`` is left holding x."""
+    """Solve A x = b in place by Gaussian elimination with partial pivoting; ``b`` (n,) is left holding x.
+
+    Of a larger ``A`` the first n rows and columns are meant.
+    """
     n = b.shape[0]
     for i in range(n):
         pivot = i
@@ -199,7 +208,7 @@ def _finish(a, w, t, state, memory, direction, load, drive, rates):
             w.push[j] = w.passed[j] - w.rest[j]
             inertia = a.motor_inertia[j] + w.motor_mass[j, j]
             rates[DTHETA, j] = (drive[j] - w.friction[j] - w.passed[j]) / inertia
-    _solve(w.mass, w.push, rates[DQ])
+    _solve(w.mass, w.push, w.both_masses, rates[DQ])
     for j in range(a.joints):
         rates[Q, j] = state[DQ, j]
         rates[THETA, j] = state[DTHETA, j]

@@ -1,17 +1,24 @@
 """Laws that hold whatever the model: energy, standstill, two masses on a spring."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from numba import njit
 from numpy.testing import assert_allclose
 
+from pipelines.contracts import Joint
 from pipelines.dynamics.assembly import assemble
 from pipelines.dynamics.forward import DQ, DTHETA, THETA, Q, memory_size, resting_state, stages, step, workspace
+from pipelines.dynamics.mobility import masses
 from pipelines.effects.friction import Friction
 from pipelines.effects.joint_elasticity import JointElasticity
 from pipelines.effects.presliding_hysteresis import PreslidingHysteresis
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.instant import REACTION
+from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.mechanisms.leg import LEG, potential_energy
 from pipelines.model import Model, Term
 
@@ -55,6 +62,29 @@ def test_a_free_swing_keeps_its_energy():
     swing.go(5.0)
     assert energy(swing.state) == pytest.approx(before, abs=1e-6)
     assert np.ptp(swing.state[DQ]) > 0.1
+
+
+COUPLED = np.array([[9.0, 2.0, 1.0], [2.0, 5.0, -1.5], [1.0, -1.5, 3.0]])
+"""kg, the mass matrix of three slides."""
+
+
+@njit(REACTION)
+def _slides(at, state, values, geometry, joint, out):
+    for j in range(3):
+        for k in range(3):
+            out[j] += values[0] * COUPLED[j, k] * at.ddq[k]
+
+
+def test_a_machine_of_three_joints_goes_as_far_as_newton_has_it():
+    mechanism = replace(LEG, kinds=("prismatic",) * 3, parameters=LEG.parameters[:1], reactions={"rigid_body": _slides})
+    machine = Machine(mechanism, tuple(Joint(name, "prismatic") for name in "xyz"))
+    a = assemble(Model((Term(RigidBody(on=machine), np.array([2.0])),)), GEOMETRY, machine.names)
+    assert_allclose(masses(a)[0], np.broadcast_to(2.0 * COUPLED, (500, 3, 3)))
+    state, force = resting_state(np.zeros(3)), np.array([3.0, -2.0, 5.0])
+    scratch = workspace(3), stages(3, 0)
+    for k in range(100):
+        step(a, *scratch, 0.01 * k, 0.01, state, np.zeros(0), np.zeros(3), force)
+    assert_allclose(state[Q], 0.5 * np.linalg.solve(2.0 * COUPLED, force), rtol=1e-9)
 
 
 def test_viscous_friction_only_takes_energy_until_the_leg_hangs():
