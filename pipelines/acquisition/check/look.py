@@ -115,7 +115,9 @@ async def look(machine: Machine, rate_hz: float | None, *, alone: bool) -> RigRe
         try:
             await _meet(probe, device)
         except DeviceError as error:
-            report.findings.append(_told_by(error, [probe]))
+            finding = _told_by(error, [probe])
+            if finding not in report.findings:  # a line that is lost says so of all its devices
+                report.findings.append(finding)
         else:
             still = probe.taken()
             device.latency = Latency.of(still.answered - still.asked)

@@ -7,8 +7,9 @@ from contextlib import ExitStack
 
 import pytest
 
+from pipelines.acquisition.check import look
 from pipelines.acquisition.check.check import check_rig
-from pipelines.errors import SettingsError
+from pipelines.errors import DeviceError, SettingsError
 from pipelines.rig import server
 from pipelines.settings.rig import load_rig
 
@@ -200,6 +201,14 @@ def test_lines_that_do_not_come_about_are_waited_for_at_once_and_not_one_after_t
         took = time.monotonic() - began
     assert [str(finding).partition(":")[2].count("no TLS connection") for finding in report.findings] == [1] * 6
     assert took < 20.0, "one line takes six seconds, one after the other they would take 36"
+
+
+def test_a_line_that_is_lost_while_its_devices_are_asked_is_told_once(checked, monkeypatch):
+    async def lost(probe, report):
+        raise DeviceError("line leg (127.0.0.1:802): the line is lost, and with it hip drive, knee drive")
+
+    monkeypatch.setattr(look, "_meet", lost)
+    assert told(checked()) == "rig: line leg (127.0.0.1:802): the line is lost, and with it hip drive, knee drive"
 
 
 def test_another_device_is_told_by_its_identity_and_not_judged_further(checked):
