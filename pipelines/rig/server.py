@@ -335,7 +335,7 @@ async def serve(
     Raises
     ------
     SettingsError
-        Where one ``port`` is given for devices on several lines.
+        Where one ``port`` is given for devices on several lines, or on a serial one.
     """
     virtual = VirtualRig(rig, plant, sample_rate_hz)
     on_line: dict[str | int, list[SimDevice]] = defaultdict(list)
@@ -350,6 +350,11 @@ async def serve(
         raise SettingsError(
             f"--port: found {port} for {len(on_line)} lines, expected one line; leave it out for the places that the "
             "rig file names, or give 0 for free ones"
+        )
+    if port and isinstance(line := rig.line.get(str(next(iter(on_line)))), RtuLine):
+        raise SettingsError(
+            f"--port: found {port}, but the rig is on a serial line, {line.serial_port}; leave it out, or give 0 for a "
+            "pseudo-terminal of any name"
         )
     clock = None if virtual.lockstep else asyncio.ensure_future(virtual.keep_time())
     try:

@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 
 import pytest
 
@@ -41,6 +42,19 @@ def test_without_a_terminal_nobody_is_asked_and_nothing_moves(exoid, monkeypatch
     outcome = exoid("rig", "check", datasets() / "rigs" / "plain.toml", option)
     assert outcome.code == 2
     assert words in outcome.err
+
+
+def test_a_rig_on_a_serial_line_has_no_port_to_be_served_at(exoid, tmp_path):
+    rig, link = tmp_path / "rig.toml", tmp_path / "tty"
+    text = (datasets() / "rigs" / "plain.toml").read_text()
+    text = re.sub(r'^(map = ".*)$', r'\1\nline = "bus"', text, flags=re.M)
+    rig.write_text(f'{text}\n[line.bus]\ntransport = "rtu"\nserial_port = "{link}"\n')
+    outcome = exoid("rig", "serve", rig, "--port", 5000)
+    assert (outcome.code, outcome.out) == (2, "")
+    assert outcome.err == (
+        f"exoid: --port: found 5000, but the rig is on a serial line, {link}; leave it out, or give 0 for a "
+        "pseudo-terminal of any name\n"
+    )
 
 
 @pytest.mark.parametrize("address", ["127.0.0.1", "127.0.0.9", "::1", "localhost"])
