@@ -23,6 +23,7 @@ from pipelines.acquisition.lock import Lock, locked
 from pipelines.acquisition.loop import Loop, Progress, Report, run_to_its_end
 from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.pace import urgent
+from pipelines.acquisition.patience import refuse_short_watchdog
 from pipelines.acquisition.plan import check_start, check_trajectory, make_plan
 from pipelines.acquisition.recorded import account_of, place_for, write_recording
 from pipelines.acquisition.resolution import refuse_coarse_set_points
@@ -101,6 +102,7 @@ def acquire(
         refuse_coarse_set_points(rig, sample_rate_hz)
     if rig.clock == "real_time":
         with about(rig_path):
+            refuse_short_watchdog(rig, sample_rate_hz)
             refuse_slow_lines(rig, sample_rate_hz, with_sensors=run.run == "with_human")
             refuse_short_heartbeat(rig, sample_rate_hz, with_sensors=run.run == "with_human")
     RECORDING.refuse_place(output)

@@ -1,5 +1,27 @@
 """How long it is borne that somebody says nothing."""
 
+from pipelines.errors import SettingsError
+from pipelines.settings.rig import RigSettings
+
+FEWEST_SAMPLES = 3
+"""That the watchdog waits for: one that is late and one that is lost are no reason to stop a leg."""
+
+
+def refuse_short_watchdog(rig: RigSettings, sample_rate_hz: float) -> None:
+    """Refuse a watchdog that would bite between two samples.
+
+    Raises
+    ------
+    SettingsError
+        Tells how long it should wait.
+    """
+    least = FEWEST_SAMPLES / sample_rate_hz
+    if rig.safety.watchdog_s < least:
+        raise SettingsError(
+            f"safety.watchdog_s: found {rig.safety.watchdog_s:g}, expected at least {least:.3g}, {FEWEST_SAMPLES} "
+            f"samples at {sample_rate_hz:g} Hz, or it stops every run; raise it"
+        )
+
 
 class Patience:
     """The time since somebody was heard last; instants ``now`` are the host's, s."""

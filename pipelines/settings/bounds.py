@@ -15,6 +15,8 @@ SAFETY = {
 """The most that each may be."""
 MOST_GRAVITY_M_S2 = 30.0
 """More than any planet has; 9.81 in cm/s² is beyond it."""
+MOST_LENGTH_M = 5.0
+"""More than any limb has, and any machine that moves one; 389.52 mm and 38.952 cm are beyond it."""
 STOP_S = 1.0
 """The longest that a stop may take from the highest speed."""
 

@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 from pipelines.contracts.joints import HIP_AND_KNEE, Joint, Kind, in_words
 from pipelines.errors import SettingsError
 from pipelines.settings.base import Settings
-from pipelines.settings.bounds import MOST_GRAVITY_M_S2
+from pipelines.settings.bounds import MOST_GRAVITY_M_S2, MOST_LENGTH_M
 from pipelines.validation import suggestion
 
 USUAL_JOINTS = {"leg": HIP_AND_KNEE, "single": (Joint("joint"),)}
@@ -36,7 +36,10 @@ class MechanismSettings(Settings):
         "revolute joint.",
     )
     thigh_length_m: float = Field(
-        0.38952, gt=0.0, description="First joint's axis to the second's, hip to knee; the paper's leg."
+        0.38952,
+        gt=0.0,
+        le=MOST_LENGTH_M,
+        description="First joint's axis to the second's, hip to knee; the paper's leg.",
     )
     gravity_m_s2: float = Field(
         9.8,

@@ -5,7 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from pipelines.settings.base import Settings
-from pipelines.settings.bounds import MOST_GRAVITY_M_S2
+from pipelines.settings.bounds import MOST_GRAVITY_M_S2, MOST_LENGTH_M
 
 Pair = tuple[float, float]
 Four = tuple[float, float, float, float]
@@ -49,7 +49,7 @@ class PlantSettings(Settings):
     sealed: str | None = Field(
         None, description="File with effects that only the rig reads, relative to this one; see docs/rig.md."
     )
-    thigh_length_m: float = Field(0.38952, gt=0.0, description="Hip axis to knee axis.")
+    thigh_length_m: float = Field(0.38952, gt=0.0, le=MOST_LENGTH_M, description="Hip axis to knee axis.")
     gravity_m_s2: float = Field(9.8, ge=0.0, le=MOST_GRAVITY_M_S2, description="Acceleration of gravity.")
     thigh_cuff_distance_m: float = Field(0.25, gt=0.0, description="Hip axis to thigh cuff.")
     shank_cuff_distance_m: float = Field(0.22, gt=0.0, description="Knee axis to shank cuff.")

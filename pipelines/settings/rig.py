@@ -13,7 +13,7 @@ from pydantic.main import IncEx
 
 from pipelines.errors import SettingsError
 from pipelines.settings.base import Settings, load_toml
-from pipelines.settings.bounds import MOST_GRAVITY_M_S2, refuse_absurd
+from pipelines.settings.bounds import MOST_GRAVITY_M_S2, MOST_LENGTH_M, refuse_absurd
 from pipelines.settings.line import LineSettings, TcpLine
 from pipelines.settings.plant import PlantSettings
 
@@ -244,6 +244,7 @@ class DriveMap(Settings):
                 f"enabled_value: found 0x{self.enabled_value:04X}, expected bits of enabled_mask "
                 f"0x{self.enabled_mask:04X} only; correct one of them"
             )
+        self._refuse_bits_that_tell_nothing()
         counters = {"newest": self.ring.newest, "record.sequence": self.ring.record.sequence} if self.ring else {}
         for name, counter in counters.items():
             if counter and counter.type != self.read.sequence.type:
@@ -252,6 +253,25 @@ class DriveMap(Settings):
                     "read.sequence: it is the same counter"
                 )
         return self
+
+    def _refuse_bits_that_tell_nothing(self) -> None:
+        """Refuse bits by which an enabled drive is not told from a disabled one, or from one with a fault."""
+        if self.enabled_mask and "enabled_value" not in self.model_fields_set:
+            raise ValueError(
+                f"enabled_value: missing beside enabled_mask 0x{self.enabled_mask:04X}, expected what these bits are "
+                "while the drive is enabled, see its manual; give it"
+            )
+        if both := self.enabled_value & self.fault_mask:
+            raise ValueError(
+                f"fault_mask: found 0x{self.fault_mask:04X}, of which 0x{both:04X} is in enabled_value "
+                f"0x{self.enabled_value:04X} too, expected other bits: an enabled drive has no fault; correct one of "
+                "them"
+            )
+        if self.enabled_mask and not self.enabled_mask & ~self.fault_mask:
+            raise ValueError(
+                f"enabled_mask: found 0x{self.enabled_mask:04X}, all of it in fault_mask 0x{self.fault_mask:04X}, "
+                "expected a bit that tells an enabled drive from a disabled one; correct one of them"
+            )
 
     @model_validator(mode="after")
     def _control_words_differ(self) -> Self:
@@ -458,10 +478,10 @@ class ControllerSettings(Settings):
 class GeometrySettings(Settings):
     """Lengths of the leg in this rig; what is left out comes from exoid.toml."""
 
-    thigh_length_m: float | None = Field(None, gt=0.0, description="Hip axis to knee axis.")
+    thigh_length_m: float | None = Field(None, gt=0.0, le=MOST_LENGTH_M, description="Hip axis to knee axis.")
     gravity_m_s2: float | None = Field(None, ge=0.0, le=MOST_GRAVITY_M_S2, description="Acceleration of gravity.")
-    thigh_cuff_distance_m: float | None = Field(None, gt=0.0, description="Hip axis to thigh cuff.")
-    shank_cuff_distance_m: float | None = Field(None, gt=0.0, description="Knee axis to shank cuff.")
+    thigh_cuff_distance_m: float | None = Field(None, gt=0.0, le=MOST_LENGTH_M, description="Hip axis to thigh cuff.")
+    shank_cuff_distance_m: float | None = Field(None, gt=0.0, le=MOST_LENGTH_M, description="Knee axis to shank cuff.")
 
 
 class SafetySettings(Settings):
@@ -561,9 +581,22 @@ class RigSettings(Settings):
         self._refuse_torque_that_is_never_told()
         if self.plant is None:  # nobody is in a virtual one
             refuse_absurd(self)
+        self._refuse_margins_that_leave_no_room()
         self._refuse_impossible_set_points()
         self._refuse_limits_that_registers_cannot_tell()
         return self
+
+    def _refuse_margins_that_leave_no_room(self) -> None:
+        """Refuse a distance from the limits that no set-point can keep."""
+        margin = self.safety.angle_margin_rad
+        for drive in self.drive:
+            for key, limits in (("angle_rad", drive.angle_rad), ("with_human.angle_rad", drive.with_human.angle_rad)):
+                if limits and not margin < (limits[1] - limits[0]) / 2.0:
+                    raise ValueError(
+                        f"safety.angle_margin_rad: found {margin:g}, expected less than "
+                        f"{(limits[1] - limits[0]) / 2.0:g}, half of the {drive.joint}'s {key}, or no set-point keeps "
+                        "it; lower it"
+                    )
 
     def _refuse_impossible_set_points(self) -> None:
         """Refuse registers that cannot hold every set-point, or so coarsely that rounding leads the leg astray."""

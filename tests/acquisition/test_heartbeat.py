@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from pipelines.acquisition.acquire import acquire
+from pipelines.acquisition.check.check import unfit
 from pipelines.acquisition.heartbeat import refuse_short_heartbeat, replies_waited_for
 from pipelines.errors import SettingsError
 from pipelines.settings import datasets
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import load_rig
+from tests.acquisition.conftest import free_port
 from tests.acquisition.simulated import RATE, Event
 from tests.acquisition.test_invariants import FINE_RAD, LINES, RIGS, SOON_S
 from tests.acquisition.test_stopping import run_with, times
@@ -88,3 +90,15 @@ def test_what_the_rig_file_says_of_the_drives_own_watchdogs_counts_and_nothing_e
 @pytest.mark.parametrize("path", sorted((datasets() / "rigs").glob("*.toml")), ids=lambda path: path.stem)
 def test_no_shipped_rig_lets_go_after_a_lost_reply(path):
     refuse_short_heartbeat(load_rig(path), 100.0, with_sensors=True)
+
+
+def test_a_watchdog_that_would_bite_between_two_samples_is_refused_before_anything_is_connected(rig_file, excitation):
+    path = rig_file("real_time", free_port(), watchdog_s=0.01)
+    run = RunSettings(name="test", run="exo_alone", purpose="train", duration_s=1.0)
+    with pytest.raises(SettingsError) as refused:
+        acquire(path, run, excitation, path.with_name("test.parquet"), 200.0)
+    assert str(refused.value) == (
+        f"{path}: safety.watchdog_s: found 0.01, expected at least 0.015, 3 samples at 200 Hz, or it stops every run; "
+        "raise it"
+    )
+    assert "watchdog_s: found 0.01" in str([*unfit(load_rig(path), 200.0)])

@@ -31,6 +31,14 @@ def test_a_file_that_begins_with_a_byte_order_mark_is_read_as_any_other(tmp_path
     assert inspect(motion).contract == "trajectory as TOML"
 
 
+def test_a_thigh_that_no_leg_has_is_refused(tmp_path):
+    (tmp_path / "exoid.toml").write_text("[mechanism]\nthigh_length_m = 389.52\n")
+    with pytest.raises(
+        SettingsError, match=r"mechanism\.thigh_length_m: found 389\.52, expected less than or equal to 5"
+    ):
+        Experiment.load(tmp_path / "exoid.toml")
+
+
 def test_files_are_named_relative_to_the_experiment(tmp_path):
     (tmp_path / "exoid.toml").write_text("")
     assert Experiment.load(tmp_path / "exoid.toml").file("rigs/a.toml") == tmp_path / "rigs" / "a.toml"

@@ -105,6 +105,20 @@ def test_a_virtual_rig_knows_its_geometry_and_its_loops():
         ("halt = 0x010F", "halt = 0x000F", "map.drive.servo: enable and halt: both are 0x000F, expected different "
          "control words; correct one"),
         ('joint = "knee"', 'joint = "hip"', "drive: found hip, hip, expected one for the hip, then one for the knee"),
+        ("enabled_value = 0x0001", "#", "map.drive.servo: enabled_value: missing beside enabled_mask 0x0001, expected "
+         "what these bits are while the drive is enabled, see its manual; give it"),
+        ("fault_mask = 0x0008", "fault_mask = 0x0009", "map.drive.servo: fault_mask: found 0x0009, of which 0x0001 is "
+         "in enabled_value 0x0001 too, expected other bits: an enabled drive has no fault; correct one of them"),
+        ("enabled_mask = 0x0001                  # bits that tell whether the drive is enabled ...\nenabled_value = "
+         "0x0001", "enabled_mask = 0x0008\nenabled_value = 0x0000", "map.drive.servo: enabled_mask: found 0x0008, all "
+         "of it in fault_mask 0x0008, expected a bit that tells an enabled drive from a disabled one; correct one of "
+         "them"),
+        ("angle_margin_rad = 0.02", "angle_margin_rad = 1.05", "safety.angle_margin_rad: found 1.05, expected less "
+         "than 1.05, half of the hip's angle_rad, or no set-point keeps it; lower it"),
+        ("thigh_length_m = 0.38952", "thigh_length_m = 38952", "plant.thigh_length_m: found 38952, expected less than "
+         "or equal to 5"),
+        ("[plant]\n", "[geometry]\nthigh_length_m = 389.52\n[plant]\n", "geometry.thigh_length_m: found 389.52, "
+         "expected less than or equal to 5"),
     ],
 )  # fmt: skip
 def test_a_bad_rig_file_is_refused_in_one_line_with_the_keys_path(tmp_path, old, new, message):

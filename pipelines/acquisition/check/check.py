@@ -18,6 +18,7 @@ from pipelines.acquisition.heartbeat import refuse_short_heartbeat
 from pipelines.acquisition.line_rate import refuse_slow_lines
 from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.pace import urgent
+from pipelines.acquisition.patience import refuse_short_watchdog
 from pipelines.acquisition.somebody import refuse_seldom_read
 from pipelines.errors import DeviceError, InputError, SettingsError
 from pipelines.settings.acquire import RunSettings
@@ -94,7 +95,7 @@ def unfit(rig: RigSettings, rate_hz: float | None) -> Iterator[Finding]:
         return
     for refuse in (
         partial(refuse_slow_lines, with_sensors=True), partial(refuse_short_heartbeat, with_sensors=True),
-        refuse_seldom_read,
+        refuse_short_watchdog, refuse_seldom_read,
     ):  # fmt: skip
         try:
             refuse(rig, rate_hz)
