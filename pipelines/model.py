@@ -159,8 +159,8 @@ def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_
         raise InputError(f"the parameters hold no rigid body for run {run!r}, only for {known}")
     others = frame[~is_body & (frame["run"].isna() | (frame["run"] == run))]
     terms = [
-        _term_from_rows(effect_named(str(name))(joint=joint if isinstance(joint, str) else None, on=machine), rows)
-        for (name, joint), rows in others.groupby(["effect", "joint"], sort=False, dropna=False)
+        _term_from_rows(_effect_of_rows(rows, machine), rows)
+        for _, rows in others.groupby(["effect", "joint"], sort=False, dropna=False)
     ]
     bodies = {str(kind): rows for kind, rows in frame[is_body].groupby("run")}
     if any(term.effect.at_cuff for term in terms) and {"exo_alone", "human"} <= set(bodies):
@@ -171,6 +171,14 @@ def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_
     else:
         parts = [(RigidBody(run=run if run in RUNS else None, on=machine), bodies[run])]
     return Model((*(_term_from_rows(effect, rows) for effect, rows in parts), *terms))
+
+
+def _effect_of_rows(rows: pd.DataFrame, machine: Machine) -> Effect:
+    """Return the effect that a parameters table tells of in some rows, all of one cause."""
+    first = rows.iloc[0]
+    each_run = "each_run" in rows and bool(first["each_run"])
+    joint = first["joint"] if isinstance(first["joint"], str) else None
+    return effect_named(str(first["effect"]))(joint=joint, on=machine, each_run=each_run)
 
 
 def _term_from_rows(effect: Effect, rows: pd.DataFrame) -> Term:

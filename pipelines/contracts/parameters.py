@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from pipelines.contracts.metadata import Geometry, Matrix, TableKeys
-from pipelines.contracts.table import TEXT, Column, Contract
+from pipelines.contracts.table import BOOLEAN, TEXT, Column, Contract
 from pipelines.errors import ContractError
 
 
@@ -51,6 +51,10 @@ PARAMETERS = Contract(
         Column("ci95_high", "", "upper end of the 95 % interval", nullable=True),
         Column("step", "", "the fit it comes from", dtype=TEXT, choices=("friction", "inertia", "extension")),
         Column("effect", "", "rigid_body, friction, or a cause's name", dtype=TEXT),
+        Column(
+            "each_run", "", "whether every run has its own, of which this is the first training run's", dtype=BOOLEAN,
+            required=False,
+        ),
     ),
     metadata=ParametersKeys,
     rules=(_covariance_has_the_rows_shape,),

@@ -31,6 +31,8 @@ def candidates(d: Diagnosis) -> pd.DataFrame:
 
 
 def _row(d: Diagnosis, labels: tuple[str, ...], score: float, ranked: Ranked | None) -> dict[str, Any]:
+    if labels == d.choice.named.labels:  # its zeros may be each run's own, which the search's were not
+        ranked = d.choice.named
     extended = _evaluated(d, labels, ranked)
     row: dict[str, Any] = {
         "causes": list(labels),

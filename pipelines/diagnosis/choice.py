@@ -61,7 +61,7 @@ class Choice:
         """Return the choice with the named set refuted and the next of those as good; None where there is none.
 
         So runs that are never fitted decide only between explanations that are as good as one another. A joint that
-        was by chance zeroed alike before all training runs is still the same cause.
+        was by chance zeroed alike before all training runs is still the same cause, and explains them as well.
         """
         if self.anew is not None:
             return replace(self, named=self.anew, freer=None, anew=None)
@@ -141,7 +141,10 @@ def _anew(named: Ranked, scorer: Scorer, empty: Fit) -> Ranked | None:
     own = {c.label: c for c in scorer.bank.candidates if c.effect.each_run}
     causes = [own.get(cause.label, cause) for cause in named.fit.causes]
     alike = all(ours.effect == theirs.effect for ours, theirs in zip(causes, named.fit.causes, strict=True))
-    return None if alike else _ranked(scorer, causes, empty)
+    if alike:
+        return None
+    made = _ranked(scorer, causes, empty)
+    return None if made.fit.is_absurd(scorer.bank.baseline) else made
 
 
 def _freer(level: dict[tuple[str, ...], Scored], named: Ranked) -> list[Scored]:

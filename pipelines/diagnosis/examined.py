@@ -51,11 +51,15 @@ class Extended:
         """What is left in averages over 0.1 s."""
         return slow_error(self.runs, self.residuals)
 
+    @property
+    def whole(self) -> list[NDArray]:
+        """What is left, (m, O) of each run, with what of the torque is faster than what was looked at."""
+        return [run.with_fast(left) for run, left in zip(self.runs, self.residuals, strict=True)]
+
     @cached_property
     def tone(self) -> NDArray:
         """(J,) N·m rms of the strongest line at each joint."""
-        whole = [run.with_fast(left) for run, left in zip(self.runs, self.residuals, strict=True)]
-        return strongest_tone(self.runs, whole)[: len(self.runs[0].motion.joints)]
+        return strongest_tone(self.runs, self.whole)[: len(self.runs[0].motion.joints)]
 
     @cached_property
     def perceived(self) -> dict[str, float]:
@@ -84,8 +88,8 @@ class Examined:
         after = Extended.of(made, validate, baseline)
         floor = noise_floor(validate, after.residuals)
         standing = _standing(before, after, floor)
-        hums = standing.hums(before.tone, after.tone)
-        wanders = bool(np.any(slow_scatter(validate, after.residuals)[:J] > WANDERING))
+        hums = standing.hums(before.tone, after.tone, noise_floor(validate, after.whole).rms[:J])
+        wanders = bool(np.any(slow_scatter(validate, after.whole)[:J] > WANDERING))
         effects = [cause.effect for cause in made.causes]
         doubtful = hums and not standing.is_minor(after.tone)
         foreign = (doubtful or (wanders and not any(e.goes_with_time for e in effects))) and not standing.rings(effects)

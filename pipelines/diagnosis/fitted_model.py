@@ -10,6 +10,7 @@ from pipelines.diagnosis import tables
 from pipelines.diagnosis.evaluate import settled
 from pipelines.diagnosis.fit import Fit
 from pipelines.diagnosis.observations import Baseline, Run
+from pipelines.diagnosis.scan import NEVER
 from pipelines.diagnosis.uncertainty import Uncertainty
 from pipelines.model import Model, model_from_parameters
 
@@ -31,16 +32,26 @@ def model_of_run(made: Fit, baseline: Baseline, run: Run) -> Model:
     return Model(tuple(replace(t, values=own.get(t.effect.label, t.values)) for t in model))
 
 
-def values_of_each_run(made: Fit, baseline: Baseline, runs: Sequence[Run]) -> dict[str, list[dict[str, Any]]]:
-    """Return what each run has for itself of the causes that have such values, by label, as ``verdict.json`` tells."""
+def _or_null(value: float) -> float | None:
+    """Return a value, or nothing for an instant outside every run: what never came, or was there all along."""
+    return None if abs(value) >= NEVER else float(value)
+
+
+def values_of_each_run(
+    made: Fit, baseline: Baseline, train: Sequence[Run], validate: Sequence[Run]
+) -> dict[str, list[dict[str, Any]]]:
+    """Return what each run has for itself of the causes that have such values, by label, as ``verdict.json`` tells.
+
+    Shapes of the runs that were trained on are the fit's own.
+    """
     told: dict[str, list[dict[str, Any]]] = {c.label: [] for c in made.causes if c.effect.per_run}
-    for run in runs if told else ():
+    fitted = {(cause.label, r): shape for cause in made.causes for r, shape in enumerate(cause.shapes)}
+    for r, run in enumerate((*train, *validate) if told else ()):
         for term in settled(made, run, baseline)[0]:
             effect, motion = term.effect, run.motion
-            own = {
-                p.name: float(value)
-                for p, value in zip(effect.parameters, effect.physical(term.values), strict=True) if p.per_run
-            }  # fmt: skip
+            shape = fitted[effect.label, r] if r < len(train) else term.shape
+            values = effect.physical(np.append(term.linear, shape))
+            own = {p.name: _or_null(v) for p, v in zip(effect.parameters, values, strict=True) if p.per_run}
             if own and effect.explains(motion):
                 told[effect.label].append({"file": motion.file, "purpose": motion.purpose, "values": own})
     return told

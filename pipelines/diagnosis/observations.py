@@ -20,7 +20,7 @@ from pipelines.estimation.regression import away_from_reversals, away_from_turns
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque
 from pipelines.mechanics.motion import CUFFS, Motion
-from pipelines.mechanics.slow_motion import at_edges, filtered
+from pipelines.mechanics.slow_motion import filtered, unsure
 from pipelines.signals.blocks import BlockAverage
 
 FOLD_S = 10.0
@@ -106,7 +106,7 @@ def observe(motion: Motion, cutoff_hz: float | None = None) -> Run:
     block = block_average(motion)
     starts = block.starts(motion.segment)
     time = block.mean(motion.time, starts)
-    trusted = motion.valid if cutoff_hz is None else motion.valid & ~at_edges(motion, cutoff_hz)
+    trusted = motion.valid if cutoff_hz is None else motion.valid & ~unsure(motion, cutoff_hz)
     valid = block.all(trusted, starts)
     usable = valid[:, np.newaxis] & block.all(away_from_reversals(motion), starts)
     outputs = [motion.torque]

@@ -130,14 +130,16 @@ class Standing:
         large = slow.excess[:J] > np.maximum(MATERIAL * self.floor, IMPERFECT * self.torque[:J])
         return np.asarray(large & (slow.sureness[:J] > SIGNIFICANT))
 
-    def hums(self, before: NDArray, after: NDArray) -> bool:
+    def hums(self, before: NDArray, after: NDArray, floor: NDArray) -> bool:
         """Tell whether a tone (J,) N·m is left that is beyond the floor and beyond a good rig's at some joint.
+
+        ``floor`` (J,) N·m is that of the band in which tones are sought, which may be wider than the one looked at.
 
         What is left of those that the named causes took most of, at all joints together, is the misfit of their form:
         what hums at one joint shakes the others too.
         """
-        loud = after > np.maximum(HUM * self.floor, IMPERFECT * self.torque[: len(self.floor)])
-        was, left = (np.sum((tone / self.floor) ** 2) for tone in (before, after))
+        loud = after > np.maximum(HUM * floor, IMPERFECT * self.torque[: len(self.floor)])
+        was, left = (np.sum((tone / floor) ** 2) for tone in (before, after))
         return bool(np.any(loud) and left > FOREIGN * was)
 
     def is_minor(self, tone: NDArray) -> bool:

@@ -54,6 +54,9 @@ def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.Data
     # Play, a stiffness or a time constant is never negative, however little is known of it.
     frame["ci95_low"] = np.where(one_way, np.minimum(np.maximum(low, 0.0), frame["value"]), low)
     frame["ci95_high"] = frame["value"] + sure.critical * error
+    own = {(cause.effect.name, cause.effect.joint) for cause in fit.causes if cause.effect.each_run}
+    if own:
+        frame["each_run"] = [row in own for row in zip(frame["effect"], frame["joint"], strict=True)]
     return frame, covariance
 
 

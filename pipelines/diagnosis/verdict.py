@@ -52,7 +52,8 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "caveats": _caveats(d),
         "scoring": {
             "bandwidth_hz": first.bandwidth_hz,
-            "mask": mask_in_words(d.baseline.machine),
+            "mask": mask_in_words(d.baseline.machine)
+            + (f"; torque and model behind a low-pass of {CUTOFF_HZ:g} Hz" if d.noisy_angles else ""),
             "samples": int(d.after.errors.counts.sum()),
         },
         **summary_numbers(d),
@@ -67,7 +68,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "data_faults": [{"file": f.file, "channel": f.channel, "what": f.what} for f in d.faults],
         "residual": left.as_json() if left else None,
         "runs": sorted({run.motion.run for run in d.validate}),
-        "noise_floor_from": "periods" if d.floor.from_periods else "the band above the motion",
+        "noise_floor_from": _floor_from(d),
     }
 
 
@@ -182,7 +183,7 @@ def _set_anew(d: Diagnosis, label: str, effect: Effect) -> str:
     (parameter,) = (p for p in effect.parameters if p.per_run)
     told = [f"{one['values'][parameter.name]:+.3g} in {one['file']}" for one in d.each_run[label]]
     return (
-        f"its {parameter.name} is another in each run, as of a joint that is zeroed anew at every start: "
+        f"each run has its own {parameter.name}, as of a joint that is zeroed anew at every start: "
         f"{', '.join(told)} ({parameter.unit})"
     )
 
@@ -202,8 +203,15 @@ def _summary(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -
         return f"Acquisition, not physics: {_in_short(d.spoilt[0], d)}."
     said = _finding(d, causes, left)
     if not d.floor.from_periods:
-        said += " No motion here repeats, so the noise floor is a guess from the band above the motion."
+        said += f" No motion here repeats, so the noise floor is a guess from {_floor_from(d)}."
     return f"{said} Beside it, faults of acquisition: {_in_short(d.faults[0], d)}." if d.faults else said
+
+
+def _floor_from(d: Diagnosis) -> str:
+    """Say what the noise floor was read off."""
+    if d.floor.from_periods:
+        return "periods"
+    return "what the model leaves of the motion's own band" if d.noisy_angles else "the band above the motion"
 
 
 def _caveats(d: Diagnosis) -> list[str]:

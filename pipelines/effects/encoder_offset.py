@@ -17,7 +17,10 @@ class EncoderOffset(Effect):
     equation = "measured angle = true angle + offset"
     source = "Hollerbach, Khalil, Gautier (2016), Springer Handbook of Robotics, ch. 6 (joint offset calibration)"
     looks_like = "gravity torque that leads or lags the angle: a residual like the cosine of the link's angle"
-    confirm = "let the machine hang freely, its links in line, and read its angles: each should be zero"
+    confirm = (
+        "hold the links where a level or a stop tells their angles, and read them; one that is zeroed at each start "
+        "reads zero wherever it then hangs: let it hang freely after a run, or home it on an index mark"
+    )
     by_angle = True
     may_differ = True
     shape = (Parameter("offset", "rad", "measured less true angle", "q_o", (-0.15, 0.15)),)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.mechanics.motion import Motion
+from pipelines.signals.blocks import dilate
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 
 EDGE_PERIODS = 1.5
@@ -17,15 +18,22 @@ def edge(rate_hz: float, cutoff_hz: float) -> int:
     return int(np.ceil(EDGE_PERIODS * rate_hz / cutoff_hz))
 
 
-def at_edges(motion: Motion, cutoff_hz: float) -> NDArray:
-    """Tell which samples a filter lacks one side of, (n,) bool; all of a stretch that is too short for it."""
+def unsure(motion: Motion, cutoff_hz: float) -> NDArray:
+    """Tell which samples a filter lacks one side of, or spoils by what is bad beside them, (n,) bool.
+
+    All of a stretch that is too short for it.
+    """
     rate = motion.sample_rate_hz
-    unsure, near = edge(rate, cutoff_hz), np.zeros(len(motion), dtype=bool)
+    reach, near = edge(rate, cutoff_hz), np.zeros(len(motion), dtype=bool)
     for stretch in motion.segments():
         if stretch.stop - stretch.start < shortest(rate, cutoff_hz):
             near[stretch] = True
-        near[stretch.start : stretch.start + unsure] = True
-        near[max(stretch.start, stretch.stop - unsure) : stretch.stop] = True
+            continue
+        near[stretch.start : stretch.start + reach] = True
+        near[max(stretch.start, stretch.stop - reach) : stretch.stop] = True
+        inner = slice(stretch.start + reach, max(stretch.start + reach, stretch.stop - reach))
+        if not motion.valid[inner].all():  # the ends are marked as bad already
+            near[inner] |= dilate(~motion.valid[inner], reach)
     return near
 
 
@@ -45,7 +53,7 @@ def below(motion: Motion, cutoff_hz: float) -> Motion:
     for stretch in motion.segments():
         if stretch.stop - stretch.start >= shortest(rate, cutoff_hz):
             dq[stretch], ddq[stretch] = (derivative(q[stretch], rate, order) for order in (1, 2))
-    valid = motion.valid & ~at_edges(motion, cutoff_hz)
+    valid = motion.valid & ~unsure(motion, cutoff_hz)
     return replace(
         motion, q=q, dq=dq, ddq=ddq, valid=valid, cutoff_hz=cutoff_hz,
         # What a fit to the faster motion estimated is not that of this one.

@@ -38,7 +38,7 @@ def test_a_joint_zeroed_anew_at_each_start_is_named_and_nothing_else(anew):
 def test_each_run_s_own_offset_is_recovered_those_that_no_fit_saw_too(anew):
     told = {one["file"]: one["values"]["offset"] for one in anew["causes"][0]["each_run"]}
     assert told == pytest.approx(HIDDEN, abs=0.01)
-    assert any("another in each run" in sentence for sentence in anew["causes"][0]["evidence"])
+    assert any("each run has its own offset" in sentence for sentence in anew["causes"][0]["evidence"])
 
 
 def test_the_interval_of_the_first_run_s_offset_holds_the_truth(anew):
@@ -70,6 +70,6 @@ def test_intervals_of_offsets_of_one_run_hold_the_truth_as_often_as_they_say():
             if (cause["effect"], cause["joint"]) == ("encoder_offset", "knee") and cause["each_run"]:
                 low, high = cause["parameters"][0]["ci95"]
                 covered.append(low <= hidden["run_0.parquet"] <= high)
-    # All 40 of some 38 or more that are named would be too wide no more than 32 of them too narrow: P < 1 % either way.
+    # Of intervals that hold the truth 95 % of the time so few of 30 or more would by chance in one of a hundred runs.
     assert len(covered) >= 30
     assert np.mean(covered) >= 0.82

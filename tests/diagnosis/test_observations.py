@@ -8,6 +8,7 @@ import pytest
 from pipelines.diagnosis.fit import fit, residuals_on
 from pipelines.diagnosis.observations import baseline_of, like_trained, observe
 from pipelines.estimation.regression import TURN_S, away_from_turns
+from pipelines.mechanics.slow_motion import below
 from tests.diagnosis.sessions import session
 
 
@@ -43,3 +44,28 @@ def test_a_validation_run_has_no_cuffs_where_training_had_none(motions):
     assert validated.has_cuffs
     assert not like_trained(validated, baseline).has_cuffs
     assert like_trained(validated, baseline_of([validated])) is validated
+
+
+def test_torque_that_obeys_the_model_obeys_it_behind_the_low_pass_and_not_along_a_motion_filtered_so_low(motions):
+    """Friction turns round at once, centrifugal torque is a square: a filtered motion has them bent."""
+    motion = motions[0]
+    baseline = baseline_of([observe(motion)])
+    values = np.linspace(1.0, 3.0, baseline.size)
+    torque = (baseline.columns(motion, motion) @ values)[:, : len(motion.joints)]
+    left = {}
+    for name, moved in (("low-pass", motion), ("motion", below(motion, 5.0))):
+        run = observe(replace(motion, torque=torque), cutoff_hz=5.0)
+        predicted = run.average(baseline.columns(moved, moved) @ values)
+        left[name] = (run.measured - predicted)[run.usable[:, 0], 0]
+    assert np.abs(left["low-pass"]).max() < 1e-9
+    assert np.sqrt(np.mean(left["motion"] ** 2)) > 0.01
+
+
+def test_what_is_bad_is_not_trusted_as_far_as_the_low_pass_carries_it(motions):
+    motion = motions[0]
+    valid = motion.valid.copy()
+    valid[2000] = False
+    spoilt = replace(motion, valid=valid)
+    near = np.abs(observe(spoilt).time - motion.time[2000]) < 0.25
+    assert not observe(spoilt, cutoff_hz=5.0).valid[near].any()
+    assert observe(spoilt).valid[near].sum() == near.sum() - 1

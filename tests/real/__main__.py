@@ -38,6 +38,9 @@ def measured(found: dict[str, Diagnosed], data: Path) -> dict[str, str]:
             made[name] = tables.pendulum(name, found, data)
     if any(len(one.motions[0].joints) == 2 for one in found.values()):
         made["timing"] = tables.timing(found)
+    if "A0-swings" in found:
+        published = data / "double_pendulum" / "A0_published_parameters.yml"
+        made["A0-swings-zeros"] = tables.with_zeros(found["A0-swings"], published)
     if "A0-fourier" in found:
         made["A0-orders"] = tables.by_order(found["A0-fourier"])
         made["A0-reversals"] = tables.reversals(found["A0-fourier"])

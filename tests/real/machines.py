@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from exoid_cli.app import run
-from pipelines.contracts import PARAMETERS
+from pipelines.contracts import PARAMETERS, RESIDUALS
 from pipelines.dynamics.replay import replay
 from pipelines.effects.rotor_inertia import RotorInertia
 from pipelines.effects.torque_offset import TorqueOffset
@@ -22,7 +22,7 @@ from pipelines.model import Model, Term, baseline, model_from_parameters, term_f
 from pipelines.settings.datasets import datasets
 from pipelines.settings.filter import FilterSettings
 from pipelines.signals.low_pass import ORDER
-from tests.real.relative_error import slow_values
+from tests.real.relative_error import TorqueError, slow_error, slow_values
 
 
 @dataclass(frozen=True)
@@ -90,12 +90,25 @@ class Diagnosed:
     def model_of(self, motion: Motion) -> Model:
         """Return the extended model with what a run has for itself."""
         own = {
-            cause_label(cause): one["values"]
+            cause_label(cause): {name: value for name, value in one["values"].items() if value is not None}
             for cause in self.verdict["causes"]
             for one in cause["each_run"]
             if one["file"] == motion.file
         }
         return Model(tuple(_with_values(term, own.get(term.effect.label, {})) for term in self.model))
+
+    def error_on(self, motion: Motion) -> TorqueError:
+        """Return the extended model's error below 5 Hz on a run, reversals included.
+
+        Of a run that no fit has seen and that has a zero of its own, on the halves that the zero was not learnt on.
+        """
+        error = slow_error(self.model_of(motion).torque(motion), motion)
+        if motion.purpose == "train" or not any(cause["each_run"] for cause in self.verdict["causes"]):
+            return error
+        left = RESIDUALS.read(self.folder / "residuals.parquet").frame
+        here = left[(left["file"] == motion.file) & (left["model"] == "extended")]
+        rms = np.array([np.sqrt(np.mean(here[f"{joint}_residual_nm"] ** 2)) for joint in motion.joints])
+        return TorqueError(rms, error.percent * rms / error.rms)
 
     def refitted(self, order: int = ORDER) -> dict[str, Model]:
         """Return the extended model of each run, by its file, by least squares below 5 Hz on the runs to train on.

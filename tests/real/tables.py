@@ -93,13 +93,12 @@ def pendulum(name: str, found: Mapping[str, Diagnosed], data: Path) -> str:
         trained = of_purpose(d.motions, "train")
         plain, refitted = slow_fit(with_rotor(d.motions[0]), trained), d.refitted()
         for motion in d.motions:
-            predicted = (
-                their_torque(theirs, motion),
-                plain.torque(motion),
-                d.model_of(motion).torque(motion),
-                refitted[motion.file].torque(motion),
-            )
-            errors = [text for torque in predicted for text in _both(slow_error(torque, motion))]
+            made = [
+                *(slow_error(torque, motion) for torque in (their_torque(theirs, motion), plain.torque(motion))),
+                d.error_on(motion),
+                slow_error(refitted[motion.file].torque(motion), motion),
+            ]
+            errors = [text for error in made for text in _both(error)]
             rows.append((motion.file.removesuffix(".parquet"), motion.purpose, *errors))
     models = ("published", "least squares", "extended", "refitted")
     headings = ("run", "for", *(f"{model}, {unit}" for model in models for unit in ("N·m", "%")))
@@ -182,6 +181,16 @@ def of_each_run(d: Diagnosed) -> str:
         for k, one in enumerate(own[0]["each_run"])
     ]  # fmt: skip
     return table(("run", "for", *headings), rows)
+
+
+def with_zeros(d: Diagnosed, file: Path) -> str:
+    """Return the makers' error on each run without and with the zeros that the diagnosis found, beside its own."""
+    theirs, rows = double_pendulum(file), []
+    for motion in d.motions:
+        zeroed = d.model_of(motion).sensed(motion)
+        errors = [slow_error(their_torque(theirs, moved), motion) for moved in (motion, zeroed)]
+        rows.append((motion.file.removesuffix(".parquet"), *(_both(e)[0] for e in (*errors, d.error_on(motion)))))
+    return table(("run", "published, N·m", "published, with these zeros, N·m", "extended, N·m"), rows)
 
 
 def timing(found: Mapping[str, Diagnosed]) -> str:

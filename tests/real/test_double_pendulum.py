@@ -41,7 +41,7 @@ def test_friction_that_goes_with_the_load_of_a_planetary_gear_is_named_and_foret
 
 def errors(found, theirs):
     """Return the errors (R, J) N·m of the extended model and of the published parameters on every run."""
-    ours = [slow_error(found.model_of(motion).torque(motion), motion).rms for motion in found.motions]
+    ours = [found.error_on(motion).rms for motion in found.motions]
     return np.array(ours), np.array([slow_error(their_torque(theirs, m), m).rms for m in found.motions])
 
 
