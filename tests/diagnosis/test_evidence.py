@@ -156,11 +156,11 @@ def test_trust_falls_with_what_is_plainly_left():
 def test_a_hum_that_the_causes_took_most_of_is_their_misfit_and_any_other_is_foreign():
     made = standing(3.0, 1.05)
     silence, hip, shaken = np.zeros(2), np.array([2.0, 0.5]), np.array([0.8, 0.5])
-    assert not made.hums(silence, silence)
-    assert made.hums(hip, hip), "what no cause touches"
-    assert not made.hums(hip, shaken), "a ripple that is explained, and what it shakes at the other joint"
-    assert made.hums(hip, 0.6 * hip)
-    assert made.hums(np.array([0.0, 2.0]), np.array([0.0, 1.9]))
+    assert not made.hums(silence, silence, made.floor)
+    assert made.hums(hip, hip, made.floor), "what no cause touches"
+    assert not made.hums(hip, shaken, made.floor), "a ripple that is explained, and what it shakes at the other joint"
+    assert made.hums(hip, 0.6 * hip, made.floor)
+    assert made.hums(np.array([0.0, 2.0]), np.array([0.0, 1.9]), made.floor)
 
 
 def test_a_hum_that_is_little_beside_what_there_was_is_no_reason_to_doubt_a_cause():
