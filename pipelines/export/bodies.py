@@ -71,7 +71,7 @@ def bodies(exported: Exported) -> tuple[Body, ...]:
     mechanism = exported.machine.mechanism
     if mechanism not in MADE:
         raise InputError(
-            f"{mechanism.title} has no bodies that exoid could choose masses for; "
+            f"{mechanism.name} ({mechanism.joints_in_words}) has no bodies that exoid could choose masses for; "
             "export to c, matlab or json, which need no bodies"
         )
     return MADE[exported.machine.mechanism](exported)
