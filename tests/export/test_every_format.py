@@ -153,5 +153,7 @@ def test_a_mechanism_without_known_bodies_is_refused_in_a_line(format):
     """As of a mechanism that another file brings; equations can be written of it all the same."""
     known = machine(*LEG)
     other = replace(known, machine=replace(known.machine, mechanism=replace(known.machine.mechanism, title="a crane")))
-    with pytest.raises(InputError, match=r"leg \(a crane\) has no bodies .* export to c, matlab or json, which need no bodies"):
+    with pytest.raises(
+        InputError, match=r"leg \(a crane\) has no bodies .* export to c, matlab or json, which need no bodies"
+    ):
         format.write(other, "crane")
