@@ -5,10 +5,8 @@ import sys
 from collections.abc import Iterator
 from types import FrameType
 
+from pipelines.ending import ENDING, known, not_ignored
 from pipelines.errors import ExoidError
-
-NAMES = {"SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "SIGHUP", "SIGQUIT": "SIGQUIT"}
-"""Signals that end exoid where the system has them, and what a user calls them."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -29,9 +27,7 @@ class Signals:
 
     def heed(self) -> None:
         """Raise KeyboardInterrupt at each from now on, so that what is half written is cleared away."""
-        known = [signal.Signals[name] for name in NAMES if name in signal.Signals.__members__]
-        # What nohup or a shell's background ignores stays ignored.
-        self._heeded = [number for number in known if signal.getsignal(number) is not signal.SIG_IGN]
+        self._heeded = not_ignored(known(ENDING))
         for number in self._heeded:
             signal.signal(number, self._interrupt)
         sys.unraisablehook = _unraisable
@@ -44,7 +40,7 @@ class Signals:
 
     def told(self) -> str:
         """Return in words what ended exoid."""
-        return f"stopped by {NAMES[(self.came or signal.SIGINT).name]}"
+        return f"stopped by {ENDING[(self.came or signal.SIGINT).name]}"
 
     @property
     def exit_code(self) -> int:

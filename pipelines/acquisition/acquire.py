@@ -5,9 +5,10 @@ import logging
 import signal
 import traceback
 from collections.abc import Callable, Coroutine, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -16,14 +17,12 @@ from numpy.typing import NDArray
 from pipelines.acquisition.alone import alone
 from pipelines.acquisition.columns import columns_of
 from pipelines.acquisition.embedded import embedded
-from pipelines.acquisition.heartbeat import refuse_short_heartbeat
+from pipelines.acquisition.feasible import refusals
 from pipelines.acquisition.journal import Journal, JournalFile, refuse_leftover
-from pipelines.acquisition.line_rate import refuse_slow_lines
 from pipelines.acquisition.lock import Lock, locked
 from pipelines.acquisition.loop import Loop, Progress, Report, run_to_its_end
 from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.pace import urgent
-from pipelines.acquisition.patience import refuse_short_watchdog
 from pipelines.acquisition.plan import check_start, check_trajectory, make_plan
 from pipelines.acquisition.recorded import account_of, place_for, write_recording
 from pipelines.acquisition.resolution import refuse_coarse_set_points
@@ -34,6 +33,7 @@ from pipelines.contracts import RECORDING
 from pipelines.contracts.atomic import open_folder
 from pipelines.contracts.beside import journal_of
 from pipelines.contracts.provenance import describe
+from pipelines.ending import ENDING, heard, known
 from pipelines.errors import DeviceError, ExoidError, about
 from pipelines.mechanics.trajectory import Trajectory, read_trajectory
 from pipelines.settings.acquire import RunSettings
@@ -102,9 +102,8 @@ def acquire(
         refuse_coarse_set_points(rig, sample_rate_hz)
     if rig.clock == "real_time":
         with about(rig_path):
-            refuse_short_watchdog(rig, sample_rate_hz)
-            refuse_slow_lines(rig, sample_rate_hz, with_sensors=run.run == "with_human")
-            refuse_short_heartbeat(rig, sample_rate_hz, with_sensors=run.run == "with_human")
+            for refuse in refusals(with_sensors=run.run == "with_human"):
+                refuse(rig, sample_rate_hz)
     RECORDING.refuse_place(output)
     journal = journal_of(output)
     refuse_leftover(journal)
@@ -207,25 +206,15 @@ def _signals() -> Iterator[list[str]]:
     """
     # A terminal that is closed must not leave a drive enabled either.
     # Ctrl-Z would leave it to the drives' own watchdogs to stop the leg.
-    told = {
-        "SIGINT": "Ctrl-C", "SIGTERM": "SIGTERM", "SIGHUP": "SIGHUP", "SIGQUIT": "SIGQUIT", "SIGTSTP": "Ctrl-Z",
-    }  # fmt: skip
-    # Windows knows two of them.
-    names = {signal.Signals[name]: word for name, word in told.items() if name in signal.Signals.__members__}
-    came, late, before = list[str](), list[signal.Signals](), {}
+    names = known({**ENDING, "SIGTSTP": "Ctrl-Z"})
+    came, late = list[str](), list[signal.Signals]()
 
-    def hear(number: int, frame: object) -> None:
+    def hear(number: int, frame: FrameType | None) -> None:
         late.append(signal.Signals(number))
         came.append(names[late[-1]])
 
-    with suppress(ValueError):  # outside a process's main thread nobody can catch signals, and nobody is sent them
-        for number in names:
-            before[number] = signal.signal(number, hear)
-    try:
+    with heard(names, hear):
         yield came
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
     for number in late[:1]:
         signal.raise_signal(number)
 

@@ -4,7 +4,6 @@ import asyncio
 import logging
 from collections.abc import Iterator
 from contextlib import nullcontext
-from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -14,11 +13,9 @@ from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.guided import guided, refuse_far_from_zero
 from pipelines.acquisition.check.look import RigReport, look, probes_of
 from pipelines.acquisition.embedded import embedded
-from pipelines.acquisition.heartbeat import refuse_short_heartbeat
-from pipelines.acquisition.line_rate import refuse_slow_lines
+from pipelines.acquisition.feasible import refusals
 from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.pace import urgent
-from pipelines.acquisition.patience import refuse_short_watchdog
 from pipelines.acquisition.somebody import refuse_seldom_read
 from pipelines.errors import DeviceError, InputError, SettingsError
 from pipelines.settings.acquire import RunSettings
@@ -93,10 +90,7 @@ def unfit(rig: RigSettings, rate_hz: float | None) -> Iterator[Finding]:
     """Yield why no run would begin with this rig file at a rate, whatever its devices answer."""
     if rate_hz is None or rig.clock == "lockstep":
         return
-    for refuse in (
-        partial(refuse_slow_lines, with_sensors=True), partial(refuse_short_heartbeat, with_sensors=True),
-        refuse_short_watchdog, refuse_seldom_read,
-    ):  # fmt: skip
+    for refuse in (*refusals(with_sensors=True), refuse_seldom_read):
         try:
             refuse(rig, rate_hz)
         except SettingsError as error:
