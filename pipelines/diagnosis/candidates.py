@@ -56,12 +56,7 @@ class Candidate:
 
     def reshaped(self, i: int, value: float, runs: Sequence[int] | None = None) -> "Candidate":
         """Return the candidate with another value of shape parameter ``i``, in some runs or in all."""
-        within = range(len(self.shapes)) if runs is None else runs
-        shapes = tuple(
-            tuple(value if r in within and k == i else v for k, v in enumerate(shape))
-            for r, shape in enumerate(self.shapes)
-        )
-        return replace(self, shapes=shapes)
+        return self.with_own(i, [value if runs is None or r in runs else now[i] for r, now in enumerate(self.shapes)])
 
     @property
     def bends(self) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates import Candidate, columns_under
-from pipelines.diagnosis.fit import NEWTON_STEPS, Fit, farthest, laden, step_of
+from pipelines.diagnosis.fit import NEWTON_STEPS, Fit, laden, step_of, within_reach
 from pipelines.diagnosis.observations import Baseline, Run
 from pipelines.diagnosis.scan import ALWAYS, NEVER
 from pipelines.model import Term
@@ -128,24 +128,36 @@ def _learn_amplitudes(
     """Fit the run's own amplitudes and bends to each mask: squared error, values, residual (m, O), terms."""
     shared, own = _shared_values(fit, baseline)
     plain = columns_under(terms, run, baseline)
-    bending = [(number, i) for number, cause in enumerate(fit.causes) if (i := cause.own_bend) is not None]
     made = []
     for learnt in masks:
-        bent, (columns, measured) = terms, plain
-        for _ in range(NEWTON_STEPS if bending else 0):
-            slopes = [_slope(fit, bent, place, shared, run, baseline, (columns, measured)) for place in bending]
-            wide = np.concatenate([columns[:, :, own], *slopes], axis=2)
-            steps = _solved(wide, measured - columns @ shared, learnt, fit.weights)[int(own.sum()) :]
-            for (number, i), step in zip(bending, steps, strict=True):
-                least, largest = farthest(fit.causes[number].effect.shape[i])
-                bent = _with_shape(bent, number, i, float(np.clip(bent[number].shape[i] + step, least, largest)))
-            columns, measured = columns_under(bent, run, baseline)
+        bent, (columns, measured) = _bent(fit, terms, run, baseline, plain, learnt)
         values = shared.copy()
         values[own] = _solved(columns[:, :, own], measured - columns @ shared, learnt, fit.weights)
         left = measured - columns @ values
         squares = float(np.sum(fit.weights * np.sum(np.where(learnt, left, 0.0) ** 2, axis=0)))
         made.append((squares, values, left, bent))
     return made
+
+
+def _bent(
+    fit: Fit, terms: list[Term], run: Run, baseline: Baseline, plain: tuple[NDArray, NDArray], learnt: NDArray
+) -> tuple[list[Term], tuple[NDArray, NDArray]]:
+    """Fit to some samples, (m, O), what bends the run in a way of its own; return the terms, and columns under them.
+
+    By Gauss and Newton's steps, as in ``fit.refined``; ``plain`` are the columns and torques under the terms as given.
+    """
+    shared, own = _shared_values(fit, baseline)
+    places = [(number, i) for number, cause in enumerate(fit.causes) if (i := cause.own_bend) is not None]
+    for _ in range(NEWTON_STEPS if places else 0):
+        columns, measured = plain
+        slopes = [_slope(fit, terms, place, shared, run, baseline, plain) for place in places]
+        wide = np.concatenate([columns[:, :, own], *slopes], axis=2)
+        steps = _solved(wide, measured - columns @ shared, learnt, fit.weights)[int(own.sum()) :]
+        for (number, i), step in zip(places, steps, strict=True):
+            value = within_reach(terms[number].shape[i] + step, fit.causes[number].effect.shape[i])
+            terms = _with_shape(terms, number, i, value)
+        plain = columns_under(terms, run, baseline)
+    return terms, plain
 
 
 def _solved(columns: NDArray, left: NDArray, learnt: NDArray, weights: NDArray) -> NDArray:

@@ -197,12 +197,11 @@ def _stepped(
     steps = iter(solve(gram, weights)[len(made.values) :])
     causes = list(made.causes)
     for number, i in places:
-        cause = causes[number]
-        least, largest = farthest(cause.effect.shape[i])
-        causes[number] = cause.with_own(i, [
-            float(np.clip(shape[i] + next(steps), least, largest)) if cause.effect.explains(run.motion) else shape[i]
-            for shape, run in zip(cause.shapes, runs, strict=True)
-        ])  # fmt: skip
+        cause, values = causes[number], [shape[i] for shape in causes[number].shapes]
+        for r, run in enumerate(runs):
+            if cause.effect.explains(run.motion):
+                values[r] = within_reach(values[r] + next(steps), cause.effect.shape[i])
+        causes[number] = cause.with_own(i, values)
     return causes
 
 
@@ -229,7 +228,12 @@ def step_of(cause: Candidate, i: int, run: int = 0) -> float:
     return STEP * (abs(cause.shapes[run][i]) if low > 0 and high / low > 4 else high - low)
 
 
-def farthest(parameter: Parameter) -> tuple[float, float]:
+def within_reach(value: float, parameter: Parameter) -> float:
+    """Return the value that a fit may give to a shape parameter of either sign, as near as it may come to ``value``."""
+    return float(np.clip(value, *_farthest(parameter)))
+
+
+def _farthest(parameter: Parameter) -> tuple[float, float]:
     """Return the least and the largest value that a fit may give to a shape parameter of either sign."""
     low, high = parameter.typical
     beyond = 0.5 * (high - low)
@@ -304,5 +308,5 @@ def _scale(
         reach = share * 2 * float(np.log(REACH))
         bottom = min(max(np.log(now) - reach, np.log(low / REACH)), np.log(now))
         return lambda x: float(np.exp(x)), bottom, max(min(np.log(now) + reach, np.log(high * REACH)), np.log(now))
-    reach, (least, largest) = share * 0.25 * (high - low), farthest(parameter)
+    reach, (least, largest) = share * 0.25 * (high - low), _farthest(parameter)
     return float, min(max(now - reach, least), now), max(min(now + reach, largest), now)

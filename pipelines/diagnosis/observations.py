@@ -119,9 +119,8 @@ def observe(motion: Motion, cutoff_hz: float | None = None) -> Run:
         outputs.append(cuffs)
         steady = block.all(away_from_turns(motion), starts)
         usable = np.hstack([usable, (valid & steady)[:, np.newaxis] & known])
-    whole = np.hstack(outputs)
-    slow = whole if cutoff_hz is None else filtered(motion, np.nan_to_num(whole), cutoff_hz)
-    measured, fast = (block.mean(np.nan_to_num(x), starts) for x in (slow, whole - slow))
+    whole = np.nan_to_num(np.hstack(outputs))
+    slow = whole if cutoff_hz is None else filtered(motion, whole, cutoff_hz)
     length = motion.period_s or FOLD_S
     number = np.floor(time / length + 1e-9).astype(int)
     # A short run has no whole period for each fold: its stretches are dealt out instead.
@@ -132,13 +131,13 @@ def observe(motion: Motion, cutoff_hz: float | None = None) -> Run:
         starts=starts,
         time=time,
         state=(block.mean(motion.q, starts), block.mean(motion.dq, starts), block.mean(motion.ddq, starts)),
-        measured=measured,
+        measured=block.mean(slow, starts),
         usable=usable,
         valid=valid,
         fold=np.floor((time - time[0]) / part).astype(int) % FOLDS if part < length else number % FOLDS,
         period=number if motion.period_s else np.full(len(time), -1),
         cutoff_hz=cutoff_hz,
-        fast=None if cutoff_hz is None else fast,
+        fast=None if cutoff_hz is None else block.mean(whole - slow, starts),
     )
 
 
