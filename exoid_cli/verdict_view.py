@@ -57,8 +57,9 @@ def _show_cause(cause: Mapping[str, Any]) -> None:
 
     where = f" at {the(cause['joint'])}" if cause["joint"] else ""
     console.say(f"\n{cause['effect']}{where} ({cause['side']}), probability {cause['probability']:.2f}")
+    of = next((f", of {one['file']}" for one in cause.get("each_run", ())), "")
     for p in cause["parameters"]:
-        console.note(_in_words(p))
+        console.note(_in_words(p) + of * (p["name"] in cause.get("fitted_on_validate", ())))
     for sentence in cause["evidence"]:
         console.note(f"- {sentence}")
     for tie in cause["indistinguishable_from"]:

@@ -31,6 +31,12 @@ def effect_labelled(label: str) -> Effect:
     return effect_named(name)(joint=joint or None)
 
 
+def effect_told(cause: Mapping[str, Any]) -> Effect:
+    """Return the effect of a cause, or of a rival, as a verdict tells it."""
+    effect = effect_named(cause["effect"])
+    return effect(joint=cause["joint"], each_run=effect.may_differ and bool(cause.get("each_run")))
+
+
 def number(machine: Machine, torque: float) -> str:
     """Return a torque or force at a joint of a machine as text: hundredths of a newton metre do for an exoskeleton."""
     return f"{torque:.2f}" if machine.is_exoskeleton else f"{torque:.3g}"

@@ -176,9 +176,9 @@ def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_
 def _effect_of_rows(rows: pd.DataFrame, machine: Machine) -> Effect:
     """Return the effect that a parameters table tells of in some rows, all of one cause."""
     first = rows.iloc[0]
-    each_run = "each_run" in rows and bool(first["each_run"])
-    joint = first["joint"] if isinstance(first["joint"], str) else None
-    return effect_named(str(first["effect"]))(joint=joint, on=machine, each_run=each_run)
+    joint, of = first["joint"] if isinstance(first["joint"], str) else None, effect_named(str(first["effect"]))
+    each_run = of.may_differ and "each_run" in rows and bool(rows["each_run"].any())
+    return of(joint=joint, on=machine, each_run=each_run)
 
 
 def _term_from_rows(effect: Effect, rows: pd.DataFrame) -> Term:

@@ -47,6 +47,17 @@ class Tie(_Object):
     probability: Number | None = None
 
 
+class OneRun(_Object):
+    """What one run has of a cause for itself."""
+
+    file: str
+    purpose: str
+    values: dict[str, Number | None]
+    """By the parameters' names; null of what never came in this run."""
+    ci95: dict[str, Interval | None] = {}
+    """Null of what was learnt from its run alone, all else held; files of older versions lack it."""
+
+
 class Cause(_Object):
     """One named cause."""
 
@@ -58,6 +69,8 @@ class Cause(_Object):
     gain: Gain
     indistinguishable_from: list[Tie]
     evidence: list[str]
+    each_run: list[OneRun] = []
+    """Empty where all runs share everything; files of older versions lack it."""
 
 
 class Loop(_Object):

@@ -75,7 +75,7 @@ def _parameters(ranked: Ranked, d: Diagnosis) -> list[dict[str, Any]]:
                 {"name": p.name, "value": float(v), "unit": p.unit}
                 for p, v in zip(effect.parameters, effect.physical(fitted), strict=True)
             ]
-        at += shared + apart.count(True) * ranked.fit.acting(cause)
+        at += shared + apart.count(True) * len(ranked.fit.acting(cause))
     return found
 
 

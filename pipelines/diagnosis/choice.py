@@ -189,7 +189,7 @@ def _ranked(scorer: Scorer, causes: Sequence[Candidate], empty: Fit) -> Ranked:
     best = refined(causes, bank.runs, bank.baseline, bank.weights)
     gain = log_likelihood(best.rms, empty.rms, independent, scorer.imperfect)
     # One that bends the motion has no amplitude of its own, but its shape is as free as one.
-    bends = sum(c.bends if c.own_bend is None else best.acting(c) for c in best.causes)
+    bends = sum(c.bends if c.own_bend is None else len(best.acting(c)) for c in best.causes)
     columns = len(best.values) - len(empty.values) + bends
     besides = known_besides(best.causes, scorer.evidence)
     return Ranked(best, gain + besides - cost(best.causes, columns, independent))

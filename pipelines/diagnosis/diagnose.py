@@ -118,7 +118,7 @@ class Diagnosis:
     @cached_property
     def each_run(self) -> dict[str, list[dict[str, Any]]]:
         """What each run has for itself of the named causes, by label."""
-        return values_of_each_run(self.choice.named.fit, self.baseline, self.train, self.validate)
+        return values_of_each_run(self.choice.named.fit, self.baseline, self.sure, self.train, self.validate)
 
     @cached_property
     def gains(self) -> dict[str, Gain]:

@@ -65,7 +65,7 @@ def _shared_values(fit: Fit, baseline: Baseline) -> tuple[NDArray, NDArray]:
         in_place = dict(zip(shared, fit.values[at : at + len(shared)], strict=True))
         values += [in_place.get(i, 0.0) for i in range(len(apart))]
         own += apart
-        at += len(shared) + (len(apart) - len(shared)) * fit.acting(cause)
+        at += len(shared) + (len(apart) - len(shared)) * len(fit.acting(cause))
     return np.array(values), np.array(own, dtype=bool)
 
 

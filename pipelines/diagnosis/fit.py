@@ -1,5 +1,6 @@
 """The extended model: baseline and causes fitted together, shapes refined, uncertainty honest."""
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -74,12 +75,21 @@ class Fit:
         for cause in self.causes:
             dealt = list(zip(cause.effect.linear, cause.apart, strict=True))
             yield from ((cause.effect, p) for p, apart in dealt if not apart)
-            yield from [(cause.effect, p) for p, apart in dealt if apart] * self.acting(cause)
+            yield from [(cause.effect, p) for p, apart in dealt if apart] * len(self.acting(cause))
 
-    def acting(self, cause: Candidate) -> int:
-        """Return in how many of the runs a cause acts."""
+    def acting(self, cause: Candidate) -> list[int]:
+        """Return the runs in which a cause acts."""
         effect = cause.effect
-        return sum(kind in effect.acts_in and effect.run in (None, kind) for kind in self.kinds)
+        return [r for r, kind in enumerate(self.kinds) if kind in effect.acts_in and effect.run in (None, kind)]
+
+    def places(self, number: int, run: int) -> list[int]:
+        """Return where in ``values`` the linear parameters of a cause stand that hold in a run in which it acts."""
+        widths = [c.apart.count(False) + c.apart.count(True) * len(self.acting(c)) for c in self.causes]
+        cause, at = self.causes[number], len(self.values) - sum(widths[number:])
+        shared = iter(range(at, at + cause.apart.count(False)))
+        before = self.acting(cause).index(run) * cause.apart.count(True)
+        own = itertools.count(at + cause.apart.count(False) + before)
+        return [next(own) if apart else next(shared) for apart in cause.apart]
 
 
 def fit(

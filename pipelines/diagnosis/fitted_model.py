@@ -5,13 +5,15 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.diagnosis import tables
 from pipelines.diagnosis.evaluate import settled
 from pipelines.diagnosis.fit import Fit
 from pipelines.diagnosis.observations import Baseline, Run
-from pipelines.diagnosis.scan import NEVER
+from pipelines.diagnosis.scan import ALWAYS, NEVER
 from pipelines.diagnosis.uncertainty import Uncertainty
+from pipelines.effects import Effect
 from pipelines.model import Model, model_from_parameters
 
 
@@ -32,26 +34,35 @@ def model_of_run(made: Fit, baseline: Baseline, run: Run) -> Model:
     return Model(tuple(replace(t, values=own.get(t.effect.label, t.values)) for t in model))
 
 
-def _or_null(value: float) -> float | None:
-    """Return a value, or nothing for an instant outside every run: what never came, or was there all along."""
-    return None if abs(value) >= NEVER else float(value)
-
-
 def values_of_each_run(
-    made: Fit, baseline: Baseline, train: Sequence[Run], validate: Sequence[Run]
+    made: Fit, baseline: Baseline, sure: Uncertainty, train: Sequence[Run], validate: Sequence[Run]
 ) -> dict[str, list[dict[str, Any]]]:
     """Return what each run has for itself of the causes that have such values, by label, as ``verdict.json`` tells.
 
-    Shapes of the runs that were trained on are the fit's own.
+    Those of the runs that were trained on are the fit's own, with its intervals; the others were learnt from their
+    runs, all else held, and have none.
     """
     told: dict[str, list[dict[str, Any]]] = {c.label: [] for c in made.causes if c.effect.per_run}
-    fitted = {(cause.label, r): shape for cause in made.causes for r, shape in enumerate(cause.shapes)}
-    for r, run in enumerate((*train, *validate) if told else ()):
+    for number, cause in enumerate(made.causes if told else ()):
+        for r in made.acting(cause) if cause.label in told else ():
+            told[cause.label].append(_told(cause.effect, train[r], *tables.values_in_run(made, sure, number, r)))
+    for run in validate if told else ():
         for term in settled(made, run, baseline)[0]:
-            effect, motion = term.effect, run.motion
-            shape = fitted[effect.label, r] if r < len(train) else term.shape
-            values = effect.physical(np.append(term.linear, shape))
-            own = {p.name: _or_null(v) for p, v in zip(effect.parameters, values, strict=True) if p.per_run}
-            if own and effect.explains(motion):
-                told[effect.label].append({"file": motion.file, "purpose": motion.purpose, "values": own})
+            if term.effect.label in told and term.effect.explains(run.motion):
+                told[term.effect.label].append(_told(term.effect, run, term.effect.physical(term.values)))
     return told
+
+
+def _told(effect: Effect, run: Run, values: NDArray, ends: NDArray | None = None) -> dict[str, Any]:
+    """Return what a run has for itself of values (p,), and the ends (p, 2) of their intervals, as a verdict tells it.
+
+    An instant outside the run is none: what never came has no value, and what was there all along came at its begin.
+    """
+    own = {p.name: i for i, p in enumerate(effect.parameters) if p.per_run}
+    came, values = values < NEVER, np.where(values <= ALWAYS, 0.0, values)
+    return {
+        "file": run.motion.file,
+        "purpose": run.motion.purpose,
+        "values": {name: float(values[i]) if came[i] else None for name, i in own.items()},
+        "ci95": {name: ends[i].tolist() if ends is not None and came[i] else None for name, i in own.items()},
+    }

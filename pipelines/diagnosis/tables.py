@@ -44,20 +44,30 @@ def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.Data
             add("friction", p.name, p.symbol, p.unit, joint, None, "friction", _unit(size, at), values[at])
             at += 1
     one_way = [False] * len(rows) + [p.typical[0] >= 0 for cause in fit.causes for p in cause.effect.parameters]
-    _add_causes(fit, baseline, sure, add)
+    for number, cause in enumerate(fit.causes):
+        effect = cause.effect
+        for p, value, slope in zip(effect.parameters, *_in_run(fit, sure, number, fit.acting(cause)[0]), strict=True):
+            add(effect.name, p.name, p.symbol, p.unit, effect.joint, effect.run, "extension", slope, float(value))
     frame = pd.DataFrame(rows)
     T = np.array(maps)
     covariance = T @ sure.covariance @ T.T
-    error = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    frame["std_error"] = error
-    low = frame["value"] - sure.critical * error
-    # Play, a stiffness or a time constant is never negative, however little is known of it.
-    frame["ci95_low"] = np.where(one_way, np.minimum(np.maximum(low, 0.0), frame["value"]), low)
-    frame["ci95_high"] = frame["value"] + sure.critical * error
-    own = {(cause.effect.name, cause.effect.joint) for cause in fit.causes if cause.effect.each_run}
+    frame["std_error"] = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    ends = _ends(frame["value"].to_numpy(), frame["std_error"].to_numpy(), sure, np.array(one_way))
+    frame["ci95_low"], frame["ci95_high"] = ends.T
+    own = {(c.effect.name, c.effect.joint, p.name) for c in fit.causes for p in c.effect.parameters if p.per_run}
     if own:
-        frame["each_run"] = [row in own for row in zip(frame["effect"], frame["joint"], strict=True)]
+        frame["each_run"] = [row in own for row in zip(frame["effect"], frame["joint"], frame["name"], strict=True)]
     return frame, covariance
+
+
+def _ends(value: NDArray, error: NDArray, sure: Uncertainty, one_way: NDArray) -> NDArray:
+    """Return the ends of 95 % intervals of values (p,) with standard errors (p,): (p, 2).
+
+    What is ``one_way``, play, a stiffness or a time constant, is never negative, however little is known of it.
+    """
+    half = sure.critical * error
+    low = value - half
+    return np.stack([np.where(one_way, np.minimum(np.maximum(low, 0.0), value), low), value + half], axis=1)
 
 
 def _bodies(baseline: Baseline) -> dict[str, list[int]]:
@@ -72,31 +82,28 @@ def _unit(size: int, at: int) -> NDArray:
     return slope
 
 
-def _add_causes(fit: Fit, baseline: Baseline, sure: Uncertainty, add) -> None:
-    """Add each cause's parameters as files name them; those that every run has for itself are its first run's."""
-    size, at = len(sure.covariance), baseline.size
-    for number, cause in enumerate(fit.causes):
-        effect, apart = cause.effect, cause.apart
-        shared = [i for i, a in enumerate(apart) if not a]
-        places: list[int | None] = [None] * len(effect.fitted)
-        for k, i in enumerate(shared):
-            places[i] = at + k
-        own = [i for i, a in enumerate(apart) if a]
-        for k, i in enumerate(own):
-            places[i] = at + len(shared) + k
-        at += len(shared) + len(own) * fit.acting(cause)
-        for order, (which, i, run) in enumerate(sure.shapes):
-            if which == number and run in (-1, 0):
-                places[len(effect.linear) + i] = len(fit.values) + order
-        linear = [fit.values[p] if p is not None else 0.0 for p in places[: len(effect.linear)]]
-        fitted = np.append(linear, cause.shapes[0])
-        jacobian, physical = effect.jacobian(fitted), effect.physical(fitted)
-        for i, p in enumerate(effect.parameters):
-            slope = np.zeros(size)
-            for k, place in enumerate(places):
-                if place is not None:
-                    slope[place] = jacobian[i, k]
-            add(effect.name, p.name, p.symbol, p.unit, effect.joint, effect.run, "extension", slope, float(physical[i]))
+def _in_run(fit: Fit, sure: Uncertainty, number: int, run: int) -> tuple[NDArray, NDArray]:
+    """Return a cause's parameters as files name them, (p,), in a run that it was fitted to and acts in.
+
+    With them how each goes with what the covariance is of, (p, size).
+    """
+    cause = fit.causes[number]
+    effect, places = cause.effect, fit.places(number, run)
+    slopes = np.zeros((len(effect.fitted), len(sure.covariance)))
+    slopes[np.arange(len(places)), places] = 1.0
+    for order, (which, i, r) in enumerate(sure.shapes):
+        if which == number and r in (-1, run):
+            slopes[len(places) + i, len(fit.values) + order] = 1.0
+    fitted = np.append(fit.values[places], cause.shapes[run])
+    return effect.physical(fitted), effect.jacobian(fitted) @ slopes
+
+
+def values_in_run(fit: Fit, sure: Uncertainty, number: int, run: int) -> tuple[NDArray, NDArray]:
+    """Return a cause's parameters in a run that it was fitted to, (p,), and the ends of their intervals, (p, 2)."""
+    values, slopes = _in_run(fit, sure, number, run)
+    error = np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", slopes, sure.covariance, slopes), 0.0))
+    one_way = np.array([p.typical[0] >= 0 for p in fit.causes[number].effect.parameters])
+    return values, _ends(values, error, sure, one_way)
 
 
 def residual_rows(run: Run, residual: NDArray, model: str) -> pd.DataFrame:

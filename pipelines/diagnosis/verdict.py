@@ -18,8 +18,7 @@ from pipelines.diagnosis.unknown import Unknown, unknown
 from pipelines.effects import Effect
 from pipelines.estimation.angle_noise import CUTOFF_HZ, IN_WORDS
 from pipelines.estimation.regression import mask_in_words
-from pipelines.label import amount, cause_label, effect_labelled, in_words, number
-from pipelines.model import effect_named
+from pipelines.label import amount, cause_label, effect_labelled, effect_told, in_words, number
 
 HIGHEST = 0.96
 """A probability never claims more than calibration has shown: some causes that nobody lists look like a listed one."""
@@ -308,15 +307,9 @@ def _remains(d: Diagnosis, told: int) -> str:
 
 def _in_words(cause: dict[str, Any]) -> str:
     """Return a cause, those that could stand in its place, and how probable all of these are together."""
-    alike = [in_words(_effect_of(one)) for one in (cause, *cause["indistinguishable_from"])]
+    alike = [in_words(effect_told(one)) for one in (cause, *cause["indistinguishable_from"])]
     likely = f"{cause['probability']:.2f}"
     if len(alike) == 1:
         return f"{alike[0]} (probability {likely})"
     *most, last = [*alike[:MENTIONED], *([f"{len(alike) - MENTIONED} more"] if len(alike) > MENTIONED else [])]
     return f"{', '.join(most)} or {last}, which these data cannot tell apart (together {likely})"
-
-
-def _effect_of(told: dict[str, Any]) -> Effect:
-    """Return the effect of a cause, or of one that could stand in its place, as the verdict tells it."""
-    effect = effect_named(told["effect"])
-    return effect(joint=told["joint"], each_run=effect.may_differ and bool(told.get("each_run")))

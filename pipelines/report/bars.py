@@ -1,7 +1,7 @@
 """Bars as data: what the error is made of, and what naming the causes took of it."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from pipelines.contracts.joints import the
 from pipelines.errors import InputError
-from pipelines.label import SHARES, cause_label, effect_labelled, in_words
+from pipelines.label import SHARES, cause_label, effect_labelled, effect_told, in_words
 
 TONES = {"noise_floor": "noise", "repeatable_unexplained": "left", "not_repeatable": "wanders", "unexplained": "left"}
 """Names of the colours of what is no cause."""
@@ -141,6 +141,14 @@ def label_in_words(label: str) -> str:
         return name.replace("_", " ") + (f" at {the(joint)}" if joint else "")
 
 
+def cause_in_words(cause: Mapping[str, Any]) -> str:
+    """Return a verdict's cause as a sentence says it: one that differs from run to run as such."""
+    try:
+        return in_words(effect_told(cause))
+    except InputError:
+        return label_in_words(cause_label(cause))
+
+
 def labels_in_words(text: str, labels: Iterable[str]) -> str:
     """Return a sentence with the labels that stand in it said as sentences say them."""
     known = sorted(set(labels), key=len, reverse=True)
@@ -156,12 +164,12 @@ def causes_in_words(causes: Sequence[dict[str, Any]]) -> str:
 
 def tied_in_words(cause: dict[str, Any]) -> str:
     """Return a cause, or the one that could stand in its place, or how many could."""
-    words, ties = label_in_words(cause_label(cause)), ties_of(cause)
+    words, ties = cause_in_words(cause), ties_of(cause)
     if not ties:
         return words
     if len(ties) > 1:
         return f"{words} or {len(ties)} others that these data cannot tell apart"
-    other, where = label_in_words(cause_label(ties[0])), f" at {the(cause['joint'])}"
+    other, where = cause_in_words(ties[0]), f" at {the(cause['joint'])}"
     return f"{words.removesuffix(where) if other.endswith(where) else words} or {other}"
 
 

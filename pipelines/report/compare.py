@@ -8,7 +8,7 @@ from typing import Any
 from pipelines.errors import InputError
 from pipelines.label import cause_label
 from pipelines.report.acquisition import runs
-from pipelines.report.bars import label_in_words, torque_unit
+from pipelines.report.bars import cause_in_words, label_in_words, torque_unit
 from pipelines.report.lead import lead
 from pipelines.report.numbers import digits
 from pipelines.report.page import render
@@ -36,10 +36,13 @@ class Change:
     def half(self) -> float | None:
         """Half the 95 % interval of the difference of independent estimates; None where one of them has none.
 
+        Nor is there one of values that are each run's own: two first runs need not have the same.
+
         Errors of independent sessions add in squares, and so do the intervals' halves: each is its standard error
         times the critical value that its session's scatter asks for.
         """
-        if self.first.half is None or self.second.half is None:
+        own = self.first.each_run or self.second.each_run
+        if own or self.first.half is None or self.second.half is None:
             return None
         return hypot(self.first.half, self.second.half)
 
@@ -275,7 +278,7 @@ def _causes(pair: tuple[Session, Session]) -> list[dict[str, Any]]:
     named = [{cause_label(cause): cause for cause in (session.verdict or {}).get("causes", [])} for session in pair]
     return [
         {
-            "words": label_in_words(label),
+            "words": " / ".join(dict.fromkeys(cause_in_words(causes[label]) for causes in named if label in causes)),
             "cells": [_cause_cell(session, causes.get(label)) for session, causes in zip(pair, named, strict=True)],
         }
         for label in dict.fromkeys(label for causes in named for label in causes)

@@ -24,6 +24,8 @@ class Estimate:
     high: float | None
     """Ends of the 95 % interval; None where there is none."""
     std_error: float | None = None
+    each_run: bool = False
+    """Whether each run has its own, of which this is the first training run's."""
     meaning: str = ""
     """What it is, in words; nothing where nobody here knows."""
 
@@ -35,7 +37,8 @@ class Estimate:
     @property
     def words(self) -> str:
         """Say which it is."""
-        return " ".join(filter(None, (self.joint, self.symbol, f"({self.run})" if self.run else "")))
+        run, own = f"({self.run})" if self.run else "", "(per run: the first training run's)" if self.each_run else ""
+        return " ".join(filter(None, (self.joint, self.symbol, run, own)))
 
     @property
     def half(self) -> float | None:
@@ -128,8 +131,9 @@ def _estimate(row: Mapping[str, Any]) -> Estimate:
                for key in ("ci95_low", "ci95_high", "std_error"))  # fmt: skip
     joint, run = (row[key] if isinstance(row[key], str) else "" for key in ("joint", "run"))
     return Estimate(
-        row["effect"], row["name"], row["symbol"], joint, run, row["unit"], float(row["value"]), low, high, error
-    )
+        row["effect"], row["name"], row["symbol"], joint, run, row["unit"], float(row["value"]), low, high, error,
+        bool(row.get("each_run")),
+    )  # fmt: skip
 
 
 def _method(method: Any) -> str:

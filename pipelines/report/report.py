@@ -9,12 +9,19 @@ import numpy as np
 
 from pipelines.contracts import Joint
 from pipelines.contracts.joints import either
-from pipelines.label import cause_label
 from pipelines.report import provenance
 from pipelines.report.acquisition import Run
 from pipelines.report.acquisition import runs as recordings
 from pipelines.report.animation import animations, drawn_as
-from pipelines.report.bars import budget, causes_in_words, falls, label_in_words, labels_in_words, ties_of
+from pipelines.report.bars import (
+    budget,
+    cause_in_words,
+    causes_in_words,
+    falls,
+    label_in_words,
+    labels_in_words,
+    ties_of,
+)
 from pipelines.report.chart import Chart, thinned_alike
 from pipelines.report.control import control_charts, loops
 from pipelines.report.excitation import excitations
@@ -29,6 +36,7 @@ from pipelines.report.measured import (
     torque_charts,
 )
 from pipelines.report.numbers import digits
+from pipelines.report.own_values import own_values
 from pipelines.report.page import LARGEST_BYTES, VALUES, indented, render
 from pipelines.report.parameters import models, side_by_side
 from pipelines.report.residual import against, residual_charts, telling
@@ -280,11 +288,12 @@ def _foretold(session: Session, joint: Joint) -> list[Foretold]:
 
 def _cause(cause: dict[str, Any]) -> dict[str, Any]:
     return {
-        "words": label_in_words(cause_label(cause)),
+        "words": cause_in_words(cause),
+        "own": own_values(cause),
         "evidence": cause["evidence"],
         "ties": [
             {
-                "words": label_in_words(cause_label(tie)),
+                "words": cause_in_words(tie),
                 "probability": tie.get("probability"),
                 "why": tie["why"],
                 "how": tie["how_to_separate"],

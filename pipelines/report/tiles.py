@@ -5,8 +5,7 @@ from typing import Any
 
 from pipelines.contracts import Joint
 from pipelines.contracts.joints import the
-from pipelines.label import cause_label
-from pipelines.report.bars import falls, label_in_words, ties_of, torque_unit
+from pipelines.report.bars import cause_in_words, falls, ties_of, torque_unit
 from pipelines.report.measured import replayed
 from pipelines.report.numbers import digits
 from pipelines.report.session import Session
@@ -54,7 +53,7 @@ def _cause_tiles(verdict: dict[str, Any], cause: dict[str, Any]) -> list[Tile]:
     gain, (low, high) = cause["gain"]["rmse_reduction_nm"], cause["gain"]["ci95"]
     joint = cause["gain"]["joint"]
     unit, ties = torque_unit(verdict, joint), len(ties_of(cause))
-    words = label_in_words(cause_label(cause))
+    words = cause_in_words(cause)
     return [
         Tile(
             "probability" + (", with its ties" if ties else ""),

@@ -8,8 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.diagnosis.candidates import Candidate
 from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.evaluate import settled
+from pipelines.diagnosis.fit import fit
+from pipelines.diagnosis.fitted_model import values_of_each_run
+from pipelines.diagnosis.observations import baseline_of, observe
+from pipelines.diagnosis.uncertainty import Uncertainty
 from pipelines.diagnosis.verdict import verdict
+from pipelines.effects import TorqueDrift, VoluntaryTorque
 from tests.diagnosis.sessions import session
 
 HIDDEN = {"run_0.parquet": 0.06, "run_1.parquet": -0.05, "run_2.parquet": -0.03, "run_3.parquet": 0.07}
@@ -41,9 +48,14 @@ def test_each_run_s_own_offset_is_recovered_those_that_no_fit_saw_too(anew):
     assert any("each run has its own offset" in sentence for sentence in anew["causes"][0]["evidence"])
 
 
-def test_the_interval_of_the_first_run_s_offset_holds_the_truth(anew):
+def test_intervals_of_the_offsets_that_were_fitted_hold_the_truth_and_the_others_have_none(anew):
     (offset,) = anew["causes"][0]["parameters"]
-    assert offset["ci95"][0] <= HIDDEN["run_0.parquet"] <= offset["ci95"][1]
+    intervals = {one["file"]: one["ci95"]["offset"] for one in anew["causes"][0]["each_run"]}
+    assert intervals["run_0.parquet"] == offset["ci95"]
+    for file in ("run_0.parquet", "run_2.parquet"):
+        low, high = intervals[file]
+        assert low <= HIDDEN[file] <= high and high - low < 0.04
+    assert intervals["run_1.parquet"] is intervals["run_3.parquet"] is None
 
 
 def test_one_offset_in_all_runs_is_one_and_no_run_has_another():
@@ -57,6 +69,29 @@ def test_one_offset_in_all_runs_is_one_and_no_run_has_another():
 def test_a_leg_that_is_zeroed_once_needs_no_zero_of_its_own_in_any_run():
     told = verdict(diagnose(session(seconds=30.0)))
     assert told["status"] == "nothing_missing"
+
+
+def test_what_runs_have_of_a_cause_of_some_of_them_is_told_of_those_alone_each_its_own():
+    pushed = session("voluntary_torque", "knee", seconds=20.0, amplitude=4.0, frequency=0.37, phase=1.0)
+    runs = [observe(m) for m in pushed]
+    baseline = baseline_of(runs)
+    pushes = [Candidate(VoluntaryTorque(joint="knee"), ((0.37,),) * 3), Candidate(TorqueDrift(joint="hip"), ((),) * 3)]
+    train, validate = (runs[0], runs[2], runs[3]), (runs[1],)
+    made = fit(pushes, train, baseline, np.array([1.0, 1.0, 1.0, 1.0]))
+    flat = Uncertainty(np.eye(len(made.values)), 2.0, (), np.eye(len(made.values)))
+    told = values_of_each_run(made, baseline, flat, train, validate)
+    assert [one["file"] for one in told["voluntary_torque@knee"]] == ["run_2.parquet", "run_3.parquet"]
+    assert [one["file"] for one in told["torque_drift@hip"]] == [f"run_{k}.parquet" for k in (0, 2, 3, 1)]
+    # A run alone, all else held, tells the same of itself as the fit of all does.
+    for run in train:
+        for term in settled(made, run, baseline)[0]:
+            names = [p.name for p in term.effect.parameters]
+            alone = dict(zip(names, term.effect.physical(term.values), strict=True))
+            for one in (one for one in told[term.effect.label] if one["file"] == run.motion.file):
+                for name, value in one["values"].items():
+                    assert value == pytest.approx(alone[name], abs=0.01)
+                    low, high = one["ci95"][name]
+                    assert low < value < high
 
 
 @pytest.mark.slow

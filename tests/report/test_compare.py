@@ -1,6 +1,7 @@
 """Two sessions side by side: what did not change is marked no more often than 95 % intervals allow."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -60,6 +61,13 @@ def test_a_change_beyond_the_intervals_is_marked_and_a_smaller_one_is_not():
 def test_what_has_no_interval_is_not_judged():
     (taken,) = changes([estimate(2.0, 0.0)], [estimate(3.0, 0.0)])
     assert taken.is_beyond is None
+
+
+def test_values_that_are_each_run_s_own_are_not_judged():
+    first, second = (replace(estimate(value, 0.01), each_run=True) for value in (2.0, 3.0))
+    (of_first_runs,) = changes([first], [second])
+    assert of_first_runs.is_beyond is None
+    assert "per run" in of_first_runs.words
 
 
 def test_the_page_says_what_changed(tmp_path):

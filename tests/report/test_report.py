@@ -323,3 +323,35 @@ def test_what_the_fits_say_against_a_model_stands_beside_its_parameters(tmp_path
     page = report(find([tmp_path]))
     for words in ("hardly separates X1", "Not a real machine: exo_alone: X1", "Biased: above 5 Hz"):
         assert page.count(words) == 2
+
+
+def test_a_cause_that_differs_from_run_to_run_is_called_so_and_every_run_s_value_is_listed(tmp_path):
+    folder = write_session(tmp_path / "leg")
+    sure = [0.0512, 0.0712]
+    each_run = [
+        {"file": "first.parquet", "purpose": "train", "values": {"offset": 0.0612}, "ci95": {"offset": sure}},
+        {"file": "judged.parquet", "purpose": "validate", "values": {"offset": -0.0503}, "ci95": {"offset": None}},
+        {"file": "absent.parquet", "purpose": "validate", "values": {"offset": None}, "ci95": {"offset": None}},
+    ]  # fmt: skip
+    cause = verdict_of()["causes"][0] | {
+        "effect": "encoder_offset", "side": "sensor", "indistinguishable_from": [], "each_run": each_run,
+        "parameters": [{"name": "offset", "value": 0.0612, "unit": "rad", "ci95": sure}],
+    }  # fmt: skip
+    write_verdict(folder, causes=[cause])
+    table = PARAMETERS.read(folder / "diagnosed" / "parameters.parquet")
+    frame = table.frame.replace({"effect": {"cogging": "encoder_offset"}, "name": {"amplitude": "offset"}})
+    frame["each_run"] = frame["effect"] == "encoder_offset"
+    PARAMETERS.write(folder / "diagnosed" / "parameters.parquet", frame, table.metadata)
+    page = report(find([folder]))
+    assert "<h1>The simulation misses per-run encoder offset at the knee</h1>" in page
+    assert "Why per-run encoder offset at the knee" in page
+    shown = told(page)
+    assert shown["each_run:encoder_offset/knee/first.parquet/offset"] == (0.0612, "0.061")
+    assert shown["each_run:encoder_offset/knee/judged.parquet/offset"][0] == -0.0503
+    assert '<th class="n">offset, rad</th>' in page
+    assert "0.051 … 0.071" in page
+    (never,) = re.findall('<tr><td class="file">absent.parquet.*?</tr>', page)
+    assert "never came" in never and "data-key" not in never
+    # The model's table holds the first run's: it says so of that value, and of no other.
+    assert re.findall('<td class="nowrap">([^<]*|<abbr[^>]*>[^<]*</abbr>) <small>encoder offset</small>', page)
+    assert page.count("(per run: the first training run") == 1
