@@ -41,6 +41,7 @@ def diagnose(
     """
     from pipelines.contracts import CANDIDATES, PARAMETERS, RESIDUALS, describe
     from pipelines.contracts.atomic import all_or_none, open_folder, write_text
+    from pipelines.contracts.provenance import recording_behind
     from pipelines.diagnosis.candidate_table import candidates
     from pipelines.diagnosis.detect import as_json, detectability
     from pipelines.diagnosis.diagnose import diagnose as find
@@ -65,6 +66,7 @@ def diagnose(
     machine, geometry = motions[0].machine, motions[0].geometry
     heeded = settings.sections_about(machine.is_exoskeleton, "mechanism", "filter")
     shared = {"joints": motions[0].joint_metadata} | describe(files, heeded)
+    recordings = {motion.file: recording_behind(path) for motion, path in zip(motions, files, strict=True)}
     model = {
         "covariance": found.covariance.tolist(),
         "mechanism": machine.mechanism.name,
@@ -72,6 +74,12 @@ def diagnose(
         "method": {"name": "joint fit of baseline and named causes", "status": found.status},
         "collinear": found.collinear,
         "unrealizable": found.unrealizable,
+        "each_run": {
+            label: [
+                {"name": one["file"], "sha256": recordings[one["file"]], "values": one["values"]} for one in of_runs
+            ]
+            for label, of_runs in found.each_run.items()
+        },
     }
     frames = {"parameters": found.parameters, "residuals": found.residuals, "candidates": candidates(found)}
     visible = as_json(detectability(found.train, found.baseline, found.floor))

@@ -152,6 +152,8 @@ def _track(table: "Table", run: str, reference: Path | None, settings: "Experime
     tables = [LOOP, *([SWEEP] if len(gains) else [])]
     drawn = ["tracking.png", "error.png", "torque.png", *(["kv-sweep.png"] if len(gains) else [])]
     console.wrote(output, *tables, *(drawn if chosen.figures else []))
+    for guess in plant.guesses:
+        console.warn(guess)
 
 
 def _replay(table: "Table", recording: Path, settings: "Experiment", output: Path) -> None:
@@ -163,7 +165,7 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
 
     default = geometry_from(settings)
     motion = read_motion(recording, settings.filter, default)
-    plant = plant_from_table(table, motion.run, motion.geometry)
+    plant = plant_from_table(table, motion.run, motion.geometry, recording)
     with console.working(f"replaying {recording.name}"):
         replayed = replay(plant.model, motion)
     open_loop, closed_loop = recorded.open_loop_frame(replayed, motion, plant.joints), None
@@ -203,11 +205,8 @@ def _replay(table: "Table", recording: Path, settings: "Experiment", output: Pat
         output.parent, output.name, *([] if lacks else [beside.name]),
         *([output.with_suffix(".png").name] if settings.simulate.figures else []),
     )  # fmt: skip
-    for label, own in plant.model.of_one_run.items():
-        console.warn(
-            f"{label}: each run has its own {' and '.join(own)}, and {table.path} holds those of one run; "
-            f"unless that is {recording.name}, the errors are more than the model's"
-        )
+    for guess in plant.guesses:
+        console.warn(f"{guess}, and as much as they differ the errors are not the model's")
 
 
 def _report_replay(result: dict[str, Any], joints: "tuple[Joint, ...]") -> None:

@@ -71,12 +71,6 @@ class Model:
         """Return the terms that are there in a kind of run."""
         return Model(tuple(t for t in self.terms if run in t.effect.acts_in and t.effect.run in (None, run)))
 
-    @property
-    def of_one_run(self) -> dict[str, list[str]]:
-        """Parameters, by their effect's label, whose values hold in one run alone: onsets, phases."""
-        own = {t.effect.label: [p.name for p in t.effect.parameters if p.per_run] for t in self.terms}
-        return {label: names for label, names in own.items() if names}
-
     def sensed(self, motion: Motion) -> Motion:
         """Undo what encoders did: the motion of the motors."""
         return self._corrected(motion, lambda effect: effect.side is Side.SENSOR)

@@ -5,9 +5,16 @@ from typing import Any
 
 import pandas as pd
 
-from pipelines.contracts.metadata import Geometry, Matrix, TableKeys
+from pipelines.contracts.metadata import Finite, Geometry, InputKeys, Matrix, TableKeys
 from pipelines.contracts.table import BOOLEAN, TEXT, Column, Contract
 from pipelines.errors import ContractError
+
+
+class OneRun(InputKeys):
+    """What one run has of a cause for itself; its hash is the recording's."""
+
+    values: dict[str, Finite | None]
+    """By the parameters' names; null of what never came in this run."""
 
 
 class ParametersKeys(TableKeys):
@@ -17,6 +24,8 @@ class ParametersKeys(TableKeys):
     mechanism: str | dict[str, Any] | None = None
     geometry: Geometry | None = None
     method: str | dict[str, Any] | None = None
+    each_run: dict[str, list[OneRun]] | None = None
+    """What each run has for itself, by the cause's label; the rows hold what the first one has."""
 
 
 def _covariance_has_the_rows_shape(frame: pd.DataFrame, metadata: Mapping[str, Any], source: str) -> None:

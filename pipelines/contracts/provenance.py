@@ -57,6 +57,13 @@ def sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
+def recording_behind(path: Path) -> str:
+    """Return the SHA-256 of the recording in a file, or behind a ``motion/1``: whatever holds it, a run has one."""
+    about = parquet.header(path)[1]
+    filtered_from = about.get("inputs") if str(about.get("contract")).startswith("motion/") else None
+    return str(filtered_from[0]["sha256"]) if filtered_from else sha256(path)
+
+
 IN_A_PAGE = re.compile(r'<script type="application/json" id="made-of">(.*?)</script>', re.DOTALL)
 """Where a report holds its own; in it, no text contains ``<``."""
 

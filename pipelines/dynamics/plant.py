@@ -1,6 +1,6 @@
 """The leg to be simulated: one kind of run of an identified model, laid out for the compiled dynamics."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +9,7 @@ from pipelines.contracts import PARAMETERS, Joint, joints_of
 from pipelines.contracts.table import Table
 from pipelines.dynamics.assembly import Assembly, assemble
 from pipelines.dynamics.mobility import masses
+from pipelines.dynamics.own_values import with_own_values
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
@@ -26,6 +27,8 @@ class Plant:
     joints: tuple[Joint, ...]
     run: str
     assembly: Assembly
+    guesses: tuple[str, ...] = ()
+    """What each run has for itself, and nobody knows of this one."""
 
     @property
     def machine(self) -> Machine:
@@ -64,8 +67,10 @@ def make_plant(model: Model, geometry: Geometry, joints: tuple[Joint, ...], run:
     return Plant(model, geometry, joints, run, assembly)
 
 
-def plant_from_table(table: Table, run: str, default_geometry: Geometry | None = None) -> Plant:
-    """Return the plant that a ``parameters/1`` table describes for one kind of run.
+def plant_from_table(
+    table: Table, run: str, default_geometry: Geometry | None = None, recording: Path | None = None
+) -> Plant:
+    """Return the plant that a ``parameters/1`` table describes for one kind of run, as it was in a recorded one.
 
     Raises
     ------
@@ -78,7 +83,8 @@ def plant_from_table(table: Table, run: str, default_geometry: Geometry | None =
         raise InputError(f"{table.path}: holds no model of the run {run}, only of: {known}; choose one with --run")
     joints, geometry = joints_of(table.metadata), geometry_of(table.metadata, default_geometry)
     machine = machine_of(joints, geometry, table.path)
-    return make_plant(model_from_parameters(table.frame, run, machine), geometry, joints, run)
+    model, guesses = with_own_values(model_from_parameters(table.frame, run, machine).for_run(run), table, recording)
+    return replace(make_plant(model, geometry, joints, run), guesses=guesses)
 
 
 def read_plant(path: Path | str, run: str, default_geometry: Geometry | None = None) -> Plant:

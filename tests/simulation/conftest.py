@@ -63,11 +63,12 @@ def rows_of(values, run: str, causes=()) -> pd.DataFrame:
 def parameters_file(tmp_path) -> Callable[..., Path]:
     """Write a parameters/1 file."""
 
-    def write(values=TABLE3, run="with_human", causes=()) -> Path:
-        path = tmp_path / "parameters.parquet"
-        PARAMETERS.write(
-            path, rows_of(values, run, causes), {"geometry": {"thigh_length_m": 0.38952, "gravity_m_s2": 9.8}}
-        )
+    def write(values=TABLE3, run="with_human", causes=(), **metadata) -> Path:
+        path, geometry = tmp_path / "parameters.parquet", {"thigh_length_m": 0.38952, "gravity_m_s2": 9.8}
+        frame = rows_of(values, run, causes)
+        own = {(t.effect.name, p.name) for t in causes for p in t.effect.parameters if p.per_run}
+        frame["each_run"] = [row in own for row in zip(frame["effect"], frame["name"], strict=True)]
+        PARAMETERS.write(path, frame, {"geometry": geometry} | metadata)
         return path
 
     return write

@@ -7,6 +7,9 @@ import pytest
 
 from exoid_cli.app import run
 from pipelines.contracts import SIMULATION
+from pipelines.contracts.provenance import sha256
+from pipelines.effects import EncoderOffset
+from pipelines.model import Term
 from tests.effects.catalogue import TERMS
 
 LIGHT = ((2.6, 0.63, 1.78, 5.7), (3.0, 4.0), (2.0, 3.0))
@@ -135,17 +138,77 @@ def test_a_model_with_any_cause_is_simulated_and_replayed(
     assert 1e-6 < max(json.loads(out)["closed_loop_rmse_nm"].values()) < 10.0
 
 
-def test_a_replay_tells_of_values_that_the_recording_need_not_share(
+def told_of(label, *runs):
+    """What a parameters/1 table tells of runs: (path of the recording, values)."""
+    return {label: [{"name": path.name, "sha256": sha256(path), "values": values} for path, values in runs]}
+
+
+ZEROED = Term(EncoderOffset("knee", each_run=True), np.array([0.1]))
+"""As in the first run; in the recording at hand the knee's zero is right."""
+
+
+def replayed(exoid, parameters, config, recording, made):
+    code, out, err = exoid("simulate", parameters, "--config", config, "--replay", recording, "-o", made, "--json")
+    assert code == 0
+    effects = {one.pop("effect"): one for one in SIMULATION.read(made).metadata["plant"]["effects"]}
+    return json.loads(out)["simulation_rmse_rad"]["knee"], effects, err
+
+
+def test_a_run_that_the_diagnosis_has_seen_is_replayed_with_its_own_values(
     exoid, parameters_file, recording_file, quick, tmp_path
 ):
-    parameters = parameters_file(LIGHT, causes=[CAUSES["payload_change"]])
-    code, _, err = exoid(
-        "simulate", parameters, "--config", quick(), "--replay", recording_file(), "-o", tmp_path / "replay.parquet"
+    recording, other = recording_file(), tmp_path / "first.parquet"
+    other.write_bytes(b"another run")
+    told = told_of("encoder_offset@knee", (other, {"offset": 0.1}), (recording, {"offset": 0.0}))
+    parameters = parameters_file(LIGHT, causes=[ZEROED], each_run=told)
+    strayed, effects, err = replayed(exoid, parameters, quick(), recording, tmp_path / "replay.parquet")
+    assert effects["encoder_offset@knee"] == {"offset": 0.0}
+    assert (strayed < 1e-4, err) == (True, "")
+    # Its motion is the same run, whatever it is called.
+    motion = tmp_path / "renamed.parquet"
+    assert exoid("filter", recording, "-o", motion)[0] == 0
+    assert replayed(exoid, parameters, quick(), motion, tmp_path / "again.parquet") == (strayed, effects, "")
+
+
+def test_a_run_that_no_diagnosis_has_seen_is_replayed_with_the_first_one_s_values_and_that_is_said(
+    exoid, parameters_file, recording_file, quick, tmp_path
+):
+    first = tmp_path / "elsewhere" / "recording.parquet"
+    first.parent.mkdir()
+    first.write_bytes(b"another run of the same name")
+    parameters = parameters_file(
+        LIGHT, causes=[ZEROED], each_run=told_of("encoder_offset@knee", (first, {"offset": 0.1}))
     )
-    assert (code, err) == (
-        0,
-        f"warning: payload_change@knee: each run has its own time, and {parameters} holds those of one run; "
-        "unless that is recording.parquet, the errors are more than the model's",
+    recording = recording_file()
+    strayed, effects, err = replayed(exoid, parameters, quick(), recording, tmp_path / "replay.parquet")
+    assert effects["encoder_offset@knee"] == {"offset": 0.1} and strayed > 1e-3
+    assert err == (
+        f"warning: encoder_offset@knee: each run has its own offset, and {parameters} tells none of {recording}; "
+        "simulated with that of recording.parquet, the first run it tells of, and as much as they differ the errors "
+        "are not the model's"
+    )
+
+
+def test_what_never_came_in_a_run_is_not_there_when_it_is_replayed(
+    exoid, parameters_file, recording_file, quick, tmp_path
+):
+    recording, payload = recording_file(), CAUSES["payload_change"]
+    told = told_of(payload.effect.label, (recording, {"time": None}))
+    strayed, effects, err = replayed(
+        exoid, parameters_file(LIGHT, causes=[payload], each_run=told), quick(), recording, tmp_path / "replay.parquet"
+    )
+    assert payload.effect.label not in effects
+    assert (strayed < 1e-4, err) == (True, "")
+
+
+def test_a_model_that_tells_of_no_run_is_replayed_with_the_values_it_holds_and_that_is_said(
+    exoid, parameters_file, recording_file, quick, tmp_path
+):
+    parameters, recording = parameters_file(LIGHT, causes=[CAUSES["payload_change"]]), recording_file()
+    _, _, err = replayed(exoid, parameters, quick(), recording, tmp_path / "replay.parquet")
+    assert err.startswith(
+        f"warning: payload_change@knee: each run has its own time, and {parameters} tells none of {recording}; "
+        "simulated with that of its rows, "
     )
 
 
