@@ -8,8 +8,6 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from numpy.typing import NDArray
-
 from pipelines.acquisition.columns import columns_of
 from pipelines.acquisition.journal import Journal
 from pipelines.acquisition.latency import Latencies
@@ -49,6 +47,8 @@ class Progress:
 
 
 Report = Callable[[Progress], None]
+Decide = Callable[[int, float], float]
+"""Decides which set-point (rad) a joint's drive is sent now, host's clock, s."""
 
 
 @dataclass
@@ -127,7 +127,8 @@ class Loop:
             self._heed_signals()
             if self.supervisor.missed(found, time.monotonic()) and not await self._resume():
                 continue
-            answers = await self._exchange(self.supervisor.next(found, time.monotonic()))
+            self.supervisor.next(found, time.monotonic())
+            answers = await self._exchange(self.supervisor.step)
             row = self.supervisor.judge(answers, time.monotonic())
             if row is None:
                 continue
@@ -178,7 +179,7 @@ class Loop:
                 patience = period
 
     def _told_at(self, joint: int) -> float:
-        """Return when a drive was told something last, or that was decided."""
+        """Return when a drive was told something last, or is being told."""
         return max(self.machine.drives[joint].told_at, float(self.supervisor.sent_at[joint]))
 
     async def _tell_alone(self, joint: int) -> None:
@@ -187,10 +188,10 @@ class Loop:
         with suppress(Unanswered):  # whoever follows the plan finds out for how long
             async with drive.device.turn():
                 self._heed(joint)
-                if self.supervisor.is_stale(joint, time.monotonic()):
-                    await self._find(joint)
                 if self.supervisor.sent_at[joint] != told:
                     return
+                if self.supervisor.is_stale(joint, time.monotonic()):
+                    await self._find(joint)
                 reading = await drive.exchange(self.supervisor.tend(joint, time.monotonic()))
                 self.supervisor.hear(joint, time.monotonic())
                 self.supervisor.judge_tended(joint, reading)
@@ -200,7 +201,7 @@ class Loop:
         began = time.monotonic()
         while True:
             self._heed_signals()
-            answers = await self._exchange(self.supervisor.rest(time.monotonic()))
+            answers = await self._exchange(self.supervisor.rest)
             if row := self.supervisor.enabled(answers, time.monotonic() - began):
                 break
             await self.machine.forget_records()  # else what comes meanwhile would be in the way once the leg moves
@@ -213,27 +214,24 @@ class Loop:
         if self.stopped_by:
             raise DeviceError(f"stopped by {self.stopped_by[0]}")
 
-    async def _exchange(self, reference: NDArray) -> Answers:
+    async def _exchange(self, decide: Decide) -> Answers:
         self._cycle += 1
         asked = time.perf_counter()
-        answers = await self.machine.cycle(reference, self._cycle, self._tell_in_turn)
+        answers = await self.machine.cycle(self._cycle, partial(self._tell_in_turn, decide))
         self._latencies.add(time.perf_counter() - asked)
         for joint, drive in enumerate(self.machine.drives):
             self.supervisor.hear(joint, drive.told_at)
             self._heed(joint)
         return answers
 
-    async def _tell_in_turn(self, drive: Drive, reference: float) -> Reading:
-        """Tell a drive its set-point (rad), or where its turn came too late what is due to it by then."""
+    async def _tell_in_turn(self, decide: Decide, drive: Drive) -> Reading:
+        """Tell a drive its set-point, decided when its turn has come: by then it may have gone on by itself."""
         joint = self.machine.drives.index(drive)
         async with drive.device.turn():
-            if self.supervisor.is_fresh(joint, time.monotonic()):
-                self.supervisor.send_now(joint, time.monotonic())
-            else:  # by itself the drive may have gone on
-                self.supervisor.unsent(joint)
+            if self.supervisor.is_stale(joint, time.monotonic()):
                 await self._find(joint)
-                reference = self.supervisor.tend(joint, time.monotonic())
-            return await drive.exchange(reference)
+                decide = self.supervisor.tend
+            return await drive.exchange(decide(joint, time.monotonic()))
 
     def _heed(self, joint: int) -> None:
         """Heed what a drive has told, though it came beside what is awaited, or ended the run, or was asked again."""
@@ -282,7 +280,7 @@ class Loop:
 
     async def _stop(self) -> None:
         """Bring every drive to rest and take its torque away, whatever happens meanwhile."""
-        touched = [j for j, drive in enumerate(self.machine.drives) if drive.told_reference is not None]
+        touched = [j for j, drive in enumerate(self.machine.drives) if drive.was_told]
         self._moving = set(touched)
         stops = [asyncio.ensure_future(self._stop_drive(j)) for j in touched]
         for j, stop in zip(touched, stops, strict=True):
@@ -317,8 +315,6 @@ class Loop:
                 # Whatever ended it is a reason to stop, and none to stop otherwise than all others do.
                 if not tending.cancelled() and (error := tending.exception()):
                     self.supervisor.abort(error)
-            if drive.told_reference is not None:  # what was decided last may not have been sent
-                self.supervisor.begin_stop(joint, drive.told_reference)
             self._heed(joint)
             while True:
                 # On the host's clock: the device's counter may be what has failed. What is late is not caught up

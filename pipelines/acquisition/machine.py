@@ -100,8 +100,8 @@ class Drive:
         self._temperature = np.nan
         self._sent = np.nan
         self._counted = 0
-        self.told_reference: float | None = None
-        """The last set-point on its way to it, rad; None while it has been told nothing, and need not be disabled."""
+        self.was_told = False
+        """Whether any set-point was on its way to it; else it need not be disabled."""
         self.told_at = 0.0
         """When it answered the last one, host's clock, s: where others are on its line, that may be late."""
         self.conditions: list[Condition] = []
@@ -204,7 +204,7 @@ class Drive:
         """Send a set-point (rad) and return the sample that is latched; ``halt`` where the leg is to stand there."""
         control = self.map.enable if self.map.halt is None or not halt else self.map.halt
         words = self.words(control, reference)
-        self.told_reference = reference
+        self.was_told = True
         # Nobody knows which set-point a drive follows that did not answer.
         before, self._sent = self._sent, np.nan
         sent = time.perf_counter()
@@ -402,8 +402,8 @@ class Drive:
         )
 
 
-Tell = Callable[[Drive, float], Awaitable[Reading]]
-"""Sends a drive a set-point (rad) and returns the sample that is latched."""
+Tell = Callable[[Drive], Awaitable[Reading]]
+"""Sends a drive its set-point and returns the sample that is latched."""
 
 
 class Sensor:
@@ -602,10 +602,8 @@ class Machine:
         """Return the cycle that the first drive is in."""
         return await self.drives[0].count() // self.samples_per_cycle
 
-    async def cycle(self, reference: NDArray, number: int, tell: Tell = Drive.exchange) -> Answers:
-        """Send set-points (J,) rad and return what came: the sample that all devices latched, or of each its newest.
-
-        Each drive is told by ``tell``, all at once.
+    async def cycle(self, number: int, tell: Tell) -> Answers:
+        """Tell all drives at once; return what came: the sample that all devices latched, or of each its newest.
 
         In lockstep the drives' exchange ends a sample, so sensors are read before it. In real time the drives
         tell when a new sample begins, so sensors are read after it. Nothing is sent twice, for a set-point that comes
@@ -613,9 +611,9 @@ class Machine:
         """
         if self.rig.clock == "lockstep":
             forces = await self.felt(number)
-            told = await self._exchange(reference, tell)
+            told = await answers_or_silence(map(tell, self.drives))
         else:
-            told = await self._exchange(reference, tell)
+            told = await answers_or_silence(map(tell, self.drives))
             forces = await self.felt(number)
         readings = [answer for answer in told if isinstance(answer, Reading)]
         whole = len(readings) == len(told)
@@ -635,11 +633,6 @@ class Machine:
             if force is not None:
                 forces[CUFFS.index(sensor.settings.cuff)] = force
         return forces
-
-    async def _exchange(self, reference: NDArray, tell: Tell) -> list[Reading | Unanswered]:
-        """Exchange every drive; return what each answers."""
-        pairs = zip(self.drives, reference.tolist(), strict=True)
-        return await answers_or_silence(tell(drive, angle) for drive, angle in pairs)
 
     async def _latch(self, readings: list[Reading]) -> bool:
         """Ask those drives again that have not latched the others' sample yet.

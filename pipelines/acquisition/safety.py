@@ -105,24 +105,23 @@ def sample_violation(drive: DriveSettings, before: Reading, found: Reading, samp
     return None
 
 
-def refuse_leap(drives: Sequence[DriveSettings], last: NDArray, reference: NDArray, allowed_s: NDArray) -> None:
-    """Stand between the plan and the wire: refuse set-points (J,) rad that no planned motion may ask for.
+def refuse_leap(drive: DriveSettings, last: float, reference: float, allowed_s: float) -> None:
+    """Stand between the plan and the wire: refuse a set-point (rad) that no planned motion may ask for.
 
-    Whatever went wrong before, each is a number, within its joint's limits, and no further from the ``last``
-    one than its speed limit leads in the time that it is allowed, (J,) s.
+    Whatever went wrong before, it is a number, within its joint's limits, and no further from the ``last`` one than
+    its speed limit leads in the time that it is allowed, s.
     """
-    for drive, before, angle, allowed in zip(drives, last, reference, allowed_s, strict=True):
-        low, high = drive.angle_rad
-        if not low <= angle <= high:
-            raise DeviceError(
-                f"{drive.joint}: a set-point of {angle:.3f} rad was due, outside its limits {low:g} to {high:g} rad; "
-                "it was not sent"
-            )
-        if not abs(angle - before) <= drive.speed_rad_s * allowed + ROUNDING_RAD:
-            raise DeviceError(
-                f"{drive.joint}: a set-point of {angle:.3f} rad was due after {before:.3f} rad with {allowed:.3f} s to "
-                f"get there, faster than its limit of {drive.speed_rad_s:g} rad/s; it was not sent"
-            )
+    low, high = drive.angle_rad
+    if not low <= reference <= high:
+        raise DeviceError(
+            f"{drive.joint}: a set-point of {reference:.3f} rad was due, outside its limits {low:g} to {high:g} rad; "
+            "it was not sent"
+        )
+    if not abs(reference - last) <= drive.speed_rad_s * allowed_s + ROUNDING_RAD:
+        raise DeviceError(
+            f"{drive.joint}: a set-point of {reference:.3f} rad was due after {last:.3f} rad with {allowed_s:.3f} s to "
+            f"get there, faster than its limit of {drive.speed_rad_s:g} rad/s; it was not sent"
+        )
 
 
 def slowed(reference: float, speed: float, deceleration: float, time_s: float) -> tuple[float, float]:

@@ -7,7 +7,7 @@ docs/safety.md draws it.
 from asyncio import CancelledError
 from collections.abc import Sequence
 from enum import StrEnum
-from math import inf
+from math import copysign, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +34,6 @@ sees up to one sample late or early."""
 
 NO_LAG_RAD = 1e-9
 """What rounding leaves between a set-point and the plan."""
-FRESH_SAMPLES = 3
-"""How long after a drive has answered it may be sent a set-point that was decided by that: it may go on by itself."""
 
 
 class State(StrEnum):
@@ -100,26 +98,20 @@ class Supervisor:
         """(J,) rad/s at which set-points move: a stop slows down from there, the way back to the plan begins there."""
         self._pace = np.zeros_like(self.sent)
         """(J,) rad/s at which a drive may go on by itself: as its last set-point did from the one before."""
-        self._fresh_until = np.full_like(self.sent, inf)
-        """(J,) until when the last set-points may be sent, host's clock, s: then a drive may have gone on too far."""
         self._held = [0 for _ in rig.drive]
         """For how many samples each drive has been held at rest in the stop."""
-        self._sample_s = np.full(len(rig.drive), 1.0 / sample_rate_hz)
-        self._walk = WALK * np.array([drive.speed_rad_s for drive in rig.drive])
-        """(J,) how fast set-points walk back to the plan, rad/s."""
         self._in_force = self.sent.copy()
         """(J,) set-points, rad, that are reached at the sample which is latched when the last ones are sent."""
         self._lead = np.zeros_like(self.sent)
         """By how much the set-points are ahead of what the speed limits allow, s; never more than the slack."""
-        self._decided = (self.sent, self.base, self.sent_at, self._lead, self._pace)
-        """What a set-point changes, and beside it what that was before."""
-        self._before = [state.copy() for state in self._decided]
         self._enabled: list[bool | None] = [None for _ in rig.drive]
         """What each drive said last of being enabled."""
         self._let_go = [False for _ in rig.drive]
         """Which drives have told a fault, or that they were no longer enabled; by the next word they may be again."""
         self._start = self.sent
         self._first = self._found = 0
+        self._advanced = True
+        """Whether the sample found last is another one than before: there is one step a sample."""
         self._found_at = 0.0
         """When the sample was found at which the plan was followed last, host's clock, s."""
 
@@ -145,11 +137,10 @@ class Supervisor:
         if why := self._dropped(row) or self._limits.violation(row):
             raise DeviceError(why)
 
-    def rest(self, now: float) -> NDArray:
-        """Return the set-points (J,) rad with which the drives are enabled: where the leg stands."""
+    def rest(self, joint: int, now: float) -> float:
+        """Return the set-point (rad) with which a drive is enabled now: where the leg stands."""
         self.refuse_after_abort()
-        self._send(self._start, np.zeros_like(self.sent), now)
-        return self.sent.copy()
+        return self._follow(joint, float(self._start[joint]), 0.0, now)
 
     def enabled(self, answers: Answers, waited_s: float) -> Row | None:
         """Return the sample at which every drive says that it is enabled, as far as it tells; None until then.
@@ -243,9 +234,8 @@ class Supervisor:
         awaited_s = now - self._found_at
         if awaited_s > self.rig.safety.longest_reply_s + SLACK_SAMPLES / self.rate:
             return self._slow(joint, now)
-        reference, speed = self._towards(self._found + int(awaited_s * self.rate), now)
-        self._speed[joint] = speed[joint]
-        return self._pass(joint, float(reference[joint]), now)
+        path, speed = self._towards(joint, self._found + int(awaited_s * self.rate), now)
+        return self._pass(joint, path, speed, now)
 
     def judge_tended(self, joint: int, reading: Reading) -> None:
         """Raise DeviceError where what a drive tells that is tended is reason to stop."""
@@ -262,10 +252,8 @@ class Supervisor:
             raise DeviceError(why)
         self._told[joint].tell(reading.sequence, float(self.sent[joint]))
 
-    def next(self, found: int, now: float) -> NDArray:
-        """Return the set-points (J,) rad to be sent now that sample ``found`` is latched.
-
-        They are the plan's. Where samples were missed they walk back to it, no step larger than the speed limit.
+    def next(self, found: int, now: float) -> None:
+        """Go on to what is due now that sample ``found`` is latched.
 
         Raises
         ------
@@ -276,15 +264,24 @@ class Supervisor:
         self._look(found, now)
         while self.state is not self._due(self._index(found)):
             self._go(FOLLOWING[FOLLOWING.index(self.state) + 1])
-        due = self._planned(found)
-        reference, speed = self.base.copy(), self._speed
-        if found > self._found:  # one step a sample
-            reference, speed = self._towards(found, now)
-        self._refuse_to_lag(due, reference)
-        self._send(reference, speed, now)
-        self._found_at = now
-        self._found = found
-        return self.sent.copy()
+        self._advanced = found > self._found
+        self._found, self._found_at = found, now
+
+    def step(self, joint: int, now: float) -> float:
+        """Return the set-point (rad) that a drive is sent now that its turn has come.
+
+        It is the plan's. Where samples were missed it walks back there, no step larger than the speed limit.
+
+        Raises
+        ------
+        DeviceError
+            Where nothing more may be sent.
+        """
+        self.refuse_after_abort()
+        path, speed = float(self.base[joint]), float(self._speed[joint])
+        if self._advanced:
+            path, speed = self._towards(joint, self._found, now)
+        return self._follow(joint, path, speed, now)
 
     def judge(self, answers: Answers, now: float) -> Row | None:
         """Return the sample that a cycle brought, where it is whole and a new one.
@@ -387,24 +384,6 @@ class Supervisor:
         if State.ABORT in TRANSITIONS[self.state]:
             self._go(State.ABORT)
 
-    def is_fresh(self, joint: int, now: float) -> bool:
-        """Tell whether the last set-point of a drive may still be sent, though it had to wait for its turn."""
-        return bool(now <= self._fresh_until[joint])
-
-    def send_now(self, joint: int, now: float) -> None:
-        """Note that the last set-point of a drive is sent only now: it has waited for its turn since it was decided."""
-        self.sent_at[joint] = now
-
-    def unsent(self, joint: int) -> None:
-        """Take back the last set-point of a drive: it did not go out."""
-        for state, before in zip(self._decided, self._before, strict=True):
-            state[joint] = before[joint]
-
-    def begin_stop(self, joint: int, reference: float) -> None:
-        """Begin to stop a drive; ``reference`` is the last set-point, rad, that went out to it."""
-        if reference != self.sent[joint]:
-            self.unsent(joint)
-
     def stop(self, joint: int, now: float) -> tuple[float, bool] | None:
         """Return the set-point, rad, that brings one drive to rest or holds it there, and whether it is to halt there.
 
@@ -423,18 +402,16 @@ class Supervisor:
     def _slow(self, joint: int, now: float) -> float:
         """Return the set-point (rad) of a drive that slows down, a sample after its last one."""
         deceleration = self.rig.safety.deceleration_rad_s2
-        path, self._speed[joint] = slowed(float(self.base[joint]), self._speed[joint], deceleration, 1.0 / self.rate)
-        return self._pass(joint, path, now)
+        path, speed = slowed(float(self.base[joint]), self._speed[joint], deceleration, 1.0 / self.rate)
+        return self._pass(joint, path, speed, now)
 
-    def _pass(self, joint: int, path: float, now: float) -> float:
-        """Let one drive's set-point (rad) pass, as near to ``path`` as its limits allow by now."""
-        drive, one = self.rig.drive[joint], slice(joint, joint + 1)
-        reach = drive.speed_rad_s * self._allowed_s(now)[joint]
-        nearest = np.clip(path, self.sent[joint] - reach, self.sent[joint] + reach)
-        reference = float(np.clip(nearest, *drive.angle_rad))
-        refuse_leap([drive], self.base[one], np.array([reference]), self._sample_s[one])
-        self._note(one, np.array([reference]), now)
-        return reference
+    def _pass(self, joint: int, path: float, speed: float, now: float) -> float:
+        """Let a drive's set-point (rad) pass, as near to ``path`` as its limits allow by now."""
+        drive, sent = self.rig.drive[joint], self.sent[joint]
+        reach = drive.speed_rad_s * self._allowed_s(joint, now)
+        reference = float(np.clip(np.clip(path, sent - reach, sent + reach), *drive.angle_rad))
+        refuse_leap(drive, self.base[joint], reference, 1.0 / self.rate)
+        return self._send(joint, reference, speed, now)
 
     def heed(self, joint: int, condition: Condition) -> None:
         """Note what a drive says of being enabled; raise DeviceError where it no longer is."""
@@ -485,34 +462,35 @@ class Supervisor:
         """Return which set-point of the path is due at a sample."""
         return min(max(found - self._first, 0), len(self._plan.reference))
 
-    def _towards(self, found: int, now: float) -> tuple[NDArray, NDArray]:
-        """Return set-points (J,) rad along the plan, or on the way back to it, and how fast they move, rad/s.
+    def _towards(self, joint: int, found: int, now: float) -> tuple[float, float]:
+        """Return a set-point (rad) along the plan, or on the way back to it, and how fast it moves, rad/s.
 
         The way back begins as fast as set-points move already, and goes faster and slower as gently as a stop does: a
         drive that is sent from rest to its speed limit within a sample jerks the leg with all of its torque. It is no
         longer than the time allows: after a late set-point the next comes soon, and both may fall into one sample.
-        """
-        due, before, earlier = (self._path(self._index(found - back)) for back in range(3))
-        along, was, lag = (due - before) * self.rate, (before - earlier) * self.rate, before - self.base
-        if not lag.any() and np.array_equal(self._speed, was):
-            return due, along
-        deceleration, took_s = self.rig.safety.deceleration_rad_s2, np.minimum(self._elapsed_s(now), self._sample_s)
-        # Half of what a stop slows down by is left for what samples make of a parabola.
-        softly = np.minimum(np.abs(lag) * self.rate, np.sqrt(deceleration * np.abs(lag)))
-        change = np.maximum(deceleration, np.abs(along - was) * self.rate) * took_s
-        fastest = np.maximum(np.abs(along), self._walk)
-        speed = np.clip(along + np.copysign(softly, lag), self._speed - change, self._speed + change)
-        speed = np.clip(speed, -fastest, fastest)
-        on_plan = (np.abs(lag) < NO_LAG_RAD) & (speed == along)
-        reference = self.base + np.where(on_plan, due - before, speed * took_s)
-        return np.where(np.abs(reference - due) < NO_LAG_RAD, due, reference), speed
 
-    def _planned(self, found: int) -> NDArray:
-        """Return the set-points (J,) rad that are due at a sample; refuse a plan that leaps there."""
-        index = self._index(found)
-        before, due = self._path(max(index - 1, 0)), self._path(index)
-        refuse_leap(self.rig.drive, before, due, self._sample_s)
-        return due
+        Raises
+        ------
+        DeviceError
+            The plan leaps there or leaves its limits, or is too far ahead.
+        """
+        drive, base, moves = self.rig.drive[joint], float(self.base[joint]), float(self._speed[joint])
+        due, before, earlier = (float(self._path(self._index(found - back))[joint]) for back in range(3))
+        refuse_leap(drive, before, due, 1.0 / self.rate)
+        along, was, lag = (due - before) * self.rate, (before - earlier) * self.rate, before - base
+        if lag == 0.0 and moves == was:
+            return due, along
+        deceleration, took_s = self.rig.safety.deceleration_rad_s2, min(self._elapsed_s(joint, now), 1.0 / self.rate)
+        # Half of what a stop slows down by is left for what samples make of a parabola.
+        softly = min(abs(lag) * self.rate, sqrt(deceleration * abs(lag)))
+        change = max(deceleration, abs(along - was) * self.rate) * took_s
+        fastest = max(abs(along), WALK * drive.speed_rad_s)
+        speed = float(np.clip(along + copysign(softly, lag), moves - change, moves + change))
+        speed = float(np.clip(speed, -fastest, fastest))
+        on_plan = abs(lag) < NO_LAG_RAD and speed == along
+        reference = base + (due - before if on_plan else speed * took_s)
+        self._refuse_to_lag(joint, abs(due - reference))
+        return (due if abs(reference - due) < NO_LAG_RAD else reference), speed
 
     def _path(self, index: int) -> NDArray:
         """Return the set-points (J,) rad of the path, whose first is where the leg stood."""
@@ -539,54 +517,52 @@ class Supervisor:
         found = [self._heed_enabled(j, one) for j, one in enumerate(told.drives) if isinstance(one, Reading)]
         return next(filter(None, found), None)
 
-    def _refuse_to_lag(self, due: NDArray, reference: NDArray) -> None:
-        """Refuse to go on where what was missed cannot be walked back to in reasonable time."""
-        for drive, lag in zip(self.rig.drive, np.abs(due - reference), strict=True):
-            allowed = drive.speed_rad_s * self.rig.safety.watchdog_s
-            if not lag <= allowed:
-                raise DeviceError(
-                    f"{drive.joint}: its set-points are {lag:.3f} rad behind the plan after missed samples, allowed "
-                    f"are {allowed:.3f} rad (speed_rad_s x watchdog_s); its answers are lost too often, or this "
-                    "computer is too busy"
-                )
+    def _refuse_to_lag(self, joint: int, lag: float) -> None:
+        """Refuse to go on where what was missed, rad, cannot be walked back to in reasonable time."""
+        drive = self.rig.drive[joint]
+        allowed = drive.speed_rad_s * self.rig.safety.watchdog_s
+        if not lag <= allowed:
+            raise DeviceError(
+                f"{drive.joint}: its set-points are {lag:.3f} rad behind the plan after missed samples, allowed are "
+                f"{allowed:.3f} rad (speed_rad_s x watchdog_s); its answers are lost too often, or this computer is "
+                "too busy"
+            )
 
     def refuse_after_abort(self) -> None:
         """Refuse to go on where the run is being stopped."""
         if self.why is not None:
             raise DeviceError(self.why)
 
-    def _send(self, reference: NDArray, speed: NDArray, now: float) -> None:
-        """Let set-points pass, and remember how they move, in case they must be slowed down."""
-        refuse_leap(self.rig.drive, self.base, reference, self._sample_s)
-        refuse_leap(self.rig.drive, self.sent, reference, self._allowed_s(now))
-        self._in_force, self._speed = self.base.copy(), speed
-        self._note(slice(None), reference, now)
+    def _follow(self, joint: int, reference: float, speed: float, now: float) -> float:
+        """Let a set-point (rad) of the plan, or of the way back there, pass; refuse one beyond the limits."""
+        drive = self.rig.drive[joint]
+        refuse_leap(drive, self.base[joint], reference, 1.0 / self.rate)
+        refuse_leap(drive, self.sent[joint], reference, self._allowed_s(joint, now))
+        self._in_force[joint] = self.base[joint]
+        return self._send(joint, reference, speed, now)
 
-    def _elapsed_s(self, now: float) -> NDArray:
-        """Return the time since each drive's last set-point, (J,) s.
+    def _elapsed_s(self, joint: int, now: float) -> float:
+        """Return the time since a drive's last set-point, s.
 
         By the host's clock, or by cycles in lockstep: a counter that runs too fast does not make time go by.
         """
         if self.rig.clock == "lockstep":
-            return self._sample_s
-        return (now - self.sent_at) * (1.0 + RATE_TOLERANCE)
+            return 1.0 / self.rate
+        return float(now - self.sent_at[joint]) * (1.0 + RATE_TOLERANCE)
 
-    def _allowed_s(self, now: float) -> NDArray:
-        """Return for how long each joint's speed limit may have led it from its last set-point to its next, (J,) s."""
-        return self._elapsed_s(now) + SLACK_SAMPLES / self.rate - self._lead
+    def _allowed_s(self, joint: int, now: float) -> float:
+        """Return for how long a joint's speed limit may have led it from its last set-point to its next, s."""
+        return self._elapsed_s(joint, now) + SLACK_SAMPLES / self.rate - float(self._lead[joint])
 
-    def _note(self, which: slice, reference: NDArray, now: float) -> None:
-        """Note set-points, rad, of ``which`` joints that are sent now."""
-        for state, before in zip(self._decided, self._before, strict=True):
-            before[which] = state[which]
-        stays = (self.rig.clock == "lockstep") | (self._pace[which] == 0.0)
-        self._fresh_until[which] = np.where(stays, inf, self._heard_at[which] + FRESH_SAMPLES / self.rate)
-        taken = np.abs(reference - self.sent[which]) / [drive.speed_rad_s for drive in self.rig.drive[which]]
-        ahead = self._lead[which] + taken - self._elapsed_s(now)[which]
-        self._lead[which] = np.clip(ahead, 0.0, SLACK_SAMPLES / self.rate)
-        self._pace[which] = (reference - self.sent[which]) / np.maximum(now - self.sent_at[which], 1.0 / self.rate)
-        self.sent[which] = self.base[which] = reference
-        self.sent_at[which] = now
+    def _send(self, joint: int, reference: float, speed: float, now: float) -> float:
+        """Note the set-point (rad) that a drive is sent now, and how fast it moves, rad/s; return it."""
+        taken = abs(reference - self.sent[joint]) / self.rig.drive[joint].speed_rad_s
+        ahead = self._lead[joint] + taken - self._elapsed_s(joint, now)
+        self._lead[joint] = np.clip(ahead, 0.0, SLACK_SAMPLES / self.rate)
+        self._pace[joint] = (reference - self.sent[joint]) / max(now - self.sent_at[joint], 1.0 / self.rate)
+        self.sent[joint] = self.base[joint] = reference
+        self.sent_at[joint], self._speed[joint] = now, speed
+        return reference
 
 
 def _reason(error: BaseException) -> str:

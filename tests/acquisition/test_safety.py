@@ -375,10 +375,10 @@ def test_a_cuff_sensor_that_falls_silent_ends_the_run(stopped, silence):
 
 @pytest.mark.parametrize("angle", [np.nan, 1.8, 0.52])
 def test_no_set_point_is_sent_that_is_no_number_or_beyond_a_limit_or_too_far_from_the_last(rig_file, angle):
-    rig, last = load_rig(rig_file()), np.array([0.5, 0.0])
-    refuse_leap(rig.drive, last, np.array([0.514, 0.0]), np.full(2, 1 / RATE))
+    drive = load_rig(rig_file()).drive[0]
+    refuse_leap(drive, 0.5, 0.514, 1 / RATE)
     with pytest.raises(DeviceError, match="it was not sent"):
-        refuse_leap(rig.drive, last, np.array([angle, 0.0]), np.full(2, 1 / RATE))
+        refuse_leap(drive, 0.5, angle, 1 / RATE)
 
 
 def test_a_leg_that_moves_before_the_drives_are_enabled_is_left_alone(stopped, monkeypatch):

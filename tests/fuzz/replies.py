@@ -219,7 +219,7 @@ class Client:
 
     async def _cycle(self, rng: Random) -> None:
         for number in range(3):
-            await self.machine.cycle(np.array([0.1, -0.1]), number)
+            await self.machine.cycle(number, lambda drive: drive.exchange(0.1))
 
     async def _felt(self, rng: Random) -> None:
         await self.machine.felt(0)
