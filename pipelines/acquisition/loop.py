@@ -316,10 +316,12 @@ class Loop:
                 if not tending.cancelled() and (error := tending.exception()):
                     self.supervisor.abort(error)
             self._heed(joint)
+            due_at = float(self.supervisor.sent_at[joint])
             while True:
-                # On the host's clock: the device's counter may be what has failed. What is late is not caught up
-                # with, so that set-points never come faster than samples.
-                due_at = self._told_at(joint) + period
+                # On the host's clock: the device's counter may be what has failed. A sample after the last was due, not
+                # after it was answered: a drive that samples before a set-point comes goes on by itself, and is led
+                # back with a jerk. What was late by more than half a sample is not caught up with.
+                due_at = max(due_at, float(self.supervisor.sent_at[joint]) - 0.5 * period) + period
                 await asyncio.sleep(0.0 if drive.in_lockstep else max(0.0, due_at - time.monotonic()))
                 try:
                     async with drive.device.turn():

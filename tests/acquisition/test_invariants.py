@@ -163,6 +163,7 @@ def check_every_invariant(clock, reads_back, count_rad, line, goes_on, human, ha
         a_drive_that_says_it_is_not_enabled_is_told_to_disable_and_nothing_else(simulated)
         motion_stops_within_the_stated_number_of_cycles(simulated)
         a_leg_is_slowed_down_before_its_torque_is_taken_away(simulated)
+        a_stop_goes_on_in_step_with_its_drives_samples(simulated)
         no_drive_that_answers_is_told_nothing_for_long(simulated)
         the_abort_is_told(simulated, folder)
         drives_are_disabled_or_it_is_said_that_they_are_not(simulated)
@@ -242,6 +243,20 @@ def a_leg_is_slowed_down_before_its_torque_is_taken_away(run):
             assert len(told) >= HOLD_SAMPLES
             # After a silence it is held where its drive is found.
             assert len(set(told[-HOLD_SAMPLES // 2 :])) == 1
+
+
+def a_stop_goes_on_in_step_with_its_drives_samples(run):
+    """Else a drive that is told nothing for one goes on by itself, and is led back with a jerk."""
+    rig = run.rig.rig
+    if run.aborted_at is None or rig.clock == "lockstep" or rig.line:
+        return
+    for drive in run.rig.drives:
+        mine = [asked for asked in run.rig.asked if drive.settings.joint in asked.label]
+        if any(asked.answered > run.aborted_at and not asked.was_answered_by(asked.time + SOON_S) for asked in mine):
+            continue
+        told = [t.time for t in run.rig.told if t.joint == drive.joint and t.control != 0 and t.time > run.aborted_at]
+        in_step = np.arange(len(told)) / RATE
+        assert (np.abs(np.array(told) - (told or [0.0])[0] - in_step) <= 0.5 / RATE + 1e-9).all()
 
 
 def no_drive_that_answers_is_told_nothing_for_long(run):

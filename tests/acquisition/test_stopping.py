@@ -98,3 +98,17 @@ def test_a_run_goes_on_after_one_lost_reply_though_the_other_drive_was_slowed_do
     # reply_s is three samples; on a shared line the device is not asked again for as long.
     assert run.result.missed <= (7 if line else 4)
     no_drive_leaps(run)
+
+
+@pytest.mark.parametrize("at", range(150, 220))
+def test_a_stop_leaves_no_sample_of_a_drive_without_a_set_point(tmp_path, monkeypatch, at):
+    """Else it goes on by itself for a sample, and is led back with a jerk; replies take a fifth of a sample here."""
+    took_s = 0.2 / RATE
+    monkeypatch.setattr("tests.acquisition.simulated.LATENCY_S", took_s)
+    run = run_with(tmp_path, Event(at, "signal"))
+    assert run.supervisor.why == "stopped by SIGTERM"
+    for joint in range(2):
+        told = [told for told in run.rig.told if told.joint == joint and told.control]
+        sample = [int((one.time + took_s - run.rig.began) * RATE) for one in told if one.time >= run.aborted_at]
+        assert len(sample) >= 20
+        assert set(np.diff(sample)) == {1}
