@@ -87,6 +87,8 @@ class Supervisor:
         """(J,) when they were sent, host's clock, s."""
         self._heard_at = np.zeros_like(self.sent)
         """(J,) when each drive answered last, host's clock, s: what it was sent since may not have arrived."""
+        self._unheard = np.zeros(len(rig.drive), dtype=int)
+        """(J,) set-points since each drive answered last."""
         self.pressing = False
         """Whether slowing down would go on pressing: the drives are then disabled without it."""
         self._limits = Limits(rig, sample_rate_hz, sensors)
@@ -192,12 +194,18 @@ class Supervisor:
 
     def hear(self, joint: int, at: float) -> None:
         """Note when a drive has answered, so that what it was sent has arrived."""
-        self._heard_at[joint] = max(self._heard_at[joint], at)
+        if at > self._heard_at[joint]:
+            self._heard_at[joint], self._unheard[joint] = at, 0
 
     def is_stale(self, joint: int, now: float) -> bool:
-        """Tell whether a drive's set-point is so old that nobody knows what it has made of it."""
-        if self.rig.clock == "lockstep" or self._pace[joint] == 0.0:  # one that is held has nowhere to go on to
+        """Tell whether nobody knows what a drive has made of its set-points: the last answer is too old.
+
+        In lockstep a drive holds the last one that arrived, however long, and those that did not add up to a leap.
+        """
+        if self._pace[joint] == 0.0:  # one that is held has nowhere to go on to
             return False
+        if self.rig.clock == "lockstep":
+            return bool(self._unheard[joint] >= SLACK_SAMPLES)
         return bool(now - self._heard_at[joint] > SLACK_SAMPLES / self.rate)
 
     def resume(self, joint: int, reading: Reading, now: float) -> None:
@@ -562,6 +570,7 @@ class Supervisor:
         self._pace[joint] = (reference - self.sent[joint]) / max(now - self.sent_at[joint], 1.0 / self.rate)
         self.sent[joint] = self.base[joint] = reference
         self.sent_at[joint], self._speed[joint] = now, speed
+        self._unheard[joint] += 1
         return reference
 
 

@@ -342,6 +342,10 @@ relaxed = dict(deadline=None, suppress_health_check=list(HealthCheck))
 
 
 @example(
+    clock="lockstep", reads_back=True, count_rad=FINE_RAD, line=None, goes_on=False, human=False,
+    happens=[Event(at=87, kind="dead", what=6)], plan=None, own=None,
+)  # fmt: skip
+@example(
     clock="real_time", reads_back=False, count_rad=FINE_RAD, line="tcp", goes_on=False, human=True,
     happens=[Event(at=263, kind="dead", what=5), Event(at=280, kind="cancel", what=None)], plan=None, own=None,
 )  # fmt: skip
