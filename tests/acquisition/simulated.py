@@ -264,6 +264,8 @@ class SimulatedRig:
                 self.failed_to_disable[drive.joint] += 1
         if kind == "raise":
             error = event.what()
+            if isinstance(error, DeviceError):  # a device's own name it
+                error = DeviceError(f"{device.label}: {error}")
             self.raised.append((self.clock.now, error))
             raise error
         await asyncio.sleep(event.what if kind == "late" else LATENCY_S)
