@@ -1,6 +1,7 @@
 """How often a line can carry what a cycle asks of it: a serial line takes its time for every character."""
 
 from collections import defaultdict
+from collections.abc import Mapping
 from math import floor
 
 from pipelines.acquisition.pace import SLOW
@@ -30,13 +31,13 @@ def refuse_slow_lines(rig: RigSettings, sample_rate_hz: float, *, with_sensors: 
 def highest_rate(rig: RigSettings, *, with_sensors: bool) -> tuple[float, str | None]:
     """Return the most samples a second, Hz, and the line that a sample waits for longest.
 
-    A cycle looks at the first drive's counter, exchanges the drives, then reads the sensors and, where drives record
-    themselves, drains each. Lines work side by side, devices on one line take turns. Infinity and None where the speed
-    of no line is known.
+    A cycle looks at the first drive's counter, exchanges the drives, then reads the sensors that are due and, where
+    drives record themselves, drains each. Lines work side by side, devices on one line take turns. Infinity and None
+    where the speed of no line is known.
     """
     first = rig.drive[0]
     look = rig.line_of(first).exchange_s(read_characters(rig.map.drive[first.map].read.sequence.registers))
-    drives, sensors, drains, records = (defaultdict[str | None, float](float) for _ in range(4))
+    drives, drains, records = (defaultdict[str | None, float](float) for _ in range(3))
     for drive in rig.drive:
         drives[drive.line] += rig.line_of(drive).exchange_s(exchange_characters(rig.map.drive[drive.map]))
         if rig.sampling == "recorder":
@@ -44,8 +45,7 @@ def highest_rate(rig: RigSettings, *, with_sensors: bool) -> tuple[float, str | 
             took_s, brings = drain(rig.line_of(drive), rig.map.drive[drive.map])
             drains[drive.line] += took_s
             records[drive.line] += took_s / brings * rig.record_rate_hz
-    for sensor in rig.sensor if with_sensors else ():
-        sensors[sensor.line] += rig.line_of(sensor).exchange_s(read_characters(_count(rig.map.sensor[sensor.map])))
+    sensors = _sensors_s(rig) if with_sensors else {}
     cycle = look + max(drives.values()) + max(sensors.values(), default=0.0)
     left = 1.0 - max(records.values(), default=0.0)
     longest = max(
@@ -56,6 +56,21 @@ def highest_rate(rig: RigSettings, *, with_sensors: bool) -> tuple[float, str | 
     busy = {name: sum(step.get(name, 0.0) for step in (drives, sensors, drains)) for name in rig.line}
     slowest = max(busy, key=lambda name: busy[name], default=None)
     return (1.0 / longest, slowest) if longest else (float("inf"), None)
+
+
+def _sensors_s(rig: RigSettings) -> Mapping[str | None, float]:
+    """Return how long each line carries the sensors that are read in one cycle, s, where that is longest.
+
+    Sensors that are read equally seldom take turns; of those that are not, the longest turns come together some time.
+    """
+    turns = defaultdict[tuple[str | None, int], defaultdict[int, float]](lambda: defaultdict(float))
+    for sensor in rig.sensor:
+        took_s = rig.line_of(sensor).exchange_s(read_characters(_count(rig.map.sensor[sensor.map])))
+        turns[sensor.line, sensor.every][rig.turn_of(sensor)] += took_s
+    longest = defaultdict[str | None, float](float)
+    for (line, _), took in turns.items():
+        longest[line] += max(took.values())
+    return longest
 
 
 def drain(line: LineSettings, registers: DriveMap) -> tuple[float, int]:

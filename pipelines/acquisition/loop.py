@@ -376,7 +376,7 @@ class Loop:
         """Watch the cuffs while the drives slow down: whoever is still pressed is not to be held there."""
         try:
             while not self.supervisor.pressing:
-                self.supervisor.feel_cuffs(await self.machine.felt(0))
+                self.supervisor.feel_cuffs(await self.machine.felt())
                 await asyncio.sleep(1.0 / self._rate)
         except asyncio.CancelledError:  # the drives are disabled
             pass

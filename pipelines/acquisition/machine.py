@@ -414,10 +414,15 @@ class Sensor:
         self.map = rig.map.sensor[settings.map]
         self.device = Device(f"sensor {settings.cuff}", settings.unit, line, rig.safety)
         self.block = Block(registers_of(self.map.read))
+        self._turn = rig.turn_of(settings)
         self._patience = Patience(rig.safety.watchdog_s)
         self._last: float | None = None
         self._owes = False
         """Whether an answer of it may still come that another request's would be taken for."""
+
+    def is_due(self, cycle: int) -> bool:
+        """Tell whether it is read in a cycle."""
+        return cycle % self.settings.every == self._turn
 
     async def look(self) -> tuple[float, float, float] | None:
         """Return the force (N), or None where the sensor has no new sample or, for once, does not answer.
@@ -567,7 +572,7 @@ class Machine:
         if self.rig.sampling == "recorder" and self.rig.clock == "real_time" and self.rig.clocks == "common":
             await self._find_leads()
         self._counted = looks[-1][0].sequence
-        return Row(tuple(looks[-1]), await self.felt(0), self.samples_per_cycle)
+        return Row(tuple(looks[-1]), await self.felt(), self.samples_per_cycle)
 
     async def _find_leads(self) -> None:
         """Find out how far the counters are apart though they go on while one drive after the other is asked.
@@ -623,9 +628,9 @@ class Machine:
         row = Row(tuple(readings), forces, self.samples_per_cycle) if whole else None
         return Answers(tuple(told), forces, row)
 
-    async def felt(self, number: int) -> NDArray:
-        """Return the forces (4, 3) N of those sensors that are due in a cycle."""
-        due = [sensor for sensor in self.sensors if number % sensor.settings.every == 0]
+    async def felt(self, cycle: int | None = None) -> NDArray:
+        """Return the forces (4, 3) N of those sensors that are due in a cycle, without one of all."""
+        due = [sensor for sensor in self.sensors if cycle is None or sensor.is_due(cycle)]
         if not due:
             return self.no_force
         forces = self.no_force.copy()

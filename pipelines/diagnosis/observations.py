@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from pipelines.effects.friction import Friction
 from pipelines.estimation.regression import away_from_reversals, away_from_turns, block_average
 from pipelines.mechanics.machine import Machine
-from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque
-from pipelines.mechanics.motion import CUFFS, Motion
+from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.slow_motion import filtered, unsure
 from pipelines.signals.blocks import BlockAverage
 
@@ -78,7 +77,7 @@ class Run:
         """Return what was measured where the links move otherwise than the encoders say, (m, O) N·m."""
         if link.q is self.motion.q or not self.has_cuffs:
             return self.measured
-        cuffs = cuff_torque_of(self.motion, link.q)
+        cuffs = self.motion.cuff_torque(link.q)
         assert cuffs is not None, "a run that has cuffs has their forces"
         joints = len(self.motion.joints)
         return np.hstack([self.measured[:, :joints], np.nan_to_num(self.average(cuffs))])
@@ -87,18 +86,6 @@ class Run:
     def has_cuffs(self) -> bool:
         """Whether the person's share was measured."""
         return self.measured.shape[1] > len(self.motion.joints) and bool(self.usable[:, -1].any())
-
-
-def cuff_torque_of(motion: Motion, q: NDArray) -> NDArray | None:
-    """Torque that the cuffs exert on a limb at angles ``q``, (n, 2) N·m; None where it was not measured."""
-    g = motion.geometry
-    if motion.forces is None or motion.run != "with_human" or motion.machine.mechanism is not LEG:
-        return None
-    if g.thigh_cuff_distance_m is None or g.shank_cuff_distance_m is None:
-        return None
-    thigh, shank = (motion.forces[:, [i for i, c in enumerate(CUFFS) if c.startswith(s)]].sum(axis=1)
-                    for s in ("thigh", "shank"))  # fmt: skip
-    return cuff_torque(thigh, shank, q, g)
 
 
 def observe(motion: Motion, cutoff_hz: float | None = None) -> Run:
@@ -110,7 +97,7 @@ def observe(motion: Motion, cutoff_hz: float | None = None) -> Run:
     valid = block.all(trusted, starts)
     usable = valid[:, np.newaxis] & block.all(away_from_reversals(motion), starts)
     outputs = [motion.torque]
-    cuffs = cuff_torque_of(motion, motion.q)
+    cuffs = motion.cuff_torque(motion.q) if motion.run == "with_human" else None
     if cuffs is None:
         outputs.append(np.full_like(motion.torque, np.nan))
         usable = np.hstack([usable, np.zeros_like(usable)])

@@ -19,6 +19,11 @@ class Geometry:
     shank_cuff_distance_m: float | None = None
     """Knee axis to shank cuff; None where there are no cuff forces."""
 
+    @property
+    def has_cuffs(self) -> bool:
+        """Whether it says where both cuffs are."""
+        return None not in (self.thigh_cuff_distance_m, self.shank_cuff_distance_m)
+
     def metadata(self) -> dict[str, float]:
         """Return what a file says of it; lengths that are not known are left out."""
         return {key: value for key, value in asdict(self).items() if value is not None}

@@ -14,12 +14,16 @@ from pipelines.contracts.table import Table
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.load import Load, load_along
 from pipelines.mechanics.machine import Machine, machine_of
-from pipelines.mechanics.mechanisms.leg import cuff_torque
+from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque
 from pipelines.mechanics.units import Scale
+from pipelines.signals.interpolation import between_readings
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 
 LOAD_CUTOFF_HZ = 5.0
 """Of a load that is to be differentiated twice: noise at 25 Hz would weigh 600 times what it does at 1 Hz."""
+
+MOST_UNREAD_S = 0.1
+"""Forces read further apart than this are not known between: a leg that moves at 1 Hz goes a tenth of its way there."""
 
 LOADS = ("transmitted", "on_limb", "link_swing", "limb_swing")
 """What a motion knows of loads, and keeps."""
@@ -48,7 +52,7 @@ class Motion:
     joints: tuple[str, ...] = ("hip", "knee")
     geometry: Geometry = field(default_factory=Geometry)
     forces: NDArray | None = None
-    """(n, 4, 3) N, cuffs in the order of ``CUFFS``; None where they were not read."""
+    """(n, 4, 3) N as read, cuffs in the order of ``CUFFS``; None where they were not read."""
     reference: NDArray | None = None
     """(n, J) commanded angle."""
     measured_angle: NDArray | None = None
@@ -105,6 +109,29 @@ class Motion:
             yield slice(int(start), int(stop))
 
     @cached_property
+    def felt(self) -> NDArray | None:
+        """Cuff forces at every sample, (n, 4, 3) N, for sensors are often read less often than drives.
+
+        NaN where readings are too far apart to know; None where there are none.
+        """
+        if self.forces is None or np.isfinite(self.forces).all():
+            return self.forces
+        made, longest = self.forces.copy(), max(round(MOST_UNREAD_S * self.sample_rate_hz), 1)
+        for stretch in self.segments():
+            for cuff in range(len(CUFFS)):
+                made[stretch, cuff] = between_readings(self.forces[stretch, cuff], longest)
+        return made
+
+    def cuff_torque(self, q: NDArray) -> NDArray | None:
+        """Return the torque of the cuffs on a limb at angles ``q``, (n, 2) N·m, NaN where it is not known.
+
+        None where it was not measured.
+        """
+        if self.felt is None or self.machine.mechanism is not LEG or not self.geometry.has_cuffs:
+            return None
+        return cuff_torque(self.felt[:, :2].sum(axis=1), self.felt[:, 2:].sum(axis=1), q, self.geometry)
+
+    @cached_property
     def transmitted(self) -> tuple[NDArray, NDArray, NDArray]:
         """Torque passed on to the links, its first and its second derivative, (n, J) each.
 
@@ -120,10 +147,10 @@ class Motion:
         """
         if self.limb_load is not None:
             return self._smoothed(self.limb_load)
-        if self.forces is None or self.geometry.thigh_cuff_distance_m is None:
+        felt = self.cuff_torque(self.q)
+        if felt is None:
             return self.transmitted
-        thigh, shank = self.forces[:, :2].sum(axis=1), self.forces[:, 2:].sum(axis=1)
-        return self._smoothed(cuff_torque(thigh, shank, self.q, self.geometry))
+        return self._smoothed(np.where(np.isfinite(felt), felt, self.transmitted[0]))
 
     @cached_property
     def link_swing(self) -> Load | None:

@@ -461,7 +461,11 @@ class SensorSettings(DeviceSettings):
 
     cuff: Literal["thigh_front", "thigh_back", "shank_front", "shank_back"] = Field(description="Where it sits.")
     every: int = Field(
-        1, ge=1, le=MOST_EVERY, description="Cycles from one reading to the next; rows between hold no force."
+        1,
+        ge=1,
+        le=MOST_EVERY,
+        description="Cycles from one reading to the next; rows between hold no force. Sensors with the same number "
+        "take turns.",
     )
 
 
@@ -667,6 +671,11 @@ class RigSettings(Settings):
     def line_of(self, device: DeviceSettings) -> LineSettings:
         """Return the line that a device is on."""
         return TcpLine(host=device.host, port=device.port) if device.line is None else self.line[device.line]
+
+    def turn_of(self, sensor: SensorSettings) -> int:
+        """Return in which of its ``every`` cycles a sensor is read: those that are read equally seldom take turns."""
+        alike = [other.cuff for other in self.sensor if other.every == sensor.every]
+        return alike.index(sensor.cuff) % sensor.every
 
     def in_force(self, run: str) -> Self:
         """Return the rig with the limits in force in a run (``exo_alone`` or ``with_human``), and no others."""

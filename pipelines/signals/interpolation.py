@@ -1,9 +1,10 @@
-"""Interpolation between evenly spaced samples."""
+"""Interpolation between samples."""
 
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import Akima1DInterpolator
 
 Place = TypeVar("Place", float, NDArray[np.float64])
 
@@ -16,3 +17,24 @@ def cubic_weights(x: Place) -> tuple[Place, Place, Place, Place]:
         -(x + 1) * x * (x - 2) / 2,
         (x + 1) * x * (x - 1) / 6,
     )
+
+
+def between_readings(x: NDArray, longest: int) -> NDArray:
+    """Return what is read only now and then at every sample, (n, k), along Akima's curve through its readings.
+
+    Parameters
+    ----------
+    x : NDArray
+        (n, k); a row with a NaN is no reading.
+    longest : int
+        Readings further apart than so many samples tell nothing of what is between them: NaN.
+    """
+    read = np.flatnonzero(np.isfinite(x).all(axis=1))
+    if len(read) in (0, 1, len(x)):
+        return x
+    every = np.arange(len(x))
+    made: NDArray = Akima1DInterpolator(read, x[read])(every)
+    later = np.searchsorted(read, every).clip(1, len(read) - 1)
+    made[read[later] - read[later - 1] > longest] = np.nan
+    made[read] = x[read]
+    return made

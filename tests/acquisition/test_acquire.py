@@ -11,7 +11,7 @@ from pipelines.acquisition.acquire import acquire
 from pipelines.acquisition.recorded import write_recording
 from pipelines.contracts import RECORDING
 from pipelines.mechanics.mechanisms.leg import cuff_torque
-from pipelines.mechanics.motion import geometry_of
+from pipelines.mechanics.motion import CUFFS, geometry_of
 from pipelines.mechanics.trajectory import read_trajectory
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record as record_by_arrays
@@ -77,11 +77,13 @@ def test_cuff_forces_are_read_with_the_human_only_and_belong_to_their_sample(rec
     assert (own.std(axis=0) < 0.8 * table.stacked("torque").std(axis=0)).all()
 
 
-def test_a_sensor_read_every_fourth_cycle_leaves_the_rows_between_empty(record):
+def test_sensors_read_every_fourth_cycle_take_turns_and_leave_the_rows_between_empty(record):
     frame = record(run="with_human", replace={'map = "force"': 'map = "force"\nevery = 4'}).frame
-    read = frame["thigh_back_force_y_n"].notna()
-    assert read.sum() == 50
-    assert set(np.diff(np.flatnonzero(read))) == {4}
+    read = frame[[f"{cuff}_force_y_n" for cuff in CUFFS]].notna().to_numpy()
+    assert (read.sum(axis=0) == 50).all()
+    for sensor in read.T:
+        assert set(np.diff(np.flatnonzero(sensor))) == {4}
+    assert (read.sum(axis=1) == 1).all()
 
 
 def test_a_drive_that_tells_neither_speed_nor_set_point_is_recorded_all_the_same(record):

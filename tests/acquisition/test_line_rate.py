@@ -45,6 +45,12 @@ def test_sensors_on_a_line_take_their_share_of_every_sample_that_reads_them(rig_
     look, drives, sensors = (17 + 7) * character, 2 * (52 + 7) * character, 4 * (29 + 7) * character
     assert highest_rate(rig, with_sensors=False) == (pytest.approx(1 / (look + drives)), "leg")
     assert highest_rate(rig, with_sensors=True) == (pytest.approx(1 / (look + drives + sensors)), "leg")
+    # Two of the four are read every third cycle, in turns: one of them beside the other two at most.
+    seldom = rig.model_copy(
+        update={"sensor": tuple(s.model_copy(update={"every": 3 if i < 2 else 1}) for i, s in enumerate(rig.sensor))}
+    )
+    sensors *= 3 / 4
+    assert highest_rate(seldom, with_sensors=True) == (pytest.approx(1 / (look + drives + sensors)), "leg")
 
 
 def test_what_drives_record_themselves_takes_its_share_of_a_line(rig_file):

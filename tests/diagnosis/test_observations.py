@@ -37,6 +37,27 @@ def test_cuffs_tell_the_wearers_torque_better_away_from_turns_than_beside_them(m
     assert np.mean(left[run.valid & ~steady] ** 2) > np.mean(left[steady] ** 2)
 
 
+def in_turns(motion, every=4):
+    """The same run from sensors that take turns, each read once in so many samples."""
+    forces = np.full_like(motion.forces, np.nan)
+    for cuff in range(4):
+        forces[cuff % every :: every, cuff] = motion.forces[cuff % every :: every, cuff]
+    return replace(motion, forces=forces)
+
+
+def test_sensors_that_are_read_in_turns_tell_the_same_torque(motions):
+    whole, thin = observe(motions[3]), observe(in_turns(motions[3]))
+    assert thin.has_cuffs
+    both = thin.usable[:, 2:]
+    assert both.sum() > 0.98 * whole.usable[:, 2:].sum()
+    apart = (thin.measured - whole.measured)[:, 2:][both]
+    assert np.sqrt(np.mean(apart**2)) < 0.05 * whole.measured[:, 2:][both].std()
+
+
+def test_sensors_that_are_read_too_seldom_tell_no_torque(motions):
+    assert not observe(in_turns(motions[3], every=30)).has_cuffs
+
+
 def test_a_validation_run_has_no_cuffs_where_training_had_none(motions):
     trained = observe(replace(motions[2], forces=None))
     validated = observe(motions[3])

@@ -222,7 +222,7 @@ class Client:
             await self.machine.cycle(number, lambda drive: drive.exchange(0.1))
 
     async def _felt(self, rng: Random) -> None:
-        await self.machine.felt(0)
+        await self.machine.felt()
 
     async def _count(self, rng: Random) -> None:
         await self.machine.drives[0].count()

@@ -65,6 +65,10 @@ class Probe:
         self._answers: list[tuple[float, float, list[int]]] = []
         self._last = [0] * self.block.count
 
+    def is_due(self, cycle: int) -> bool:
+        """Tell whether a run reads it in a cycle."""
+        return isinstance(self.part, Drive) or self.part.is_due(cycle)
+
     async def read(self) -> None:
         """Read the block and keep the answer; moves nothing."""
         asked = time.perf_counter()

@@ -44,7 +44,7 @@ async def cycles(probes: Sequence[Probe], seconds: float, rate_hz: float | None,
     began = time.perf_counter()
     while time.perf_counter() - began < seconds or len(durations) < fewest:
         start = time.perf_counter()
-        due = [p.step() for p in sensors if len(durations) % p.every == 0]
+        due = [p.step() for p in sensors if p.is_due(len(durations))]
         if drives and drives[0].in_lockstep:
             await asyncio.gather(*due)
             await asyncio.gather(*(p.step() for p in drives))

@@ -68,8 +68,8 @@ def averages(motion: Motion) -> Averages | None:
         block.mean(x, starts) for x in (motion.q, motion.dq, motion.ddq, np.sign(motion.dq), motion.torque)
     )
     cuffs = None
-    if motion.forces is not None and motion.geometry.shank_cuff_distance_m and motion.geometry.thigh_cuff_distance_m:
-        cuffs = block.mean(np.stack([motion.forces[:, :2].sum(axis=1), motion.forces[:, 2:].sum(axis=1)], 1), starts)
+    if (felt := motion.felt) is not None and motion.geometry.has_cuffs:
+        cuffs = block.mean(np.stack([felt[:, :2].sum(axis=1), felt[:, 2:].sum(axis=1)], 1), starts)
     return Averages(motion, q, dq, ddq, direction, torque, cuffs)
 
 

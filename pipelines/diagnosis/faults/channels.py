@@ -43,8 +43,8 @@ def channel_faults(motion: Motion) -> Iterator[Fault]:
     for joint in range(motion.torque.shape[1]):
         yield from _stuck_angle(motion, joint)
         yield from _torque(motion, joint)
-    if motion.forces is not None and motion.run == "with_human":
-        yield from _forces(motion, motion.forces)
+    if motion.felt is not None and motion.run == "with_human":
+        yield from _forces(motion, motion.felt)
 
 
 def _repeated(motion: Motion) -> Iterator[Fault]:
