@@ -99,8 +99,9 @@ def _record(
         refuse_recorded(output)
     experiment.mechanism.refuse_all_but_the_leg("`exoid acquire`")
     settings, rate = experiment.run_named(run), experiment.acquire.sample_rate_hz
+    watched: list[RigSettings] = []
     reports: list[Callable[[Progress], None]] = []
-    with ExitStack() as shown:
+    with ExitStack() as starting, ExitStack() as shown:
 
         def begin(rig: "RigSettings", motion: "Trajectory") -> None:
             if settings.run == "with_human" and not rig.embedded:
@@ -108,11 +109,21 @@ def _record(
                     console.warn(warning)
                 if not yes:
                     confirm(rig, settings, trajectory, motion, rate)
-            reports.append(shown.enter_context(_watching(rig, run)))
+            watched.append(rig)
+            if rig.embedded:
+                starting.enter_context(
+                    console.starting("starting the virtual rig; the first start compiles, up to a minute")
+                )
+
+        def report(progress: "Progress") -> None:
+            if not reports:
+                starting.close()
+                reports.append(shown.enter_context(_watching(watched[0], run)))
+            reports[0](progress)
 
         outcome = record(
             experiment.file(experiment.acquire.rig), settings, trajectory, output, rate, experiment.mechanism,
-            lambda progress: reports[0](progress), reset_faults=reset_faults, begin=begin,
+            report, reset_faults=reset_faults, begin=begin,
         )  # fmt: skip
     if outcome.missed:
         console.warn(f"{outcome.path}: {outcome.missed} samples were missed; `exoid show` lists the gaps")

@@ -8,6 +8,7 @@ import json
 import math
 import shlex
 import sys
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,6 +26,8 @@ from exoid_cli.column_widths import at_slashes, columns
 
 DRAWING_S = 0.0005
 """How long the drawing of a live picture may hold up the work that it tells of."""
+LATE_S = 5.0
+"""After this long somebody who sees nothing move wonders whether anything goes on."""
 
 
 class Console:
@@ -147,6 +150,19 @@ class Console:
         with Progress(*columns, console=self.err, transient=True, disable=not self._may_move) as line:
             line.add_task(what, total=None)
             yield
+
+    @contextmanager
+    def starting(self, what: str) -> Iterator[None]:
+        """Show what is being started; where nothing moves, a line says so as soon as it takes long."""
+        late = threading.Timer(LATE_S, lambda: self.err.print(Text(what), soft_wrap=True))
+        late.daemon = True
+        if self.speaks and not self._may_move:
+            late.start()
+        try:
+            with self.working(what):
+                yield
+        finally:
+            late.cancel()
 
     @contextmanager
     def live(self, picture: RenderableType) -> Iterator[None]:

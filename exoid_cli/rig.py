@@ -47,7 +47,8 @@ def rig(
         print(f"{line} {place}" if line else place, flush=True)
 
     with starting:
-        starting.enter_context(console.working(f"starting {file.name}; the first start compiles"))
+        if not until_input_ends:
+            starting.enter_context(console.starting(f"starting {file.name}; the first start compiles, up to a minute"))
         from pipelines.rig.server import serve_file  # compiles already
 
         serve_file(file, run, seed, port, sample_rate_hz, announce, until_input_ends=until_input_ends, bind=bind)

@@ -31,6 +31,13 @@ with suppress(ImportError):  # Windows has another way with ports
     BAD_SETTINGS += (termios.error,)
 
 
+CERTIFICATE_ADVICE = {
+    9: "set the clocks of this computer and of the rig, or wait until it is valid",
+    10: "renew it at the rig, or set this computer's clock if that is wrong",
+}
+"""What to do about a certificate that OpenSSL refuses by a code of its own, where it is no matter of whom to trust."""
+
+
 class Owed:
     """An answer that did not come in time, and may still come."""
 
@@ -296,10 +303,10 @@ def _explained(error: OSError) -> str:
     if isinstance(error, socket.gaierror):
         return f"no such host ({error.strerror}); correct host in the rig file, or give its address"
     if isinstance(error, ssl.SSLCertVerificationError):
-        return (
-            f"its certificate is not to be trusted ({error.verify_message.rstrip('.')}); name in ca whoever signed it, "
-            "and in host the name that it is made out to"
+        advice = CERTIFICATE_ADVICE.get(
+            error.verify_code, "name in ca whoever signed it, and in host the name that it is made out to"
         )
+        return f"its certificate is not to be trusted ({error.verify_message.rstrip('.')}); {advice}"
     if isinstance(error, TimeoutError):
         return "no TLS connection within safety.connect_s; check that the rig is on, and that the port speaks TLS"
     if isinstance(error, ssl.SSLError):

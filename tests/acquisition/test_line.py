@@ -7,6 +7,7 @@ import shutil
 import ssl
 import subprocess
 import time
+from datetime import UTC, datetime, timedelta
 
 import pytest
 import serial
@@ -272,6 +273,33 @@ def test_a_rig_whose_certificate_nobody_vouches_for_is_not_trusted(serve, on_lin
         believed = path.with_name("believed.toml")
         believed.write_text(path.read_text().replace(f"ca = '{certificates}/own", f"ca = '{certificates}/other"))
         assert "its certificate is not to be trusted (self-signed certificate" in connecting(believed)
+
+
+@pytest.mark.parametrize(
+    ("days", "found", "advice"),
+    [(-2, "certificate has expired", "renew it at the rig"), (2, "certificate is not yet valid", "set the clocks")],
+)
+def test_a_certificate_out_of_its_time_is_told_as_that(
+    serve, on_line, line_of, certificates, tmp_path, days, found, advice
+):
+    stamp = [f"{datetime.now(UTC) + timedelta(days=days + more):%Y%m%d%H%M%SZ}" for more in (0, 1)]
+    (tmp_path / "ca.cnf").write_text(
+        "[ca]\ndefault_ca = c\n[c]\ndatabase = index\nserial = serial\nnew_certs_dir = .\ndefault_md = sha256\n"
+        "policy = any\nx509_extensions = x\n[any]\ncommonName = optional\n[x]\nsubjectAltName = IP:127.0.0.1\n"
+    )
+    (tmp_path / "index").touch()
+    (tmp_path / "serial").write_text("01\n")
+    key = str(certificates / "own.key")
+    requested = ["openssl", "req", "-new", "-key", key, "-subj", "/CN=own", "-out", "own.csr"]
+    signed = ["openssl", "ca", "-batch", "-config", "ca.cnf", "-selfsign", "-keyfile", key, "-in", "own.csr",
+              "-startdate", stamp[0], "-enddate", stamp[1], "-notext", "-out", "timed.pem"]  # fmt: skip
+    for command in (requested, signed):
+        subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    timed = {kind: str(tmp_path / "timed.pem") for kind in ("ca", "rig_certificate")}
+    path = on_line(line_of("tls", **timed))
+    with serve(path, None):
+        why = connecting(path)
+    assert f"its certificate is not to be trusted ({found}); {advice}" in why
 
 
 @pytest.mark.parametrize("shown", ["", r"\1 = '\2other.\3'\n"], ids=["none", "another's"])

@@ -6,6 +6,7 @@ import pty
 import re
 import subprocess
 import sys
+import time
 
 import pytest
 import typer
@@ -90,3 +91,11 @@ def test_a_remark_is_set_in_and_broken_between_words(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "30")
     Console().note("- creep the empty joint through 0.01 to 0.3 rad/s")
     assert capsys.readouterr().out.splitlines() == ["  - creep the empty joint", "    through 0.01 to 0.3 rad/s"]
+
+
+@pytest.mark.parametrize(("lasts_s", "said"), [(0.5, ["compiling"]), (0.0, [])], ids=["long", "soon"])
+def test_what_is_started_where_nothing_moves_is_told_once_it_takes_long(capsys, monkeypatch, lasts_s, said):
+    monkeypatch.setattr("exoid_cli.console.LATE_S", 0.05 if lasts_s else 5.0)
+    with Console().starting("compiling"):
+        time.sleep(lasts_s)
+    assert capsys.readouterr().err.split() == said
