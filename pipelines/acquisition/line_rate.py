@@ -8,7 +8,7 @@ from pipelines.acquisition.pace import SLOW
 from pipelines.errors import SettingsError
 from pipelines.registers import Block
 from pipelines.settings.line import LineSettings
-from pipelines.settings.rig import MOST_QUEUED, MOST_REGISTERS, DriveMap, RigSettings, SensorMap, registers_of
+from pipelines.settings.rig import DriveMap, RigSettings, SensorMap, registers_of
 
 
 def refuse_slow_lines(rig: RigSettings, sample_rate_hz: float, *, with_sensors: bool) -> None:
@@ -77,10 +77,9 @@ def drain(line: LineSettings, registers: DriveMap) -> tuple[float, int]:
     """Return how long a line carries one full read of a drive's own record, s, and how many samples that brings."""
     ring = registers.ring
     assert ring  # a rig file that asks for recorders has one for every drive
+    brings = ring.records_per_read
     if ring.newest is None:
-        brings = MOST_QUEUED // ring.words
         return line.exchange_s(queue_characters(brings * ring.words)), brings
-    brings = MOST_REGISTERS["read"] // ring.words
     newest = line.exchange_s(read_characters(ring.newest.registers))
     return line.exchange_s(read_characters(brings * ring.words)) + newest, brings
 

@@ -79,7 +79,7 @@ class Reading(Condition):
 class Drive:
     """One drive: set-points out, readings in."""
 
-    def __init__(self, rig: RigSettings, settings: DriveSettings, line: Line) -> None:
+    def __init__(self, rig: RigSettings, settings: DriveSettings, line: Line, samples_per_cycle: int = 1) -> None:
         self.settings = settings
         self.in_lockstep = rig.clock == "lockstep"
         self.map = rig.map.drive[settings.map]
@@ -94,7 +94,7 @@ class Drive:
         self._time = Counter(self.told.span("time"))
         self.bounds: Bounds | None = None
         """Told of every reply, where somebody wants to know when the drive samples."""
-        self.ring = self._its_ring() if rig.sampling == "recorder" else None
+        self.ring = self._its_ring(samples_per_cycle) if rig.sampling == "recorder" else None
         self.recorded = self._recorded()
         """Quantities that the samples which are kept of it hold."""
         self._temperature = np.nan
@@ -107,11 +107,13 @@ class Drive:
         self.conditions: list[Condition] = []
         """What it has told that nobody has heeded yet: whoever asked may not have come to hear it."""
 
-    def _its_ring(self) -> Ring | Queue:
+    def _its_ring(self, samples_per_cycle: int) -> Ring | Queue:
         settings = self.map.ring
         assert settings  # a rig file that asks for recorders has one for every drive
         self._ring_time = Counter(Block(registers_of(settings.record)).span("time"))
-        return Ring(self.device, settings, self._newest) if settings.fifo is None else Queue(self.device, settings)
+        if settings.fifo is not None:
+            return Queue(self.device, settings, samples_per_cycle)
+        return Ring(self.device, settings, self._newest, samples_per_cycle)
 
     def _recorded(self) -> frozenset[str]:
         if self.ring is None or self.map.ring is None:
@@ -490,7 +492,7 @@ class Machine:
         """Take the devices of a rig; drives take so many samples from one set-point to the next."""
         self.rig = rig
         line_of = lines_of(rig)
-        self.drives = [Drive(rig, settings, line_of(settings)) for settings in rig.drive]
+        self.drives = [Drive(rig, settings, line_of(settings), samples_per_cycle) for settings in rig.drive]
         self.sensors = [Sensor(rig, settings, line_of(settings)) for settings in rig.sensor] if with_sensors else []
         self.samples_per_cycle = samples_per_cycle
         self._latches = rig.sampling == "cyclic" and rig.clocks == "common"

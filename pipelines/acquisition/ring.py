@@ -7,14 +7,15 @@ after the records, so that one which the drive may have overwritten meanwhile is
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from math import ceil
 
 from pipelines.acquisition.counter import carried
 from pipelines.acquisition.device import Device
 from pipelines.registers import Block
-from pipelines.settings.rig import MOST_QUEUED, MOST_REGISTERS, RingSettings, registers_of
+from pipelines.settings.rig import RingSettings, registers_of
 
-MOST_READS = 4
-"""Reads in one drain; what is left waits for the next one, as set-points do not."""
+FEWEST_READS = 4
+"""Reads that a drain may take, however few bring what a cycle does."""
 
 Record = Mapping[str, float]
 Numbered = Callable[[float, float | None], int]
@@ -22,10 +23,18 @@ Numbered = Callable[[float, float | None], int]
 was the drive's newest sample, when it was asked for (host's clock, s)."""
 
 
+def most_reads(settings: RingSettings, samples_per_cycle: int) -> int:
+    """Return how many reads one drain may take; what is left waits for the next one, as set-points do not.
+
+    Twice what a cycle brings: what had to wait is made up for.
+    """
+    return max(FEWEST_READS, ceil(2 * samples_per_cycle / settings.records_per_read))
+
+
 class Ring:
     """The ring of one drive, which FC03 reads."""
 
-    def __init__(self, device: Device, settings: RingSettings, numbered: Numbered) -> None:
+    def __init__(self, device: Device, settings: RingSettings, numbered: Numbered, samples_per_cycle: int = 1) -> None:
         assert settings.newest and settings.address is not None and settings.capacity  # a ring has all three
         self._device = device
         self._numbered = numbered
@@ -33,8 +42,9 @@ class Ring:
         self._record = Block(registers_of(settings.record))
         self._span = int(self._record.span("sequence"))
         self._address, self._capacity, self._words = settings.address, settings.capacity, settings.words
-        self.block = MOST_REGISTERS["read"] // settings.words
-        """Records that one read brings."""
+        self.block = settings.records_per_read
+        self._most = most_reads(settings, samples_per_cycle) * self.block
+        """Records that one drain brings."""
         self._next: int | None = None
         self._doubted: int | None = None
 
@@ -49,7 +59,7 @@ class Ring:
         The first drain returns none: it says where to begin.
         """
         first = newest + 1 if self._next is None else max(self._next, newest + 1 - self._capacity)
-        newest = min(newest, first + MOST_READS * self.block - 1)
+        newest = min(newest, first + self._most - 1)
         if first > newest:
             self._next = first
             return []
@@ -95,14 +105,14 @@ class Ring:
 class Queue:
     """The queue of one drive, which FC24 reads and which reading empties."""
 
-    def __init__(self, device: Device, settings: RingSettings) -> None:
+    def __init__(self, device: Device, settings: RingSettings, samples_per_cycle: int = 1) -> None:
         assert settings.fifo is not None  # a queue has an address
         self._device = device
         self._address, self._words = settings.fifo, settings.words
         self._record = Block(registers_of(settings.record))
         self._span = self._record.span("sequence")
-        self.block = MOST_QUEUED // settings.words
-        """Records that one read brings."""
+        self.block = settings.records_per_read
+        self._reads = most_reads(settings, samples_per_cycle)
         self._began: int | None = None
         self._fetched: list[tuple[int, Record]] = []
         """Records that nobody else has any more, until a drain returns them."""
@@ -110,7 +120,7 @@ class Queue:
     async def forget(self) -> bool:
         """Let go what has gathered in it, as far as one drain reaches; tell whether that was all."""
         self._began, self._fetched = None, []
-        for _ in range(MOST_READS):
+        for _ in range(self._reads):
             if len(await self._read()) < self.block:
                 return True
         return False
@@ -122,7 +132,7 @@ class Queue:
         """
         if self._began is None:
             self._began = newest
-        for _ in range(MOST_READS):
+        for _ in range(self._reads):
             found = await self._read()
             numbered = [(int(carried(record["sequence"], newest, self._span)), record) for record in found]
             self._fetched += [(number, record) for number, record in numbered if number > self._began]

@@ -317,7 +317,7 @@ class Supervisor:
         first = answers.drives[0]
         if isinstance(first, Unanswered):
             return None
-        late = first.sequence // self.rig.samples_per_cycle(self.rate) - self._found
+        late = abs(first.sequence // self.rig.samples_per_cycle(self.rate) - self._found)
         return self._limits.straying(answers, self._in_force, late)
 
     def _is_new(self, joint: int, found: Reading | Unanswered, now: float) -> bool:

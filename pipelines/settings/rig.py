@@ -181,6 +181,11 @@ class RingSettings(Settings):
             self._refuse_bad_ring(self.newest)
         return self
 
+    @property
+    def records_per_read(self) -> int:
+        """How many records one read brings at most."""
+        return (MOST_REGISTERS["read"] if self.fifo is None else MOST_QUEUED) // self.words
+
     def _refuse_bad_ring(self, newest: Register) -> None:
         assert self.address is not None and self.capacity is not None  # a ring has all three
         end = self.address + self.capacity * self.words
@@ -721,6 +726,13 @@ class RigSettings(Settings):
                 f"record_rate_hz: found {self.record_rate_hz:g} with set-points at {sample_rate_hz:g} Hz, expected a "
                 "whole multiple; change it or acquire.sample_rate_hz"
             )
+        for name, drive in self.map.drive.items():
+            if drive.ring and drive.ring.capacity and drive.ring.capacity < 2 * ratio:
+                raise SettingsError(
+                    f"map.drive.{name}.ring.capacity: found {drive.ring.capacity} with {ratio:.0f} records from one "
+                    f"set-point to the next, expected at least {2 * ratio:.0f}, or they are overwritten before they "
+                    "are read; lower record_rate_hz or raise acquire.sample_rate_hz"
+                )
         return round(ratio)
 
     def known_geometry(self) -> dict[str, float]:

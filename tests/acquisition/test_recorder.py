@@ -58,6 +58,13 @@ def test_a_set_point_every_fifth_sample_records_every_sample_of_the_run(record, 
     assert_allclose(frame["hip_angle_rad"], frame["hip_reference_rad"], atol=0.1)
 
 
+@pytest.mark.parametrize("drain", [{}, QUEUE], ids=["ring", "queue"])
+def test_a_set_point_every_fiftieth_sample_records_them_all_too(record, drain):
+    rate = {"seed = 1 ": "sample_rate_hz = 20.0\nseed = 1 "}
+    frame = record(shipped="recorder", rate_hz=20.0, watchdog_s=20.0, replace=LOCKSTEP | rate | drain).frame
+    assert np.diff(frame["sequence"]).tolist() == [1] * 999
+
+
 def test_recorded_and_cyclic_samples_tell_the_same_motion(record):
     silent = {"ripple_nm": "[0.0, 0.0]"}
     often = record(shipped="recorder", watchdog_s=20.0, replace=LOCKSTEP, **silent).frame

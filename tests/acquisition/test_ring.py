@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipelines.acquisition.counter import Counter
-from pipelines.acquisition.ring import MOST_READS, Queue, Ring
+from pipelines.acquisition.ring import FEWEST_READS, Queue, Ring
 from pipelines.errors import SettingsError
 from pipelines.registers import Block
 from pipelines.rig import ring as virtual
@@ -127,7 +127,7 @@ def test_a_drain_takes_no_longer_than_a_few_reads_of_125_registers():
     drive.sample(60)
     drive.asked.clear()
     drained(ring, drive.number)
-    assert len(drive.asked) <= MOST_READS + 1
+    assert len(drive.asked) <= FEWEST_READS + 1
     assert max(drive.asked) <= 125
 
 
@@ -166,6 +166,17 @@ def test_a_queue_is_emptied_and_what_it_lost_is_missing():
     assert drained(queue, 13) == truth([13])
 
 
+def test_a_queue_of_short_reads_is_emptied_at_twenty_samples_a_set_point():
+    drive = Drive(QUEUE)
+    drive.sample(1)
+    queue, found = Queue(drive, QUEUE, samples_per_cycle=20), []
+    drained(queue, 0)
+    for _ in range(50):
+        drive.sample(20)
+        found += drained(queue, drive.number)
+    assert found == truth(range(1, 1001))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -186,3 +197,10 @@ def test_a_ring_that_cannot_be_is_refused_with_its_key(rig_file, old, new, words
 def test_a_set_point_rate_that_does_not_divide_the_rings_is_refused(rig_file):
     with pytest.raises(SettingsError, match="record_rate_hz: found 1000 with set-points at 300 Hz, expected a whole"):
         load_rig(rig_file("recorder")).samples_per_cycle(300.0)
+
+
+def test_a_ring_that_is_overwritten_from_one_set_point_to_the_next_is_refused(rig_file):
+    small = rig_file("recorder", replace={"capacity = 2048": "capacity = 16"})
+    assert load_rig(small).samples_per_cycle(200.0) == 5
+    with pytest.raises(SettingsError, match=r"ring\.capacity: found 16 with 10 records from one set-point to the next"):
+        load_rig(small).samples_per_cycle(100.0)
