@@ -35,7 +35,7 @@ def identify(
     method: Annotated[
         str | None,
         typer.Option(
-            help="Estimator; docs/estimators.md tells of each.",
+            help="Estimator, also iv, wls, ols, irls or oe for short; docs/estimators.md tells of each.",
             show_default="[identify] method, weighted_least_squares",
             autocompletion=completion.methods,
         ),

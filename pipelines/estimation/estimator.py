@@ -52,6 +52,8 @@ class Estimator(ABC):
     """A method to fit parameters, as ``exoid identify --method`` names it."""
 
     name: ClassVar[str]
+    short: ClassVar[str] = ""
+    """What papers call it for short, where they do: ``--method`` takes that too."""
     title: ClassVar[str]
     """In the words of a sentence."""
 

@@ -32,6 +32,7 @@ class InstrumentalVariables(Estimator):
     """Instruments from the closed-loop simulation of the identified model; whole runs are held in memory."""
 
     name = "instrumental_variables"
+    short = "iv"
     title = "instrumental variables (IDIM-IV)"
 
     def fit(self, problem: Problem) -> Fit:

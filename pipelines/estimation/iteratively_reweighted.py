@@ -69,6 +69,7 @@ class IterativelyReweighted(Estimator):
     """Huber's weights, then Tukey's bisquare, a scale for each joint."""
 
     name = "iteratively_reweighted"
+    short = "irls"
     title = "iteratively reweighted least squares"
 
     def fit(self, problem: Problem) -> Fit:

@@ -26,6 +26,7 @@ class WeightedLeastSquares(Estimator):
     """Joints weighed by the inverse variance of what the fit leaves at them."""
 
     name = "weighted_least_squares"
+    short = "wls"
     title = "weighted least squares"
     passes = PASSES
 
@@ -56,6 +57,7 @@ class OrdinaryLeastSquares(WeightedLeastSquares):
     """All joints weigh alike, whatever their noise."""
 
     name = "ordinary_least_squares"
+    short = "ols"
     title = "ordinary least squares"
     passes = 0
 

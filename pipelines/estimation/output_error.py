@@ -41,6 +41,7 @@ class OutputError(Estimator):
     """Windows of half a second under the recorded torque; whole runs are held in memory."""
 
     name = "output_error"
+    short = "oe"
     title = "output error"
 
     def fit(self, problem: Problem) -> Fit:

@@ -160,6 +160,15 @@ def test_a_method_that_does_not_exist_is_told_with_the_nearest_that_does():
         estimator_named("instrumental_variable")
 
 
+@pytest.mark.parametrize(
+    ("short", "method"),
+    [("iv", InstrumentalVariables), ("wls", WeightedLeastSquares), ("ols", OrdinaryLeastSquares),
+     ("irls", IterativelyReweighted), ("oe", OutputError)],
+)  # fmt: skip
+def test_a_method_answers_to_what_papers_call_it_for_short(short, method):
+    assert type(estimator_named(short)) is method
+
+
 STEPPED = 9
 """The simulation that tries the search's first step: one for the weights, one to count, one at the start, five and one
 for the slopes there."""
