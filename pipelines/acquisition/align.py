@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from math import floor
 
-from pipelines.acquisition.machine import Reading
+from pipelines.acquisition.drive import Reading
 from pipelines.signals.interpolation import cubic_weights
 
 Position = Callable[[int], float | None]

@@ -2,7 +2,8 @@
 
 from collections.abc import Callable
 
-from pipelines.acquisition.machine import Machine, Row
+from pipelines.acquisition.machine import Machine
+from pipelines.acquisition.row import Row
 from pipelines.contracts.joints import Joint
 from pipelines.mechanics.motion import CUFFS
 

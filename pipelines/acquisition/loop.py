@@ -9,11 +9,13 @@ from functools import partial
 from typing import Any
 
 from pipelines.acquisition.columns import columns_of
+from pipelines.acquisition.drive import Drive, Reading
 from pipelines.acquisition.journal import Journal
 from pipelines.acquisition.latency import Latencies
-from pipelines.acquisition.machine import Answers, Drive, Machine, Reading, Row, all_answers
+from pipelines.acquisition.machine import Machine, all_answers
 from pipelines.acquisition.pace import Lockstep, PhaseLock
 from pipelines.acquisition.plan import Plan
+from pipelines.acquisition.row import Answers, Row
 from pipelines.acquisition.sampling import Sampling
 from pipelines.acquisition.states import SLACK_SAMPLES, State, Supervisor
 from pipelines.errors import DeviceError, Unanswered

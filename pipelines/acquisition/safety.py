@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.acquisition.machine import Answers, Reading, Row
+from pipelines.acquisition.drive import Reading
+from pipelines.acquisition.row import Answers, Row
 from pipelines.errors import DeviceError
 from pipelines.mechanics.motion import CUFFS
 from pipelines.settings.rig import DriveSettings, RigSettings, SensorSettings

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from pipelines.acquisition.align import Alignment
 from pipelines.acquisition.clocks import BUCKET_S, Bounds, Drift
-from pipelines.acquisition.machine import Drive, Machine, Reading, Row, all_answers
+from pipelines.acquisition.drive import Drive, Reading
+from pipelines.acquisition.machine import Machine, all_answers
+from pipelines.acquisition.row import Row
 from pipelines.errors import DeviceError, Unanswered
 
 Judge = Callable[[Row, Sequence[Sequence[Reading]], float], list[list[Reading]]]

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from pipelines.acquisition.counter import RATE_TOLERANCE
 from pipelines.acquisition.cuffs import Cuffs
+from pipelines.acquisition.drive import Condition, Reading
 from pipelines.acquisition.frozen import ANSWER_CYCLES, Told
-from pipelines.acquisition.machine import Answers, Condition, Reading, Row
 from pipelines.acquisition.plan import Plan
+from pipelines.acquisition.row import Answers, Row
 from pipelines.acquisition.safety import HOLD_SAMPLES, Limits, refuse_leap, slowed
 from pipelines.acquisition.stream import Stream
 from pipelines.errors import DeviceError, Unanswered

@@ -9,8 +9,8 @@ contradicts nothing passes; docs/faults.md says how large it can be.
 from math import ceil, inf
 
 from pipelines.acquisition.counter import RATE_TOLERANCE, keeps_time
+from pipelines.acquisition.drive import Reading
 from pipelines.acquisition.frozen import ANSWER_CYCLES, FROZEN_CYCLES, FROZEN_RAD, Held, Told
-from pipelines.acquisition.machine import Reading
 from pipelines.acquisition.patience import Patience
 from pipelines.acquisition.safety import sample_violation
 from pipelines.errors import DeviceError, Unanswered

@@ -10,7 +10,7 @@ from unittest.mock import patch
 
 from pymodbus.client.base import ModbusBaseClient
 
-from pipelines.acquisition import journal, loop, machine, pace
+from pipelines.acquisition import drive, journal, loop, machine, pace, sensor
 from pipelines.acquisition.acquire import _finish, _record
 from pipelines.acquisition.device import Device
 from pipelines.acquisition.line import Line
@@ -405,7 +405,7 @@ def _patched(simulated, time, run, plan, own):
             run.followed_since = time.now
 
     with ExitStack() as stack:
-        for module in (loop, machine, pace):
+        for module in (drive, loop, machine, pace, sensor):
             stack.enter_context(patch.object(module, "time", time))
         stack.enter_context(patch("asyncio.events.new_event_loop", lambda: time))
         # A line gives everybody their turn; every request then goes to the simulated rig.

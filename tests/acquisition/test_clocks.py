@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from pipelines.acquisition.align import Alignment
 from pipelines.acquisition.clocks import BUCKET_S, Bounds, Drift
-from pipelines.acquisition.machine import Reading
+from pipelines.acquisition.drive import Reading
 from pipelines.acquisition.sampling import AIM, SECOND_LOOK
 from pipelines.contracts.table import Table
 from pipelines.identification.two_step import identify

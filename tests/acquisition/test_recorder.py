@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipelines.acquisition import machine, sampling
+from pipelines.acquisition import drive, sampling
 from pipelines.acquisition.acquire import acquire
 from pipelines.acquisition.check.look import probes_of
 from pipelines.acquisition.check.rings import check_rings
@@ -252,7 +252,7 @@ def test_a_check_empties_full_queues_first(with_full_queues):
 
 def test_a_queue_that_fills_faster_than_it_is_read_is_refused_before_the_drives_are_enabled(record, monkeypatch):
     served = []
-    monkeypatch.setattr(machine, "EMPTYING_S", 0.2)
+    monkeypatch.setattr(drive, "EMPTYING_S", 0.2)
     monkeypatch.setattr(Ring, "taken", lambda ring: [0] * 30)
     monkeypatch.setattr(Servo, "hear", lambda servo, reference, control: served.append(control))
     with pytest.raises(DeviceError, match=r"drive hip .*: its queue is not empty after 0\.2 s .* record less often"):

@@ -10,8 +10,9 @@ import pytest
 from pymodbus.constants import ExcCodes
 
 from pipelines.acquisition.device import Device as Line
-from pipelines.acquisition.machine import Reading, Row
+from pipelines.acquisition.drive import Reading
 from pipelines.acquisition.plan import make_plan
+from pipelines.acquisition.row import Row
 from pipelines.acquisition.safety import HOLD_SAMPLES, Limits, refuse_leap, slowed
 from pipelines.contracts import RECORDING
 from pipelines.contracts.beside import journal_of

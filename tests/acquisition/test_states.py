@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.acquisition.machine import Answers, Condition, Reading, Row
+from pipelines.acquisition.drive import Condition, Reading
 from pipelines.acquisition.plan import Plan
+from pipelines.acquisition.row import Answers, Row
 from pipelines.acquisition.states import TRANSITIONS, State, Supervisor
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.settings import datasets

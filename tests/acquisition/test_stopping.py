@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.acquisition.machine import Reading
+from pipelines.acquisition.drive import Reading
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.states import Supervisor
 from pipelines.errors import DeviceError

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.acquisition.drive import Reading
 from pipelines.acquisition.frozen import Told
-from pipelines.acquisition.machine import Reading
 from pipelines.acquisition.stream import Stream
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.settings import datasets

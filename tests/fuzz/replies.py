@@ -15,7 +15,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from pipelines.acquisition.machine import Drive, Machine, Sensor
+from pipelines.acquisition.drive import Drive
+from pipelines.acquisition.machine import Machine
+from pipelines.acquisition.sensor import Sensor
 from pipelines.errors import DeviceError
 from pipelines.settings import datasets
 from pipelines.settings.rig import RigSettings, load_rig

@@ -17,9 +17,11 @@ from pipelines.acquisition.check.rate import Rate, check_rate, cycles
 from pipelines.acquisition.check.rings import check_rings
 from pipelines.acquisition.check.zeros import check_zeros
 from pipelines.acquisition.counter import RATE_TOLERANCE
+from pipelines.acquisition.drive import Drive
 from pipelines.acquisition.line import Line
-from pipelines.acquisition.machine import Drive, Machine, Sensor
+from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.pace import SLOW
+from pipelines.acquisition.sensor import Sensor
 from pipelines.errors import DeviceError
 from pipelines.settings.rig import RigSettings
 

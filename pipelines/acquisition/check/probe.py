@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.acquisition.counter import Counter
-from pipelines.acquisition.machine import Drive, Sensor
+from pipelines.acquisition.drive import Drive
+from pipelines.acquisition.sensor import Sensor
 from pipelines.registers import Block
 from pipelines.settings.rig import Register, registers_of
 

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.plausible import STEP_RAD
 from pipelines.acquisition.check.probe import Probe
+from pipelines.acquisition.drive import Drive, Reading
 from pipelines.acquisition.frozen import Told
-from pipelines.acquisition.machine import Drive, Machine, Reading
+from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.stream import Stream
 from pipelines.errors import DeviceError, ExoidError
 
