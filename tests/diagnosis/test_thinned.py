@@ -44,6 +44,15 @@ def test_a_kilohertz_becomes_200_hz_and_the_blocks_last_as_long_as_before(fast):
     assert_allclose(after.state[0], before.state[0], atol=1e-9)
 
 
+def test_forces_that_were_read_with_each_set_point_alone_are_there_at_200_hz(fast):
+    forces = np.full_like(fast.forces, np.nan)
+    forces[2::5] = fast.forces[2::5]
+    thin, whole = thinned(replace(fast, forces=forces)), thinned(fast)
+    assert np.isfinite(thin.forces[1:-1]).all()
+    apart = np.sqrt(np.mean((thin.forces - whole.forces)[1:-1] ** 2))
+    assert apart < 0.05 * whole.forces.std()
+
+
 def test_a_slow_recording_is_left_as_it_is(fast):
     thin = thinned(fast)
     assert thinned(thin) is thin
