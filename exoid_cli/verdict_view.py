@@ -63,7 +63,8 @@ def _show_cause(cause: Mapping[str, Any]) -> None:
     for sentence in cause["evidence"]:
         console.note(f"- {sentence}")
     for tie in cause["indistinguishable_from"]:
-        console.note(f"or {cause_label(tie)}: {tie['why']}; {tie['how_to_separate']}")
+        per_run = "per-run " * tie.get("per_run", False)
+        console.note(f"or {per_run}{cause_label(tie)}: {tie['why']}; {tie['how_to_separate']}")
 
 
 def _in_words(parameter: Mapping[str, Any]) -> str:

@@ -34,7 +34,8 @@ def effect_labelled(label: str) -> Effect:
 def effect_told(cause: Mapping[str, Any]) -> Effect:
     """Return the effect of a cause, or of a rival, as a verdict tells it."""
     effect = effect_named(cause["effect"])
-    return effect(joint=cause["joint"], each_run=effect.may_differ and bool(cause.get("each_run")))
+    differs = cause.get("each_run") or cause.get("per_run")
+    return effect(joint=cause["joint"], each_run=bool(effect.may_differ and differs))
 
 
 def number(machine: Machine, torque: float) -> str:

@@ -171,7 +171,7 @@ def _effect_of_rows(rows: pd.DataFrame, machine: Machine) -> Effect:
     """Return the effect that a parameters table tells of in some rows, all of one cause."""
     first = rows.iloc[0]
     joint, of = first["joint"] if isinstance(first["joint"], str) else None, effect_named(str(first["effect"]))
-    each_run = of.may_differ and "each_run" in rows and bool(rows["each_run"].any())
+    each_run = bool(of.may_differ and "each_run" in rows and rows["each_run"].any())
     return of(joint=joint, on=machine, each_run=each_run)
 
 

@@ -45,6 +45,8 @@ class Tie(_Object):
     why: str
     how_to_separate: str
     probability: Number | None = None
+    per_run: bool = False
+    """Whether it would be another in every run; files of older versions lack it."""
 
 
 class OneRun(_Object):

@@ -1,6 +1,7 @@
 """Which set of causes is named, how likely each is, and what cannot be told from it."""
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +12,9 @@ from pipelines.diagnosis.candidates import Candidate
 from pipelines.diagnosis.fit import Fit, fit, refined, residuals_on
 from pipelines.diagnosis.floor import Floor, independent_share
 from pipelines.diagnosis.search import Scored, Scorer, cost, known_besides, log_likelihood, search
+from pipelines.effects import Effect
+from pipelines.label import effect_labelled
+from pipelines.model import effect_named
 
 MOST_INDEPENDENT = 1 / 6
 """Of 25 ms blocks: what a model leaves of a leg is never white (DESIGN section 5)."""
@@ -49,11 +53,12 @@ class Choice:
     """By size of the set, the empty one first."""
     independent: NDArray
     standby: tuple[Ranked, ...] = ()
-    """Sets as worthy as the named one that training hardly tells from it, best first."""
+    """Sets as worthy as the named one that training hardly tells from it, best first.
+
+    Behind each, the named one too, stands the same with other values in every run of what may differ from run to run.
+    """
     freer: Fit | None = None
     """The named set with one of its causes in two shapes at once, where that was tried."""
-    anew: Ranked | None = None
-    """The named set with another value in every run of what may differ from run to run."""
     refuted: frozenset[tuple[str, ...]] = frozenset()
     """Sets that explain the training runs and fail on others."""
 
@@ -63,8 +68,6 @@ class Choice:
         So runs that are never fitted decide only between explanations that are as good as one another. A joint that
         was by chance zeroed alike before all training runs is still the same cause, and explains them as well.
         """
-        if self.anew is not None:
-            return replace(self, named=self.anew, freer=None, anew=None)
         return replace(self._instead(self.standby[0]), standby=self.standby[1:]) if self.standby else None
 
     def just(self, causes: Sequence[str]) -> "Choice | None":
@@ -90,9 +93,9 @@ class Choice:
         return self._instead(Ranked(empty, 0.0))
 
     def _instead(self, named: Ranked) -> "Choice":
-        """Return the choice of another set, the one named so far refuted."""
-        refuted = self.refuted | {self.named.labels}
-        return replace(self, named=named, standby=(), freer=None, anew=None, refuted=refuted)
+        """Return the choice of another set, the one named so far refuted unless it is of the same causes."""
+        refuted = self.refuted | ({self.named.labels} - {named.labels})
+        return replace(self, named=named, standby=(), freer=None, refuted=refuted)
 
     def alone(self, cause: str) -> float:
         """Return what a cause gains in log likelihood with no other beside it."""
@@ -132,19 +135,22 @@ def choose(bank: Bank, floor: Floor, evidence: Mapping[str, float]) -> Choice:
             break
         named, *others = sorted(worthy, key=lambda r: -r.score)
         freer, standby = [], [r for r in others if r.score > named.score - NEEDED]
-    anew = _anew(named, scorer, empty)
-    return Choice(named, levels, ranked, independent, tuple(standby), freer[0].fit if freer else None, anew)
+    _, *others = itertools.chain.from_iterable(_and_anew(r, scorer, empty) for r in (named, *standby))
+    return Choice(named, levels, ranked, independent, tuple(others), freer[0].fit if freer else None)
 
 
-def _anew(named: Ranked, scorer: Scorer, empty: Fit) -> Ranked | None:
-    """Return a set with another value in every run of what may differ from run to run; None where nothing may."""
-    own = {c.label: c for c in scorer.bank.candidates if c.effect.each_run}
-    causes = [own.get(cause.label, cause) for cause in named.fit.causes]
-    alike = all(ours.effect == theirs.effect for ours, theirs in zip(causes, named.fit.causes, strict=True))
-    if alike:
-        return None
+def _and_anew(ranked: Ranked, scorer: Scorer, empty: Fit) -> Iterator[Ranked]:
+    """Yield a set, and the same with other values in every run of what may differ from run to run, if any may."""
+    yield ranked
+    causes = [
+        replace(cause, effect=replace(cause.effect, each_run=True)) if cause.effect.may_differ else cause
+        for cause in ranked.fit.causes
+    ]
+    if all(ours.effect == theirs.effect for ours, theirs in zip(causes, ranked.fit.causes, strict=True)):
+        return
     made = _ranked(scorer, causes, empty)
-    return None if made.fit.is_absurd(scorer.bank.baseline) else made
+    if not made.fit.is_absurd(scorer.bank.baseline):
+        yield made
 
 
 def _freer(level: dict[tuple[str, ...], Scored], named: Ranked) -> list[Scored]:
@@ -223,7 +229,8 @@ def dilution(choice: Choice, bank: Bank) -> float:
 def rivals(choice: Choice, bank: Bank, cause: str) -> dict[str, float]:
     """Return every effect that could stand in a named cause's place, and its log likelihood behind the named set.
 
-    The others of the set stay; nought is the named cause itself.
+    The others of the set stay; nought is the named cause itself. None that is more than another of them and explains
+    no more: what it is besides does not show.
     """
     others = tuple(sorted(set(choice.named.labels) - {cause}))
     size = len(choice.named.labels)
@@ -237,7 +244,22 @@ def rivals(choice: Choice, bank: Bank, cause: str) -> dict[str, float]:
             rival = next(iter(set(labels) - set(others)))
             gap = choice.named.score - fine[labels].score if labels in fine else best_coarse - scored.score
             behind[rival] = max(gap, 0.0) if rival != cause else 0.0
-    return behind
+    return {rival: gap for rival, gap in behind.items() if gap <= behind.get(_within(rival), np.inf)}
+
+
+def in_place_of(choice: Choice, bank: Bank, cause: str, rival: str) -> Effect:
+    """Return a rival as it was fitted in a named cause's place."""
+    labels = tuple(sorted({*choice.named.labels, rival} - {cause}))
+    fine = choice.refined[len(labels)].get(labels)
+    coarse = choice.levels[len(labels) - 1][labels]
+    causes = fine.fit.causes if fine else [bank.candidates[i] for i in coarse.chosen]
+    return next(c.effect for c in causes if c.label == rival)
+
+
+def _within(label: str) -> str:
+    """Return the label of what a cause is more than; empty where it is more than none."""
+    effect = effect_labelled(label)
+    return effect_named(effect.more_than)(joint=effect.joint).label if effect.more_than else ""
 
 
 def probabilities(behind: dict[str, float], diluted: float) -> dict[str, float]:

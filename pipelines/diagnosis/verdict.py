@@ -6,6 +6,7 @@ from typing import Any
 import pandas as pd
 
 from pipelines.contracts.joints import the
+from pipelines.diagnosis.choice import in_place_of
 from pipelines.diagnosis.control import control
 from pipelines.diagnosis.dependence import Dependence, dependences
 from pipelines.diagnosis.diagnose import Diagnosis, summary_numbers
@@ -109,7 +110,9 @@ def _cause(d: Diagnosis, label: str) -> dict[str, Any]:
             "joint": named_joint,
         },
         "indistinguishable_from": [
-            _tie(effect, other, p, d) for other, p in sorted(alike.items(), key=lambda t: -t[1]) if other != label
+            _tie(effect, in_place_of(d.choice, d.bank, label, other), p)
+            for other, p in sorted(alike.items(), key=lambda t: -t[1])
+            if other != label
         ],
         "evidence": _evidence(d, label, effect, worth.value, named_joint, alike),
         "fitted_on_validate": [p.name for p in effect.parameters if p.per_run],
@@ -140,8 +143,7 @@ def _probability(d: Diagnosis, among_rivals: float) -> float:
     return HIGHEST * crowded * d.standing.trust ** len(d.causes) * min(among_rivals, 1.0)
 
 
-def _tie(effect: Effect, other: str, probability: float, d: Diagnosis) -> dict[str, Any]:
-    rival = effect_labelled(other)
+def _tie(effect: Effect, rival: Effect, probability: float) -> dict[str, Any]:
     tie = tie_between(effect.name, rival.name, effect.confirm, rival.confirm)
     return {
         "effect": rival.name,
@@ -149,6 +151,7 @@ def _tie(effect: Effect, other: str, probability: float, d: Diagnosis) -> dict[s
         "why": tie.why,
         "how_to_separate": tie.how_to_separate,
         "probability": probability,
+        "per_run": rival.each_run,
     }
 
 
@@ -181,10 +184,7 @@ def _set_anew(d: Diagnosis, label: str, effect: Effect) -> str:
     """Say what each run has of a cause that is another in every run."""
     (parameter,) = (p for p in effect.parameters if p.per_run)
     told = [f"{one['values'][parameter.name]:+.3g} in {one['file']}" for one in d.each_run[label]]
-    return (
-        f"each run has its own {parameter.name}, as of a joint that is zeroed anew at every start: "
-        f"{', '.join(told)} ({parameter.unit})"
-    )
+    return f"each run has its own {parameter.name}, as of {effect.may_differ}: {', '.join(told)} ({parameter.unit})"
 
 
 def _may_be_chance(d: Diagnosis, label: str) -> bool:

@@ -100,7 +100,7 @@ class Effect(ABC):
     on: Machine = THE_LEG
     """The machine that has it."""
     each_run: bool = False
-    """True where its shape is another in every run; only of effects that ``may_differ``."""
+    """True where its values are others in every run; only of effects that ``may_differ``."""
 
     name: ClassVar[str]
     title: ClassVar[str]
@@ -139,8 +139,10 @@ class Effect(ABC):
     """kg·m² on the motor's side of ``spring``."""
     known_to: ClassVar[float] = 0.0
     """Relative standard error that the effect's approximation of itself adds to its first shape, whatever the data."""
-    may_differ: ClassVar[bool] = False
-    """True where what it is may change from run to run and not within one: what is set anew at every start."""
+    may_differ: ClassVar[str] = ""
+    """What is set anew at every start, so that each run may have another; empty where all runs share it."""
+    more_than: ClassVar[str] = ""
+    """The effect that it is, in every run for itself, where what else it has is nought."""
     at_cuff: ClassVar[bool] = False
     """True where ``spring`` stands between machine and limb, not between motor and link."""
     swings: ClassVar[bool] = False
@@ -155,7 +157,8 @@ class Effect(ABC):
     def __post_init__(self) -> None:
         """Say in the machine's own units and equations what the class says of a leg, and what each run has."""
         if self.each_run:
-            object.__setattr__(self, "shape", tuple(replace(p, per_run=True) for p in type(self).shape))
+            for role in ("linear", "shape"):
+                object.__setattr__(self, role, tuple(replace(p, per_run=True) for p in getattr(type(self), role)))
         if self.on == THE_LEG:
             return
         if self.joint:

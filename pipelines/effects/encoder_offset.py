@@ -22,7 +22,7 @@ class EncoderOffset(Effect):
         "reads zero wherever it then hangs: let it hang freely after a run, or home it on an index mark"
     )
     by_angle = True
-    may_differ = True
+    may_differ = "a joint that is zeroed anew at every start"
     shape = (Parameter("offset", "rad", "measured less true angle", "q_o", (-0.15, 0.15)),)
 
     @reading

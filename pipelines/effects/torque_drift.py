@@ -19,6 +19,7 @@ class TorqueDrift(Effect):
         Parameter("level", "N·m", "offset when the run begins", "o", (-4.0, 4.0), per_run=True, default=0.0),
     )
     parity = Parity.EVEN
+    more_than = "torque_offset"
 
     @torque_reading
     def torque_reading(t, torque, values, joint, state):

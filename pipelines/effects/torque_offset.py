@@ -5,7 +5,7 @@ from pipelines.effects.kernel import torque_reading
 
 
 class TorqueOffset(Effect):
-    """The measured torque is the true one plus a constant."""
+    """The measured torque is the true one plus a constant; another at each start, where the sensor is tared there."""
 
     name = "torque_offset"
     title = "Torque offset"
@@ -13,7 +13,11 @@ class TorqueOffset(Effect):
     equation = "measured torque = true torque + offset"
     source = "Janot, Vandanjon, Gautier (2014), IEEE Trans. Control Systems Technology 22(1): the drive chain's offset"
     looks_like = "a residual whose mean is not zero, moving or standing"
-    confirm = "switch the drive off and read its torque: it should be zero"
+    confirm = (
+        "switch the drive off and read its torque: it should be zero; one that is tared at each start reads zero then "
+        "whatever loads it: take the load off first"
+    )
+    may_differ = "a torque sensor that is tared anew at every start"
     linear = (Parameter("offset", "N·m", "measured less true torque", "o", (-4.0, 4.0)),)
     parity = Parity.EVEN
 

@@ -1,6 +1,7 @@
 """The tables of docs/real-data.md."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.effects.presliding_hysteresis import PreslidingHysteresis
-from pipelines.label import cause_label
+from pipelines.label import cause_label, effect_told
 from pipelines.mechanics.motion import Motion
-from pipelines.model import Model, effect_named
+from pipelines.model import Model
 from tests.real.machines import LOGS, Diagnosed, of_purpose, symmetric, with_rotor
 from tests.real.published import EMPS, EMPS_ERRORS, double_pendulum, their_torque
 from tests.real.relative_error import TorqueError, decimated_error, fitted, slow_error, slow_fit
@@ -46,9 +47,8 @@ def _verdict(title: str, d: Diagnosed) -> tuple[str, ...]:
 
 def _label(cause: Mapping[str, Any]) -> str:
     """Return a cause's label and those of what could stand in its place."""
-    labels = [cause_label(one) for one in (cause, *cause["indistinguishable_from"])]
-    set_anew = effect_named(cause["effect"]).may_differ and bool(cause["each_run"])
-    return "per-run " * set_anew + " or ".join(labels)
+    effects = [effect_told(one) for one in (cause, *cause["indistinguishable_from"])]
+    return " or ".join("per-run " * effect.each_run + effect.label for effect in effects)
 
 
 def emps(found: Mapping[str, Diagnosed]) -> str:
@@ -187,8 +187,9 @@ def with_zeros(d: Diagnosed, file: Path) -> str:
     """Return the makers' error on each run without and with the zeros that the diagnosis found, beside its own."""
     theirs, rows = double_pendulum(file), []
     for motion in d.motions:
-        zeroed = d.model_of(motion).sensed(motion)
-        errors = [slow_error(their_torque(theirs, moved), motion) for moved in (motion, zeroed)]
+        model = d.model_of(motion)
+        zeroed = replace(model.sensed(motion), torque=model.delivered(motion))
+        errors = [slow_error(their_torque(theirs, moved), moved) for moved in (motion, zeroed)]
         rows.append((motion.file.removesuffix(".parquet"), *(_both(e)[0] for e in (*errors, d.error_on(motion)))))
     return table(("run", "published, N·m", "published, with these zeros, N·m", "extended, N·m"), rows)
 

@@ -31,6 +31,12 @@ def test_the_headline_claims_no_cause_that_is_tied(ties, said):
     assert causes_in_words([cause(ties=ties)]).startswith(said)
 
 
+def test_a_tie_that_would_differ_from_run_to_run_is_called_so():
+    tied = cause("torque_offset", ties=[("encoder_offset", "knee")]) | {"each_run": [{"file": "a", "values": {}}]}
+    tied["indistinguishable_from"][0]["per_run"] = True
+    assert causes_in_words([tied]) == "per-run torque offset or per-run encoder offset at the knee"
+
+
 def test_two_causes_are_parted_by_a_comma_where_one_of_them_is_tied():
     both = cause(), cause("backlash", "hip")
     assert causes_in_words(both) == "cogging at the knee and backlash at the hip"

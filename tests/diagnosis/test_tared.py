@@ -1,0 +1,104 @@
+"""A torque sensor that is tared at every start: each run has an offset of its own, and no drift is claimed.
+
+What is hidden is added to recorded torques, by no code of the effects'.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.verdict import verdict
+from pipelines.label import cause_label
+from tests.diagnosis.sessions import session
+from tests.diagnosis.test_each_run import zeroed
+
+HIDDEN = {"run_0.parquet": 1.1, "run_1.parquet": -0.8, "run_2.parquet": -0.9, "run_3.parquet": 0.7}
+"""N·m, at the knee; runs 1 and 3 are of those that no fit sees."""
+EVERY = dict.fromkeys(HIDDEN, 1.0)
+
+
+def misread(motion, offset, rate=0.0):
+    """Return a motion whose knee torque was read ``offset`` N·m too high, and by ``rate`` N·m/s more as it went on."""
+    more = offset + rate * (motion.time - motion.time[0])
+    return replace(motion, torque=motion.torque + more[:, np.newaxis] * np.array([0.0, 1.0]))
+
+
+def found(offsets, rate=0.0, seed=1):
+    return verdict(diagnose([misread(m, offsets[m.file], rate) for m in session(seconds=30.0, seed=seed)]))
+
+
+@pytest.fixture(scope="module")
+def tared():
+    return found(HIDDEN)
+
+
+def test_a_sensor_tared_anew_at_each_start_is_named_and_nothing_is_said_of_warming(tared):
+    assert tared["status"] == "explained"
+    (cause,) = tared["causes"]
+    assert cause_label(cause) == "torque_offset@knee"
+    assert "per-run torque offset at the knee (probability" in tared["summary"]
+    assert cause["fitted_on_validate"] == ["offset"]
+    # A drift would explain as much with a rate that does not show: it is no rival.
+    assert "torque_drift" not in [tie["effect"] for tie in cause["indistinguishable_from"]]
+    words = " ".join([tared["summary"], *cause["evidence"]])
+    assert "warm" not in words
+    assert "as of a torque sensor that is tared anew at every start" in words
+
+
+def test_each_run_s_own_offset_is_recovered_and_its_interval_holds_it(tared):
+    each_run = tared["causes"][0]["each_run"]
+    assert {one["file"]: one["values"]["offset"] for one in each_run} == pytest.approx(HIDDEN, abs=0.08)
+    for one in each_run:
+        if one["purpose"] == "train":
+            low, high = one["ci95"]["offset"]
+            assert low <= HIDDEN[one["file"]] <= high and high - low < 0.3
+
+
+def test_one_offset_in_all_runs_is_one_and_no_run_has_another():
+    told = found(EVERY)
+    (cause,) = told["causes"]
+    # While the joint always moves, friction that differs with direction is the same torque.
+    names = {cause["effect"], *(tie["effect"] for tie in cause["indistinguishable_from"])}
+    assert {"torque_offset", "coulomb_asymmetry"} <= names
+    assert cause["each_run"] == [] and "per-run" not in told["summary"]
+
+
+@pytest.mark.parametrize("levels", [HIDDEN, dict.fromkeys(HIDDEN, 0.0)], ids=["tared", "settled"])
+def test_what_grows_within_runs_is_a_drift_whatever_its_level(levels):
+    told = found(levels, rate=0.03)
+    (cause,) = told["causes"]
+    assert cause_label(cause) == "torque_drift@knee"
+    assert "torque_offset" not in [tie["effect"] for tie in cause["indistinguishable_from"]]
+    rate = next(p for p in cause["parameters"] if p["name"] == "rate")
+    assert rate["ci95"][0] <= 0.03 <= rate["ci95"][1]
+
+
+@pytest.mark.parametrize("seed", range(2, 8))
+def test_of_a_sensor_that_is_right_nothing_is_named(seed):
+    told = found(dict.fromkeys(HIDDEN, 0.0), seed=seed)
+    assert told["status"] == "nothing_missing" and told["causes"] == []
+
+
+def two_runs(spoil, offsets):
+    """The verdict on one run to train and one to validate, each with an offset of its own."""
+    runs = session(seconds=30.0)[2:]
+    return verdict(diagnose([spoil(m, offset) for m, offset in zip(runs, offsets, strict=True)]))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "offsets", "label"),
+    [(misread, (1.1, -0.8), "torque_offset@knee"), (zeroed, (0.07, -0.06), "encoder_offset@knee")],
+    ids=["tared", "zeroed"],
+)
+def test_of_two_runs_the_one_that_no_fit_saw_shows_that_each_has_its_own(spoil, offsets, label):
+    told = two_runs(spoil, offsets)
+    (cause,) = told["causes"]
+    assert cause_label(cause) == label
+    assert [one["values"]["offset"] for one in cause["each_run"]] == pytest.approx(offsets, abs=0.1 * abs(offsets[0]))
+
+
+def test_of_two_runs_one_offset_in_both_is_one():
+    told = two_runs(misread, (1.0, 1.0))
+    assert "coulomb_asymmetry" in told["causes"][0]["effect"] and told["causes"][0]["each_run"] == []
