@@ -226,13 +226,23 @@ def _caveats(d: Diagnosis) -> list[str]:
         "that channel are right"
         for joint, share in _floor_that_hides(d).items()
     ]
-    return [noisy] * d.noisy_angles + hiding * (not d.spoilt) + _of_one_kind(d)
+    return [noisy] * d.noisy_angles + hiding * (not d.spoilt) + _of_one_run(d) + _of_one_kind(d)
 
 
 def _floor_that_hides(d: Diagnosis) -> dict[str, float]:
     """Return the joints whose floor is a guess and so high that much could hide in it, with its share of the torque."""
     shares = dict(zip(d.baseline.joints, (d.standing.floor / d.torque_rms).tolist(), strict=True))
     return {} if d.floor.from_periods else {joint: share for joint, share in shares.items() if share > HIDING}
+
+
+def _of_one_run(d: Diagnosis) -> list[str]:
+    """Return what one run to train on cannot show, where nothing is named that it could be."""
+    if d.status != "unknown_cause" or d.spoilt or len(d.train) > 1:
+        return []
+    return [
+        "one run alone was trained on: a zero or a tare that is set anew at each start is there the same as one for "
+        "all runs; record another to train on, started anew"
+    ]
 
 
 def _of_one_kind(d: Diagnosis) -> list[str]:

@@ -87,6 +87,10 @@ def two_runs(spoil, offsets):
     return verdict(diagnose([spoil(m, offset) for m, offset in zip(runs, offsets, strict=True)]))
 
 
+def started_anew(told):
+    return [caveat for caveat in told["caveats"] if "started anew" in caveat]
+
+
 @pytest.mark.parametrize(
     ("spoil", "offsets", "label"),
     [(misread, (1.1, -0.8), "torque_offset@knee"), (zeroed, (0.07, -0.06), "encoder_offset@knee")],
@@ -97,8 +101,15 @@ def test_of_two_runs_the_one_that_no_fit_saw_shows_that_each_has_its_own(spoil, 
     (cause,) = told["causes"]
     assert cause_label(cause) == label
     assert [one["values"]["offset"] for one in cause["each_run"]] == pytest.approx(offsets, abs=0.1 * abs(offsets[0]))
+    assert started_anew(told) == []
 
 
 def test_of_two_runs_one_offset_in_both_is_one():
     told = two_runs(misread, (1.0, 1.0))
     assert "coulomb_asymmetry" in told["causes"][0]["effect"] and told["causes"][0]["each_run"] == []
+
+
+def test_where_nothing_is_named_and_one_run_was_trained_on_it_is_said_what_that_cannot_show():
+    told = two_runs(misread, (0.0, 1.2))
+    assert (told["status"], told["causes"]) == ("unknown_cause", [])
+    assert len(started_anew(told)) == 1
