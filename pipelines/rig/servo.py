@@ -34,7 +34,8 @@ class Servo:
         heartbeat_s : float or None
             How long it may be told nothing before it disables itself; None for a drive without such a watchdog.
         samples_per_cycle : int
-            Samples from one set-point to the next, within which it goes there in a straight line.
+            Samples from one set-point to the next, a cycle. It goes to each in a straight line, to be there a cycle
+            after it was at the one before: set-points that come a little early or late move it no less evenly.
         """
         self.fault = False
         """Latched until a fault reset, and no drive with a fault is enabled."""
@@ -46,6 +47,8 @@ class Servo:
         self._told, self._control = rest, registers.disable
         self._last, self._step, self._unheard = rest, 0.0, 0
         self._pace = 0.0
+        self._way = samples_per_cycle
+        """Samples from when the set-point came to when it is to be reached."""
 
     @property
     def enabled(self) -> bool:
@@ -66,7 +69,11 @@ class Servo:
         # It holds where it is told no number: arithmetic would carry that on for ever.
         told = reference if isfinite(reference) else self._last
         # The set-points' own speed: the way back from having gone on too far is none to go on at.
-        self._pace = (told - self._told) / max(self._unheard, self._cycle) if self.enabled else 0.0
+        cycles = max(round(self._unheard / self._cycle), 1)
+        self._pace = (told - self._told) / (cycles * self._cycle) if self.enabled else 0.0
+        # A cycle after the one before was to be reached; anew where that would be too soon, or too late.
+        way = self._way - self._unheard + cycles * self._cycle
+        self._way = way if 0.5 * self._cycle <= way <= 1.5 * self._cycle else self._cycle
         self._unheard = 0
         if control == self._map.fault_reset:
             self.fault = False
@@ -87,8 +94,8 @@ class Servo:
     def _reference(self) -> float:
         if self._control == self._map.halt:
             return self._last
-        if self._unheard < self._cycle:
-            return self._last + (self._told - self._last) / (self._cycle - self._unheard)
+        if self._unheard < self._way:
+            return self._last + (self._told - self._last) / (self._way - self._unheard)
         step = self._pace
         if self._unheard >= self._cycle * (1 + EXTRAPOLATED):
             step = self._step

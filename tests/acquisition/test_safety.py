@@ -16,7 +16,7 @@ from pipelines.acquisition.row import Row
 from pipelines.acquisition.safety import HOLD_SAMPLES, Limits, refuse_leap, slowed
 from pipelines.contracts import RECORDING
 from pipelines.contracts.beside import journal_of
-from pipelines.errors import DeviceError, ExoidError, InputError
+from pipelines.errors import DeviceError, ExoidError, InputError, SettingsError
 from pipelines.rig.server import READ_WRITE, Drive, Sensor
 from pipelines.rig.servo import Servo
 from pipelines.settings.rig import load_rig
@@ -438,3 +438,11 @@ def test_nothing_sealed_is_in_a_recording_of_a_rig_that_hides_something(record, 
     told = json.dumps(table.metadata) + " ".join(table.frame.columns)
     for secret in ("secret_file", "987654", "encoder_offset", "inertial", "coulomb", "sealed", "plant"):
         assert secret not in told
+
+
+def test_a_drive_that_would_be_sent_to_the_mirror_image_of_where_it_stands_is_refused(record):
+    served, written = [], 'reference = { address = 200, type = "int32", scale = 1e-6, unit = "rad" }'
+    with pytest.raises(SettingsError) as caught:
+        record(served_as=served, replace={written: written.replace("1e-6", "-1e-6")})
+    assert "write.reference.scale: found -1e-06 with 1e-06 of read.angle" in str(caught.value)
+    assert not any(drive.servo.enabled for drive in served[0].rig.drives)

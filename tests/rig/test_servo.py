@@ -29,6 +29,18 @@ def test_a_set_point_is_reached_in_a_straight_line_within_its_cycle(servo, cycle
     np.testing.assert_allclose(path, 0.1 * np.arange(1, cycle + 1) / cycle)
 
 
+@pytest.mark.parametrize("phase", range(5))
+def test_set_points_that_come_a_sample_early_or_late_move_the_drive_no_less_evenly(servo, phase):
+    drive, enable = servo(5)
+    rng, path = np.random.default_rng(phase), []
+    came = 5 * np.arange(400) + phase + rng.integers(-1, 2, 400)
+    for number, samples in enumerate(np.diff(came, prepend=0)):
+        path += [drive.next(0.0)[0] for _ in range(samples)]
+        drive.hear(0.005 * number, enable)
+    # Once it is in step with them it goes at their speed, and at no other.
+    np.testing.assert_allclose(np.diff(path)[100:], 0.001, rtol=1e-9)
+
+
 @pytest.mark.parametrize("cycle", [1, 5, 20])
 def test_set_points_that_come_irregularly_do_not_swing_the_drive_up(servo, cycle):
     drive, enable = servo(cycle)

@@ -34,22 +34,29 @@ def test_a_right_rig_answers_its_set_points(checked):
 
 
 @pytest.mark.parametrize(
-    ("believed", "words"),
+    ("there", "believed", "words"),
     [
         (
             {READ: READ.replace("1e-6", "-1e-6"), VELOCITY: VELOCITY.replace("1e-5", "-1e-5")},
+            {READ: READ, VELOCITY: VELOCITY},
             "its angle goes against its set-point",
         ),
-        ({CURRENT: CURRENT.replace("0.1", "-0.1")}, "its torque goes against its speed"),
-        ({WRITE: WRITE.replace("1e-6", "2e-6")}, "times as far as its set-point: unit or scale of"),
+        ({}, {CURRENT: CURRENT.replace("0.1", "-0.1")}, "its torque goes against its speed"),
+        ({}, {WRITE: WRITE.replace("1e-6", "2e-6")}, "times as far as its set-point: unit or scale of"),
     ],
     ids=["sign of the angle", "sign of the current", "scale of the set-point"],
 )
-def test_a_wrong_sign_or_scale_is_told_by_the_answer(checked, believed, words):
-    report = checked(options=MOVE, believed=believed, rest_rad="[0.0, 0.0]")
+def test_a_wrong_sign_or_scale_is_told_by_the_answer(checked, there, believed, words):
+    report = checked(options=MOVE, served=there, believed=believed, rest_rad="[0.0, 0.0]")
     assert [finding.device for finding in report.findings if words in finding.text] == ["drive hip", "drive knee"], (
         told(report)
     )
+
+
+def test_a_set_point_of_another_sign_than_its_angle_is_told_and_nothing_is_moved(checked):
+    report = checked(options=MOVE, believed={WRITE: WRITE.replace("1e-6", "-1e-6")})
+    assert "map.drive.servo.write.reference.scale: found -1e-06 with 1e-06 of read.angle" in told(report)
+    assert report.answers == []
 
 
 @pytest.mark.parametrize("scale", ["-1e-5", "3e-5"])
