@@ -35,6 +35,8 @@ sees up to one sample late or early."""
 
 NO_LAG_RAD = 1e-9
 """What rounding leaves between a set-point and the plan."""
+LONGEST_RETURN_S = 5.0
+"""How long set-points may take to the end of their path once it is due."""
 
 
 class State(StrEnum):
@@ -359,10 +361,24 @@ class Supervisor:
         return kept
 
     def has_followed(self, row: Row) -> bool:
-        """Tell whether the plan is at its end with a sample, and the set-points have walked there."""
+        """Tell whether the plan is at its end with a sample, and the set-points have walked there, but for a count.
+
+        Raises
+        ------
+        DeviceError
+            They have not for long: samples are missed faster than they are made up for.
+        """
         # What is sent while a sample is latched is reached at the end of the next one.
         end = len(self._plan.reference)
-        return row.sequence - self._first > end and np.array_equal(self.sent, self._path(end))
+        past = row.sequence - self._first - end
+        if past > LONGEST_RETURN_S * self.rate:
+            raise DeviceError(
+                f"the set-points are not at the end of their path {LONGEST_RETURN_S:g} s after it, for samples are "
+                "missed again and again; its answers are lost too often, or a drive's counter has parted from the "
+                "other's"
+            )
+        counts = [self.rig.map.drive[drive.map].write.reference.step for drive in self.rig.drive]
+        return past > 0 and bool((np.abs(self.sent - self._path(end)) <= np.maximum(counts, NO_LAG_RAD)).all())
 
     def index(self, row: Row) -> int:
         """Return which set-point of the plan a sample carries; outside the plan before and after it."""

@@ -31,7 +31,7 @@ class SimulatedTime(asyncio.SelectorEventLoop):
 
     def __init__(self):
         super().__init__(selectors.SelectSelector())
-        self.now, self._turns = 1000.0, 0
+        self.now, self._turns, self.hung = 1000.0, 0, False
 
     def time(self):
         return self.now
@@ -40,7 +40,9 @@ class SimulatedTime(asyncio.SelectorEventLoop):
 
     def _run_once(self):
         self._turns += 1
-        assert self._turns < STEPS, "the run hangs"
+        if self._turns == STEPS:  # once: it is stopped as by any other error
+            self.hung = True
+            raise AssertionError("the run hangs")
         if not self._ready and self._scheduled:
             while self._scheduled and self._scheduled[0]._cancelled:
                 self._timer_cancelled_count -= 1
@@ -348,6 +350,7 @@ def simulate(rig, settings, trajectory, path, events, rest, *, plan=None, own=No
             run.result = _finish(path, path.with_suffix(".journal"), supervisor)
         except BaseException as error:
             run.result = error
+    assert not time.hung, "the run hangs"
     return run
 
 

@@ -170,6 +170,15 @@ def check_every_invariant(clock, reads_back, count_rad, line, goes_on, human, ha
         only_drawn_transitions_were_made(simulated)
 
 
+@pytest.mark.parametrize("reads_back", [True, False])
+@pytest.mark.parametrize("count_rad", [FINE_RAD, COARSE_RAD])
+@pytest.mark.parametrize("ahead", [1, 2, 3])
+def test_a_run_ends_though_one_drives_counter_has_parted_from_the_others(reads_back, count_rad, ahead):
+    """Each cycle then waits for the slower one, and misses samples all along."""
+    parting = [Event(77 + 2 * k, "counter", 1) for k in range(ahead)]
+    check_every_invariant("real_time", reads_back, count_rad, "tcp", True, False, parting, None, None)
+
+
 def rounding_of(run):
     """Return by how much rounding lengthens a step at most, rad."""
     return run.rig.rig.map.drive["servo"].write.reference.step + NOTHING_RAD
