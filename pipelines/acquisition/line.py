@@ -18,7 +18,7 @@ from pymodbus.framer import FramerSocket, FramerType
 from pymodbus.pdu import DecodePDU, ModbusPDU
 from serial.tools import list_ports
 
-from pipelines.acquisition.reply import check_replies
+from pipelines.acquisition.reply import NoReply, check_replies
 from pipelines.errors import DeviceError, SettingsError
 from pipelines.settings.line import LineSettings, NetworkLine, RtuLine, RtuOverTcpLine, TlsLine, refuse_passphrase
 from pipelines.settings.rig import DeviceSettings, RigSettings
@@ -173,7 +173,9 @@ class Line:
             self.client.ctx.comm_params.timeout_connect = within_s
             self._asking = self._failed = True
             answer = await request(**arguments, device_id=unit)
-            self._failed, self._has_answered = False, True
+            # What answers another request is no silence; but who asks again is to do so on another connection.
+            self._asking, self._failed, self._has_answered = False, isinstance(answer, NoReply), True
+            self._quiet_since = asyncio.get_running_loop().time()
             self._asked.pop(unit, None)
             return answer
         except (ModbusException, OSError) as error:

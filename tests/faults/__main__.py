@@ -62,7 +62,7 @@ def _wrong(path: Path, latched: dict) -> int:
 def _plain(text: str) -> str:
     """Return a reason without what differs from run to run, and without what always follows it."""
     text = re.sub(r"127\.0\.0\.1:\d+", "127.0.0.1:502", text.removeprefix("exoid: "))
-    text = re.sub(r"/\S*/run\.parquet", "run.parquet", text)
+    text = re.sub(r"/\S*/(run\.(?:aborted\.)?parquet)", r"\1", text)
     return re.sub(r"; the leg was stopped.*", "", text)
 
 
