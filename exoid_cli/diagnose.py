@@ -66,7 +66,8 @@ def diagnose(
     machine, geometry = motions[0].machine, motions[0].geometry
     heeded = settings.sections_about(machine.is_exoskeleton, "mechanism", "filter")
     shared = {"joints": motions[0].joint_metadata} | describe(files, heeded)
-    recordings = {motion.file: recording_behind(path) for motion, path in zip(motions, files, strict=True)}
+    hashed = zip(motions, files, strict=True) if found.each_run else ()  # whole files are read for that
+    recordings = {motion.file: recording_behind(path) for motion, path in hashed}
     model = {
         "covariance": found.covariance.tolist(),
         "mechanism": machine.mechanism.name,

@@ -147,7 +147,7 @@ async def _record(
     """Move the leg and write the journal, which says at its end why the run was stopped early, if it was."""
     rig = supervisor.rig
     with_human = run.run == "with_human"
-    machine = Machine(rig, with_sensors=with_human, samples_per_cycle=rig.samples_per_cycle(supervisor.rate))
+    machine = Machine(rig, with_sensors=with_human, samples_per_cycle=supervisor.samples_per_cycle)
     report(Progress(duration_s=run.duration_s))
     try:
         supervisor.check()

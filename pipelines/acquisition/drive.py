@@ -343,17 +343,8 @@ class Drive:
         self.conditions.append(condition := self._condition(values.get("status", 0.0)))
         told = self._numbers(values)
         self._temperature = told.get("temperature", np.nan)
-        return Reading(
-            sequence=self._newest(told["sequence"], sent),
-            time=self._time(told["time"]),
-            angle=told["angle"],
-            torque=told["current"] * self.settings.torque_per_ampere,
-            current=told["current"],
-            velocity=told.get("velocity", np.nan),
-            temperature=self._temperature,
-            reference=told.get("reference", self._sent),
-            **vars(condition),
-        )
+        number = self._newest(told["sequence"], sent)
+        return self._sample(number, self._time(told["time"]), told, self._sent, condition)
 
     def _condition(self, status: float) -> Condition:
         """Return what a status word tells; of one that is no number nothing."""
@@ -375,15 +366,22 @@ class Drive:
     def _of_ring(self, number: int, told: Mapping[str, float]) -> Reading:
         """Return a record as a sample; temperature is what the last exchange told."""
         told = self._numbers(told)
+        return self._sample(number, self._ring_time(told["time"]), told, np.nan, Condition())
+
+    def _sample(
+        self, number: int, time_s: float, told: Mapping[str, float], sent: float, condition: Condition
+    ) -> Reading:
+        """Return what a drive tells as a sample; ``sent`` is its set-point (rad) where it tells none."""
         return Reading(
             sequence=number,
-            time=self._ring_time(told["time"]),
+            time=time_s,
             angle=told["angle"],
             torque=told["current"] * self.settings.torque_per_ampere,
             current=told["current"],
             velocity=told.get("velocity", np.nan),
             temperature=self._temperature,
-            reference=told.get("reference", np.nan),
+            reference=told.get("reference", sent),
+            **vars(condition),
         )
 
 

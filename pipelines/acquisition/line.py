@@ -174,8 +174,7 @@ class Line:
             self._asking = self._failed = True
             answer = await request(**arguments, device_id=unit)
             # What answers another request is no silence; but who asks again is to do so on another connection.
-            self._asking, self._failed, self._has_answered = False, isinstance(answer, NoReply), True
-            self._quiet_since = asyncio.get_running_loop().time()
+            self._failed, self._has_answered = isinstance(answer, NoReply), True
             self._asked.pop(unit, None)
             return answer
         except (ModbusException, OSError) as error:
@@ -185,7 +184,7 @@ class Line:
         finally:
             if self._asking:
                 self._quiet_since = asyncio.get_running_loop().time()
-                if self._failed and (len(self.devices) > 1 or not self.tells_replies_apart):
+                if unit in self._asked and (len(self.devices) > 1 or not self.tells_replies_apart):
                     self._owed[unit] = Owed(within_s)
             self._asking = False
 

@@ -23,6 +23,7 @@ class Limits:
         """Watch drives, and those cuff sensors that are read."""
         self._rig = rig
         self._rate = sample_rate_hz
+        self._samples_per_cycle = rig.samples_per_cycle(sample_rate_hz)
         self._sensors = {CUFFS.index(sensor.cuff): sensor for sensor in sensors}
         self._felt: dict[int, int] = {}
         """Of each cuff the machine's counter at its last fresh sample."""
@@ -31,7 +32,7 @@ class Limits:
 
     def violation(self, told: Row | Answers) -> str | None:
         """Return which limit is broken by what came, None if it keeps them all."""
-        samples_hz = self._rate * self._rig.samples_per_cycle(self._rate)
+        samples_hz = self._rate * self._samples_per_cycle
         for j, (drive, found) in enumerate(zip(self._rig.drive, told.drives, strict=True)):
             if isinstance(found, Reading):
                 if why := sample_violation(drive, self._last.get(j, found), found, samples_hz):
@@ -42,7 +43,7 @@ class Limits:
     def cuff_violation(self, told: Row | Answers) -> str | None:
         """Return which cuff's force is above its limit, or could be unseen: its sensor tells nothing any more."""
         first = told.drives[0]
-        cycle = first.sequence // self._rig.samples_per_cycle(self._rate) if isinstance(first, Reading) else None
+        cycle = first.sequence // self._samples_per_cycle if isinstance(first, Reading) else None
         return self.force_violation(told.forces) or (None if cycle is None else self._silence(told.forces, cycle))
 
     def straying(self, told: Row | Answers, in_force: NDArray, late: int = 0) -> str | None:

@@ -73,6 +73,7 @@ class Supervisor:
         """Supervise a run on a rig; ``sensors`` are the cuff sensors that are read."""
         self.rig = rig
         self.rate = sample_rate_hz
+        self.samples_per_cycle = rig.samples_per_cycle(sample_rate_hz)
         self.state = State.IDLE
         self.why: str | None = None
         """The first reason to stop early; None while there is none."""
@@ -103,6 +104,9 @@ class Supervisor:
         """(J,) rad/s at which set-points move: a stop slows down from there, the way back to the plan begins there."""
         self._pace = np.zeros_like(self.sent)
         """(J,) rad/s at which a drive may go on by itself: as its last set-point did from the one before."""
+        counts = [rig.map.drive[drive.map].write.reference.step for drive in rig.drive]
+        self._nearest = np.maximum(counts, NO_LAG_RAD)
+        """(J,) rad within which a set-point is another: drives cannot be told it more finely."""
         self._held = [0 for _ in rig.drive]
         """For how many samples each drive has been held at rest in the stop."""
         self._in_force = self.sent.copy()
@@ -192,8 +196,7 @@ class Supervisor:
         """Refuse to go on after too long a silence, or with a counter that runs backwards or leaps."""
         for stream in self._streams:
             stream.refuse_silence(now)
-        cycle = self.rig.samples_per_cycle(self.rate)
-        self._streams[0].refuse_count((found + 1) * cycle - 1)
+        self._streams[0].refuse_count((found + 1) * self.samples_per_cycle - 1)
 
     def hear(self, joint: int, at: float) -> None:
         """Note when a drive has answered, so that what it was sent has arrived."""
@@ -320,7 +323,7 @@ class Supervisor:
         first = answers.drives[0]
         if isinstance(first, Unanswered):
             return None
-        late = abs(first.sequence // self.rig.samples_per_cycle(self.rate) - self._found)
+        late = abs(first.sequence // self.samples_per_cycle - self._found)
         return self._limits.straying(answers, self._in_force, late)
 
     def _is_new(self, joint: int, found: Reading | Unanswered, now: float) -> bool:
@@ -377,8 +380,7 @@ class Supervisor:
                 "missed again and again; its answers are lost too often, or a drive's counter has parted from the "
                 "other's"
             )
-        counts = [self.rig.map.drive[drive.map].write.reference.step for drive in self.rig.drive]
-        return past > 0 and bool((np.abs(self.sent - self._path(end)) <= np.maximum(counts, NO_LAG_RAD)).all())
+        return past > 0 and bool((np.abs(self.sent - self._path(end)) <= self._nearest).all())
 
     def index(self, row: Row) -> int:
         """Return which set-point of the plan a sample carries; outside the plan before and after it."""

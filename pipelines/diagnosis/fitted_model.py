@@ -43,7 +43,7 @@ def values_of_each_run(
     runs, all else held, and have none.
     """
     told: dict[str, list[dict[str, Any]]] = {c.label: [] for c in made.causes if c.effect.per_run}
-    for number, cause in enumerate(made.causes if told else ()):
+    for number, cause in enumerate(made.causes):
         for r in made.acting(cause) if cause.label in told else ():
             told[cause.label].append(_told(cause.effect, train[r], *tables.values_in_run(made, sure, number, r)))
     for run in validate if told else ():

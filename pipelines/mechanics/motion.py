@@ -122,14 +122,20 @@ class Motion:
                 made[stretch, cuff] = between_readings(self.forces[stretch, cuff], longest)
         return made
 
+    @property
+    def on_segments(self) -> NDArray | None:
+        """Cuff forces on thigh and shank, front and back together, (n, 2, 3) N; None where there are none."""
+        return None if self.felt is None else self.felt.reshape(-1, 2, 2, 3).sum(axis=2)
+
     def cuff_torque(self, q: NDArray) -> NDArray | None:
         """Return the torque of the cuffs on a limb at angles ``q``, (n, 2) N·m, NaN where it is not known.
 
         None where it was not measured.
         """
-        if self.felt is None or self.machine.mechanism is not LEG or not self.geometry.has_cuffs:
+        forces = self.on_segments
+        if forces is None or self.machine.mechanism is not LEG or not self.geometry.has_cuffs:
             return None
-        return cuff_torque(self.felt[:, :2].sum(axis=1), self.felt[:, 2:].sum(axis=1), q, self.geometry)
+        return cuff_torque(forces[:, 0], forces[:, 1], q, self.geometry)
 
     @cached_property
     def transmitted(self) -> tuple[NDArray, NDArray, NDArray]:

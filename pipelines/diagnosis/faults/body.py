@@ -68,8 +68,8 @@ def averages(motion: Motion) -> Averages | None:
         block.mean(x, starts) for x in (motion.q, motion.dq, motion.ddq, np.sign(motion.dq), motion.torque)
     )
     cuffs = None
-    if (felt := motion.felt) is not None and motion.geometry.has_cuffs:
-        cuffs = block.mean(np.stack([felt[:, :2].sum(axis=1), felt[:, 2:].sum(axis=1)], 1), starts)
+    if (forces := motion.on_segments) is not None and motion.geometry.has_cuffs:
+        cuffs = block.mean(forces, starts)
     return Averages(motion, q, dq, ddq, direction, torque, cuffs)
 
 
