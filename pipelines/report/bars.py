@@ -89,6 +89,7 @@ class Fall:
 def budget(verdict: dict[str, Any]) -> list[Bar]:
     """Return a bar for each joint; what takes away from an error lies left of zero."""
     found = []
+    told = told_in_words(verdict)
     for joint, shares in verdict["error_budget"].items():
         left = right = 0.0
         segments = []
@@ -96,7 +97,7 @@ def budget(verdict: dict[str, Any]) -> list[Bar]:
         for key, share in shares.items():
             start = right if share >= 0 else left
             tone = TONES[key] if key in TONES else f"cause{1 + causes.index(key) % CAUSES}"
-            words = share_in_words(key)
+            words = SHARES.get(key) or told.get(key) or label_in_words(key)
             if key == "noise_floor" and share < 0.999 * verdict["noise_floor_nm"][joint] ** 2:
                 words = "noise, all of it below the floor"
             segments.append(Segment(key, words, tone, min(start, start + share), max(start, start + share), share))
@@ -127,11 +128,6 @@ def torque_unit(verdict: dict[str, Any], joint: str) -> str:
     return verdict.get("units", {}).get(joint, {}).get("torque", "N·m")
 
 
-def share_in_words(key: str) -> str:
-    """Say what a share of the error is."""
-    return SHARES[key] if key in SHARES else label_in_words(key)
-
-
 def label_in_words(label: str) -> str:
     """Return ``cogging@knee`` as a sentence says it; an effect that is not known here by its name."""
     try:
@@ -147,6 +143,11 @@ def cause_in_words(cause: Mapping[str, Any]) -> str:
         return in_words(effect_told(cause))
     except InputError:
         return label_in_words(cause_label(cause))
+
+
+def told_in_words(verdict: Mapping[str, Any]) -> dict[str, str]:
+    """Return a verdict's causes and those that could stand in their place as sentences say them, by label."""
+    return {cause_label(one): cause_in_words(one) for cause in verdict["causes"] for one in (*ties_of(cause), cause)}
 
 
 def labels_in_words(text: str, labels: Iterable[str]) -> str:

@@ -21,6 +21,7 @@ from pipelines.report.bars import (
     label_in_words,
     labels_in_words,
     ties_of,
+    told_in_words,
 )
 from pipelines.report.chart import Chart, thinned_alike
 from pipelines.report.control import control_charts, loops
@@ -309,11 +310,16 @@ def _candidates(session: Session) -> list[dict[str, Any]]:
     rows = session.candidates.frame.sort_values("rank").to_dict("records")
     labels = {label for row in rows for label in row["causes"]}
     named = next((row for row in rows if row["verdict"] == "named"), None)
+    # What another set's zeros would be, one for all runs or each run's own, the table does not tell.
+    told = dict.fromkeys(("named", "indistinguishable"), told_in_words(session.verdict or {"causes": []}))
     return [
         {
             "rank": row["rank"],
             "is_more": (more := _beyond(row, named)) is not None,
-            "words": [label_in_words(label) for label in (row["causes"] if more is None else more)],
+            "words": [
+                told.get(row["verdict"], {}).get(label) or label_in_words(label)
+                for label in (row["causes"] if more is None else more)
+            ],
             "verdict": row["verdict"],
             "tone": TONES.get(row["verdict"], ""),
             "falls": [

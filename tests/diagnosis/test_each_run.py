@@ -11,6 +11,7 @@ import pytest
 from pipelines.diagnosis.candidates import Candidate
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.evaluate import settled
+from pipelines.diagnosis.figures.budget import words_of
 from pipelines.diagnosis.fit import fit
 from pipelines.diagnosis.fitted_model import values_of_each_run
 from pipelines.diagnosis.observations import baseline_of, observe
@@ -31,8 +32,13 @@ def zeroed(motion, offset):
 
 
 @pytest.fixture(scope="module")
-def anew():
-    return verdict(diagnose([zeroed(m, HIDDEN[m.file]) for m in session(seconds=30.0)]))
+def found():
+    return diagnose([zeroed(m, HIDDEN[m.file]) for m in session(seconds=30.0)])
+
+
+@pytest.fixture(scope="module")
+def anew(found):
+    return verdict(found)
 
 
 def test_a_joint_zeroed_anew_at_each_start_is_named_and_nothing_else(anew):
@@ -40,6 +46,10 @@ def test_a_joint_zeroed_anew_at_each_start_is_named_and_nothing_else(anew):
     assert [(c["effect"], c["joint"]) for c in anew["causes"]] == [("encoder_offset", "knee")]
     assert "per-run encoder offset at the knee" in anew["summary"]
     assert anew["causes"][0]["fitted_on_validate"] == ["offset"]
+
+
+def test_figures_call_it_what_the_summary_calls_it(found):
+    assert words_of("encoder_offset@knee", found) == "per-run encoder offset at the knee"
 
 
 def test_each_run_s_own_offset_is_recovered_those_that_no_fit_saw_too(anew):

@@ -337,7 +337,11 @@ def test_a_cause_that_differs_from_run_to_run_is_called_so_and_every_run_s_value
         "effect": "encoder_offset", "side": "sensor", "indistinguishable_from": [], "each_run": each_run,
         "parameters": [{"name": "offset", "value": 0.0612, "unit": "rad", "ci95": sure}],
     }  # fmt: skip
-    write_verdict(folder, causes=[cause])
+    shares = {joint: {"noise_floor": 0.07, "encoder_offset@knee": 0.4} for joint in ("hip", "knee")}
+    write_verdict(folder, causes=[cause], error_budget=shares)
+    tried = CANDIDATES.read(folder / "diagnosed" / "candidates.parquet")
+    tried.frame["causes"] = [["encoder_offset@knee"], ["encoder_offset@knee", "cogging@hip"]]
+    CANDIDATES.write(folder / "diagnosed" / "candidates.parquet", tried.frame, tried.metadata)
     table = PARAMETERS.read(folder / "diagnosed" / "parameters.parquet")
     frame = table.frame.replace({"effect": {"cogging": "encoder_offset"}, "name": {"amplitude": "offset"}})
     frame["each_run"] = frame["effect"] == "encoder_offset"
@@ -345,6 +349,8 @@ def test_a_cause_that_differs_from_run_to_run_is_called_so_and_every_run_s_value
     page = report(find([folder]))
     assert "<h1>The simulation misses per-run encoder offset at the knee</h1>" in page
     assert "Why per-run encoder offset at the knee" in page
+    assert '<li class="key cause1">per-run encoder offset at the knee: ' in page
+    assert re.search('<td>per-run encoder offset at the knee</td><td><span class="pill [^"]*">named', page)
     shown = told(page)
     assert shown["each_run:encoder_offset/knee/first.parquet/offset"] == (0.0612, "0.061")
     assert shown["each_run:encoder_offset/knee/judged.parquet/offset"][0] == -0.0503

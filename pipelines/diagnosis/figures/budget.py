@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 
 from pipelines.diagnosis.diagnose import Diagnosis
 from pipelines.diagnosis.error_budget import FLOOR, LEFT, REPEATS, WANDERS
-from pipelines.label import SHARES, effect_labelled, in_words
+from pipelines.label import SHARES, in_words
 from pipelines.plots import BLUE, CAUSES, NOISE
 from pipelines.plots import WANDERS as SCATTER
 
@@ -37,7 +37,7 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
         axis.set_title(f"{joint}: {rms(total)} {units[joint]} rms with rigid body and friction", loc="left", fontsize=9)
         axis.legend(
             [Patch(color=colours[key]) for key in shares],
-            [_line(key, share, total, units[joint]) for key, share in shares.items()],
+            [_line(words_of(key, d), share, total, units[joint]) for key, share in shares.items()],
             loc="center left", bbox_to_anchor=(1.01, 0.5),
         )  # fmt: skip
     last = d.baseline.machine.joints[-1]
@@ -53,9 +53,9 @@ def colours_of(budget: Mapping[str, Mapping[str, float]]) -> dict[str, str]:
     return COLOURS | dict(zip(labels, CAUSES, strict=False))
 
 
-def words_of(key: str) -> str:
+def words_of(key: str, d: Diagnosis) -> str:
     """Say what a share is."""
-    return SHARES.get(key) or in_words(effect_labelled(key))
+    return SHARES.get(key) or in_words(d.effects[key])
 
 
 def stack(axis: Axes, row: float, shares: Mapping[str, float], colours: Mapping[str, str], scale: float = 1.0) -> None:
@@ -91,9 +91,9 @@ def rms(share: float) -> str:
     return f"{'−' if share < 0 else ''}{root:.2f}" if root > SMALL else f"{'−' if share < 0 else ''}{root:.2g}"
 
 
-def _line(key: str, share: float, total: float, unit: str) -> str:
+def _line(words: str, share: float, total: float, unit: str) -> str:
     if abs(share) < NEGLIGIBLE * total:
-        return f"{words_of(key)}: none"
+        return f"{words}: none"
     if share < 0:
-        return f"{words_of(key)}: makes it worse by {rms(-share)} {unit} rms, {-share / total:.0%} of the square"
-    return f"{words_of(key)}: {rms(share)} {unit} rms, {share / total:.0%} of the square"
+        return f"{words}: makes it worse by {rms(-share)} {unit} rms, {-share / total:.0%} of the square"
+    return f"{words}: {rms(share)} {unit} rms, {share / total:.0%} of the square"

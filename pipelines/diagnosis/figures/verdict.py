@@ -15,7 +15,7 @@ from pipelines.diagnosis.figures.against import against, draw, reach
 from pipelines.diagnosis.figures.budget import colours_of, highest, lowest, rms, stack, words_of
 from pipelines.diagnosis.figures.palette import AFTER, BEFORE
 from pipelines.effects import RUNS
-from pipelines.label import effect_labelled, in_words
+from pipelines.label import in_words
 from pipelines.model import effect_named
 from pipelines.plots import NOISE
 
@@ -31,14 +31,14 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
     head = 0.1 + LINE_IN * len(summary)
     height = head + BODY_IN
     drawn, (left, right) = plt.subplots(1, 2, figsize=(10, height), width_ratios=[1, 1.1])
-    _budget(left, said)
+    _budget(left, d, said)
     _shape(right, d, said)
     drawn.text(0.01, 1.0, "\n".join(summary), ha="left", va="top", fontsize=9.5, fontweight="bold")
     drawn.tight_layout(rect=(0, 0, 1, 1 - head / height))
     return drawn
 
 
-def _budget(axis: Axes, said: dict[str, Any]) -> None:
+def _budget(axis: Axes, d: Diagnosis, said: dict[str, Any]) -> None:
     """Draw each joint's bar to its own scale: its baseline's mean square is 100 %."""
     budget = said["error_budget"]
     colours = colours_of(budget)
@@ -59,7 +59,7 @@ def _budget(axis: Axes, said: dict[str, Any]) -> None:
     there = [key for key in next(iter(budget.values()))
              if any(abs(shares[key]) > 0.01 * totals[joint] for joint, shares in budget.items())]  # fmt: skip
     axis.legend(
-        [Patch(color=colours[key]) for key in there], [words_of(key) for key in there],
+        [Patch(color=colours[key]) for key in there], [words_of(key, d) for key in there],
         loc="upper left", bbox_to_anchor=(-0.02, -0.2), fontsize=8, ncols=2,
     )  # fmt: skip
 
@@ -78,7 +78,7 @@ def _shape(axis: Axes, d: Diagnosis, said: dict[str, Any]) -> None:
     draw(axis, seen, floor, max(reach(seen.before, seen.after), 2 * floor), bool(d.causes))
     axis.set_ylabel(f"{joint} {d.baseline.machine.joint(joint).effort} error, {said['units'][joint]['torque']}")
     lines = [("rigid body and friction", BEFORE)]
-    named = " and ".join(in_words(effect_labelled(label)) for label in d.causes)
+    named = " and ".join(in_words(d.effects[label]) for label in d.causes)
     lines += [(f"with {named}", AFTER)] if d.causes else []
     handles = [Line2D([], [], color=colour, lw=2) for _, colour in lines] + [Patch(color=NOISE, alpha=0.5)]
     axis.legend(handles, [words for words, _ in lines] + ["noise floor"], loc="upper left",
