@@ -106,6 +106,13 @@ class Model:
             parts[i] = effect.columns(at, shape)
         return np.concatenate([parts[i] for i in range(len(parts))], axis=2)
 
+    def observed(self, columns: NDArray, motion: Motion) -> NDArray:
+        """Return what the sensors make of torques (n, J, k) along a motion."""
+        for term in self.terms:
+            if term.effect.side is Side.SENSOR:
+                columns = term.effect.observed(columns, motion, term.shape)
+        return columns
+
     def delivered(self, motion: Motion) -> NDArray:
         """Return what the drives deliver where their sensors measured ``motion.torque``, (n, J) N·m."""
         torque = motion.torque

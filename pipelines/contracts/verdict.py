@@ -98,6 +98,16 @@ class Dependence(_Object):
     share_after: Number
 
 
+class Reversal(_Object):
+    """Friction of a joint that builds up over a travel where it turns round."""
+
+    joint: str
+    travel: Number
+    unit: str
+    at_once_rmse_nm: Number
+    over_travel_rmse_nm: Number
+
+
 class Fault(_Object):
     """Something wrong with a file's data."""
 
@@ -150,6 +160,8 @@ class Verdict(_Object):
     control: Control
     error_budget: dict[str, ByJoint]
     depends_on: dict[str, list[Dependence]]
+    reversals: list[Reversal] = []
+    """Files of older versions lack it."""
     units: dict[str, dict[str, str]]
     causes: list[Cause]
     data_faults: list[Fault]

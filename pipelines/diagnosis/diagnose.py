@@ -28,6 +28,7 @@ from pipelines.diagnosis.fitted_model import model_of_run, values_of_each_run
 from pipelines.diagnosis.floor import Floor, noise_floor
 from pipelines.diagnosis.gain import Gain, errors_of, gain
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, like_trained, observe, with_load
+from pipelines.diagnosis.reversals import BuildUp, built_up
 from pipelines.diagnosis.search import imperfection
 from pipelines.diagnosis.second_look import slower
 from pipelines.diagnosis.session import refuse_unfit
@@ -81,6 +82,8 @@ class Diagnosis:
     """(J,) rad: the 1 s simulation error of the baseline and of the extended model."""
     noisy_angles: bool
     """Whether only what the angles hold below 5 Hz was looked at, for above it is noise."""
+    reversals: tuple[BuildUp, ...]
+    """Joints whose friction builds up over a travel where they turn round, which nothing else here looks at."""
 
     @property
     def collinear(self) -> list[str]:
@@ -226,6 +229,7 @@ def _look(
         perceived=examined.sure, sure=sure, parameters=frame, covariance=covariance,
         residuals=tables.residual_table(validate, {"baseline": before.residuals, "extended": after.residuals}),
         train=bank.runs, validate=validate, faults=faults, noisy_angles=noisy_angles,
+        reversals=() if spoilt else tuple(built_up(choice.named.fit, baseline, bank.runs, validate)),
         strayed={"baseline": _strayed(empty, validate, baseline),
                  "extended": _strayed(choice.named.fit, validate, baseline)},
     )  # fmt: skip

@@ -13,10 +13,11 @@ from pipelines.diagnosis.diagnose import Diagnosis, summary_numbers
 from pipelines.diagnosis.error_budget import error_budget
 from pipelines.diagnosis.examined import PERCEIVED
 from pipelines.diagnosis.faults import Fault
+from pipelines.diagnosis.reversals import NEAR_S, BuildUp
 from pipelines.diagnosis.status import AT_FLOOR, EXPLAINED
 from pipelines.diagnosis.ties import tie_between
 from pipelines.diagnosis.unknown import Unknown, unknown
-from pipelines.effects import Effect
+from pipelines.effects import Effect, PreslidingHysteresis
 from pipelines.estimation.angle_noise import CUTOFF_HZ, IN_WORDS
 from pipelines.estimation.regression import mask_in_words
 from pipelines.label import amount, cause_label, effect_labelled, effect_told, in_words, number
@@ -60,6 +61,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "control": control(d),
         "error_budget": error_budget(d),
         "depends_on": _depends_on(before, after),
+        "reversals": [_reversal(d, one) for one in d.reversals],
         "units": {
             joint.name: {"torque": joint.unit("torque"), "angle": joint.unit("angle")}
             for joint in d.baseline.machine.joints
@@ -226,7 +228,31 @@ def _caveats(d: Diagnosis) -> list[str]:
         "that channel are right"
         for joint, share in _floor_that_hides(d).items()
     ]
-    return [noisy] * d.noisy_angles + hiding * (not d.spoilt) + _of_one_run(d) + _of_one_kind(d)
+    turning = [_turning(d, one) for one in d.reversals]
+    return [noisy] * d.noisy_angles + hiding * (not d.spoilt) + turning + _of_one_run(d) + _of_one_kind(d)
+
+
+def _reversal(d: Diagnosis, one: BuildUp) -> dict[str, Any]:
+    return {
+        "joint": one.joint,
+        "travel": one.travel,
+        "unit": d.baseline.machine.joint(one.joint).unit("angle"),
+        "at_once_rmse_nm": one.at_once,
+        "over_travel_rmse_nm": one.over_travel,
+    }
+
+
+def _turning(d: Diagnosis, one: BuildUp) -> str:
+    """Say of a joint what the samples tell that the mask leaves out."""
+    machine = d.baseline.machine
+    joint = machine.joint(one.joint)
+    return (
+        f"within {NEAR_S:g} s of its reversals, where no cause is looked for, {the(one.joint)}'s friction does not "
+        f"turn round at once: it builds up over {1e3 * one.travel:.2g} m{joint.unit('angle')} of travel "
+        f"({PreslidingHysteresis.name}), which takes the {joint.effort} error there from "
+        f"{amount(machine, one.joint, one.at_once)} to {amount(machine, one.joint, one.over_travel)} below "
+        f"{CUTOFF_HZ:g} Hz, on runs no fit has seen; the model has it turn round at once"
+    )
 
 
 def _floor_that_hides(d: Diagnosis) -> dict[str, float]:

@@ -45,6 +45,7 @@ def measured(found: dict[str, Diagnosed], data: Path) -> dict[str, str]:
         made["A0-orders"] = tables.by_order(found["A0-fourier"])
         made["A0-reversals"] = tables.reversals(found["A0-fourier"])
     for key, one in found.items():
+        made[f"{key}-turning"] = tables.turning(one)
         if any(cause["each_run"] for cause in one.verdict["causes"]):
             made[f"{key}-each-run"] = tables.of_each_run(one)
         made |= {f"{key}-depends": tables.depends(one), f"{key}-says": f"> {one.verdict['summary']}"}

@@ -119,6 +119,11 @@ def by_order(d: Diagnosed) -> str:
     return table(headings, rows)
 
 
+def turning(d: Diagnosed) -> str:
+    """Return what the verdict says of friction at reversals."""
+    return "\n>\n".join(f"> But {caveat}." for caveat in d.verdict["caveats"] if "reversals" in caveat) or "> Nothing."
+
+
 def built_up(named: Mapping[str, Model], motion: Motion, travels: Sequence[float]) -> NDArray:
     """Return the torque (n, J) of a run's model whose Coulomb friction builds up over a travel after each reversal."""
     model = named[motion.file]

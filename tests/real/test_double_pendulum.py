@@ -40,6 +40,15 @@ def test_friction_that_goes_with_the_load_of_a_planetary_gear_is_named_and_foret
     assert (ours.rms < theirs.rms).all()
 
 
+def test_at_reversals_friction_builds_up_over_a_travel_of_some_counts_of_the_encoder(fourier):
+    count = 0.000381
+    told = {one["joint"]: one for one in fourier.verdict["reversals"]}
+    assert set(told) == {"shoulder", "elbow"}
+    for one in told.values():
+        assert 2.0 * count < one["travel"] < 10.0 * count
+        assert one["over_travel_rmse_nm"] < 0.8 * one["at_once_rmse_nm"]
+
+
 def errors(found, theirs):
     """Return the errors (R, J) N·m of the extended model and of the published parameters on every run."""
     ours = [found.error_on(motion).rms for motion in found.motions]

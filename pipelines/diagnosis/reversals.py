@@ -1,0 +1,189 @@
+"""What the verdict leaves out: whether friction turns round at once where a joint does, or builds up over a travel.
+
+A faultless joint with dry friction may stand at a reversal while the torque swings; one whose friction is elastic gives
+way all along. The torque of the two is alike, their angles are not: of the first nothing moves while friction changes
+sides, of the second the encoder tells the travel over which it does. So the model's own Coulomb friction is put on
+its other side at once, late, over a range of speeds and over a travel, and each is held against the torque there.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.choice import NEEDED
+from pipelines.diagnosis.fit import Fit
+from pipelines.diagnosis.fitted_model import model_of_run
+from pipelines.diagnosis.observations import Baseline, Run
+from pipelines.effects import PreslidingHysteresis
+from pipelines.effects.friction import Friction
+from pipelines.estimation.angle_noise import CUTOFF_HZ
+from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.slow_motion import filtered, unsure
+from pipelines.model import Model
+from pipelines.signals.blocks import dilate
+
+NEAR_S = 0.12
+"""About a reversal: as long as a low-pass of ``CUTOFF_HZ`` feels what happens there."""
+SHORTEST, LONGEST = 2e-5, 0.01
+"""rad of travel, on an exoskeleton's scale: what builds up over more shows away from reversals too."""
+TRAVELS = 16
+SPEEDS = (0.02, 0.04, 0.08, 0.16, 0.32)
+"""rad/s, on an exoskeleton's scale, within which friction that goes with speed turns round."""
+LATE_S = (0.01, 0.02, 0.04)
+"""After the reversal: friction does so where a torque is read late, and nobody knows."""
+ROUNDING = 1e-9
+TAKEN = 0.2
+"""Share of the error's power about reversals that a travel must take beyond what speed or a delay takes."""
+
+
+@dataclass(frozen=True)
+class BuildUp:
+    """Friction of a joint that builds up over a travel after each reversal."""
+
+    joint: str
+    travel: float
+    """rad, m at a prismatic joint: that over which 63 % of it change sides."""
+    at_once: float
+    over_travel: float
+    """N·m rms about reversals of the validation runs, below ``CUTOFF_HZ``: what either friction leaves."""
+
+
+@dataclass(frozen=True)
+class _About:
+    """A run about the reversals of a joint."""
+
+    motion: Motion
+    model: Model
+    j: int
+    read: NDArray
+    """(n,) the joint's angle as its encoder gave it."""
+    speed: NDArray
+    """(n,)."""
+    rest: NDArray
+    """(n,) N·m measured less what the model tells without Coulomb friction, below the cut-off."""
+    level: float
+    """N·m of Coulomb friction."""
+    near: NDArray
+    """(n,) bool."""
+
+    @property
+    def seconds(self) -> float:
+        return float(self.near.sum() / self.motion.sample_rate_hz)
+
+    @classmethod
+    def of(cls, made: Fit, baseline: Baseline, run: Run, j: int) -> "_About | None":
+        """Return None where the angle as read is not known, or the joint never turns round."""
+        motion, model = run.motion, model_of_run(made, baseline, run)
+        label = Friction(baseline.joints[j], on=baseline.machine).label
+        coulomb = [(effect.label, p.name) == (label, "coulomb") for effect, p in model.linear_parameters]
+        level, near = float(model.linear_values[coulomb].sum()), _near(motion, j)
+        if motion.measured_angle is None or level <= 0.0 or not near.any():
+            return None
+        read, speed = np.ascontiguousarray(motion.measured_angle[:, j]), motion.dq[:, j]
+        told = model.with_linear(np.where(coulomb, 0.0, model.linear_values)).torque(motion)
+        rest = filtered(motion, motion.torque[:, j] - told[:, j], CUTOFF_HZ)
+        return cls(motion, model, j, read, speed, rest, level, near)
+
+    def left(self, side: "Side") -> NDArray:
+        """Return what friction on that side leaves about reversals, (near,) N·m."""
+        column = np.zeros((*self.motion.q.shape, 1))
+        column[:, self.j, 0] = self.level * side(self)
+        seen = self.model.observed(column, self.motion)[:, self.j, 0]
+        return (self.rest - filtered(self.motion, seen, CUTOFF_HZ))[self.near]
+
+
+def _near(motion: Motion, j: int) -> NDArray:
+    """Tell which samples are about a joint's reversals and can be trusted below the cut-off, (n,) bool."""
+    turned = np.zeros(len(motion), dtype=bool)
+    turned[1:] = np.diff(motion.dq[:, j] > 0)
+    about = dilate(turned, round(NEAR_S * motion.sample_rate_hz))
+    return np.asarray(about & motion.valid & ~unsure(motion, CUTOFF_HZ))
+
+
+Side = Callable[[_About], NDArray]
+"""The side on which friction is along a run, (n,) from -1 to 1."""
+
+
+def built_up(made: Fit, baseline: Baseline, train: Sequence[Run], validate: Sequence[Run]) -> list[BuildUp]:
+    """Return the joints whose friction builds up; the travel is told by the runs to train on, and the others judge."""
+    known = {cause.label for cause in made.causes}
+    found = []
+    for j, joint in enumerate(baseline.joints):
+        runs = [[_About.of(made, baseline, run, j) for run in some] for some in (train, validate)]
+        about = [[one for one in some if one is not None] for some in runs]
+        if PreslidingHysteresis(joint, on=baseline.machine).label in known or not all(about):
+            continue
+        if (one := _of_joint(about[0], about[1], baseline, j)) is not None:
+            found.append(one)
+    return found
+
+
+def _of_joint(train: Sequence[_About], validate: Sequence[_About], baseline: Baseline, j: int) -> BuildUp | None:
+    joint = baseline.joints[j]
+    scale = baseline.machine.scale(joint)
+    count = max(_count(about.read) for about in (*train, *validate))
+    shortest, longest = max(SHORTEST * scale.travel, count), LONGEST * scale.travel
+    if 2.0 * shortest > longest:
+        return None
+    travels = np.geomspace(shortest, longest, TRAVELS)
+    over = [_side_over(0.5 * count, travel) for travel in travels]
+    best = int(np.argmin([_power(train, side) for side in over]))
+    if best in (0, TRAVELS - 1):
+        return None  # at once, as far as the encoder tells, or over more than what is about a reversal
+    rivals = [_side_at_once, *(_side_by_speed(speed * scale.speed) for speed in SPEEDS), *map(_side_late, LATE_S)]
+    rival = rivals[int(np.argmin([_power(train, side) for side in rivals]))]
+    ratios = [_power(some, over[best]) / _power(some, rival) for some in (train, validate)]
+    independent = CUTOFF_HZ * sum(about.seconds for about in train)
+    if max(ratios) > 1.0 - TAKEN or -0.5 * independent * np.log(ratios[0]) < NEEDED:
+        return None
+    return BuildUp(
+        joint, float(travels[best]), *(float(np.sqrt(_power(validate, side))) for side in (rivals[0], over[best]))
+    )
+
+
+def _power(some: Sequence[_About], side: Side) -> float:
+    return float(np.mean(np.concatenate([about.left(side) for about in some]) ** 2))
+
+
+def _side_at_once(about: _About) -> NDArray:
+    return np.sign(about.speed)
+
+
+def _side_by_speed(speed: float) -> Side:
+    return lambda about: np.tanh(about.speed / speed)
+
+
+def _side_late(delay: float) -> Side:
+    return lambda about: np.interp(about.motion.time - delay, about.motion.time, np.sign(about.speed))
+
+
+def _side_over(grain: float, travel: float) -> Side:
+    return lambda about: np.asarray(dahl(about.read, grain, travel))
+
+
+def _count(angle: NDArray) -> float:
+    """Return the smallest step of an angle as it was read, but for rounding."""
+    read = angle[np.isfinite(angle)]
+    steps = np.abs(np.diff(read))
+    return float(np.min(steps[steps > ROUNDING * np.abs(read).max(initial=0.0)], initial=np.inf))
+
+
+@njit(cache=True)
+def dahl(angle: NDArray, grain: float, travel: float) -> NDArray:
+    """Return Dahl's friction along an angle (n,), from -1 to 1: it goes with the travel, whatever the time it takes.
+
+    An encoder that flickers by less than ``grain`` has not moved. Dahl (1976), AIAA Journal 14(12), eq. 4, exponent 1.
+    """
+    out = np.zeros(len(angle))
+    at, z = angle[0], 0.0
+    for i in range(1, len(angle)):
+        away = angle[i] - at
+        if abs(away) > grain:
+            way = 1.0 if away > 0.0 else -1.0
+            z = way + (z - way) * np.exp(-(abs(away) - grain) / travel)
+            at = angle[i] - way * grain
+        out[i] = z
+    return out

@@ -1,0 +1,86 @@
+"""At reversals: friction that builds up over a travel is told from one that sticks, on the plant of the blind test."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.reversals import dahl
+from pipelines.diagnosis.verdict import verdict
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.read import read_motions
+from pipelines.settings.filter import FilterSettings
+from tests.blind import smooth
+from tests.blind.cases import case
+from tests.blind.excitation import random_excitation
+from tests.blind.machine import random_machine
+from tests.blind.people import random_person
+from tests.blind.plan import JOINTS, Plan, Run
+from tests.blind.plant import Rig, record
+from tests.blind.session import Session, write
+
+COUNTS = 2**17
+"""Of a turn: 0.05 mrad each."""
+
+
+def test_dahls_friction_changes_sides_over_its_travel_whatever_the_time_that_it_takes():
+    forth, travel = np.linspace(0.0, 0.1, 5_000), 0.002
+    turned = np.linspace(0.1, 0.1 - travel * np.log(2.0), 50)
+    for back in (turned, np.sort(np.repeat(turned, 7))[::-1]):
+        side = dahl(np.concatenate([forth, back]), 0.0, travel)
+        assert side[len(forth) - 1] == pytest.approx(1.0) and side[-1] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_an_encoder_that_flickers_between_two_counts_has_not_moved():
+    count = 1e-3
+    steady = np.arange(0.0, 0.05, count)
+    flickering = steady[-1] - count * (np.arange(200) % 2)
+    side = dahl(np.concatenate([steady, flickering]), 0.5 * count, 2.0 * count)
+    assert_allclose(side[len(steady) :], side[len(steady) :].mean(), atol=1e-12)
+
+
+def diagnosed(folder, seed, travel, counts=COUNTS, late=0.0):
+    """Diagnose two minutes of a rig whose dry friction gives way over ``travel`` rad, or sticks where that is None."""
+    rng = np.random.default_rng(seed)
+    person = random_person(rng)
+    machine = replace(random_machine(rng, person.thigh_length), counts=np.full(2, float(counts)))
+    rig = Rig(machine if travel is None else replace(machine, coulomb=np.zeros(2)), person)
+    runs = []
+    for purpose in ("train", "validate"):
+        run, plan = Run("exo_alone", purpose, 60.0, rng), Plan()
+        for j, level in enumerate(machine.coulomb) if travel is not None else ():
+            plan.torque(smooth.DAHL, j, level, travel)
+        plan.channel.delay_s[:] = late
+        runs.append(record(rig, random_excitation(rng), plan, run, rng))
+    write(Session(case(seed, "none", 0), rig, [], runs), folder / "recordings", folder / "truth.json")
+    return diagnose(read_motions(sorted((folder / "recordings").glob("*.parquet")), FilterSettings(), Geometry()))
+
+
+@pytest.mark.parametrize(("seed", "travel"), [(900_001, 0.001), (900_002, 0.002), (900_003, 0.004)])
+def test_bristles_of_milliradians_are_told_with_their_travel(tmp_path, seed, travel):
+    found = diagnosed(tmp_path, seed, travel)
+    told = {one.joint: one for one in found.reversals}
+    assert set(told) == set(JOINTS)
+    for one in told.values():
+        assert one.travel == pytest.approx(travel, rel=0.3)
+        assert one.over_travel < 0.7 * one.at_once
+    said = verdict(found)
+    assert [(one["joint"], one["unit"]) for one in said["reversals"]] == [(joint, "rad") for joint in JOINTS]
+    assert sum("builds up over" in caveat for caveat in said["caveats"]) == 2
+
+
+@pytest.mark.parametrize("seed", range(900_001, 900_005))
+def test_a_faultless_joint_that_sticks_where_it_turns_round_is_given_no_travel(tmp_path, seed):
+    found = diagnosed(tmp_path, seed, None)
+    assert found.reversals == () and verdict(found)["reversals"] == []
+
+
+def test_an_encoder_whose_counts_are_as_long_as_the_travel_tells_none(tmp_path):
+    assert diagnosed(tmp_path, 900_002, 0.001, counts=2**12).reversals == ()
+
+
+@pytest.mark.parametrize("late", [0.01, 0.04])
+def test_friction_that_turns_round_at_once_and_is_read_late_is_given_no_travel(tmp_path, late):
+    assert diagnosed(tmp_path, 900_002, None, late=late).reversals == ()
