@@ -19,6 +19,7 @@ from pipelines.acquisition.row import Answers, Row
 from pipelines.acquisition.sampling import Sampling
 from pipelines.acquisition.states import SLACK_SAMPLES, State, Supervisor
 from pipelines.errors import DeviceError, Unanswered
+from pipelines.event_loop import exact_event_loop
 
 REPORT_S = 0.1
 DISABLE_TRIES = 3
@@ -127,8 +128,11 @@ class Loop:
         while not self.supervisor.has_followed(last):
             found = await pace.wait(last.sequence)
             self._heed_signals()
-            if self.supervisor.missed(found, time.monotonic()) and not await self._resume():
-                continue
+            if self.supervisor.missed(found, time.monotonic()):
+                try:
+                    found = max(found, await self._resume())
+                except Unanswered:
+                    continue
             self.supervisor.next(found, time.monotonic())
             answers = await self._exchange(self.supervisor.step)
             row = self.supervisor.judge(answers, time.monotonic())
@@ -140,15 +144,12 @@ class Loop:
             if time.monotonic() - self._reported >= REPORT_S:
                 self._tell()
 
-    async def _resume(self) -> bool:
-        """Ask the drives what they made of a silence; tell whether they answered."""
-        try:
-            await all_answers(self._find(joint) for joint in range(len(self.machine.drives)))
-        except Unanswered:
-            return False
-        return True
+    async def _resume(self) -> int:
+        """Ask the drives what they made of a silence; return the cycle that they are in by now."""
+        first, *_ = await all_answers(self._find(joint) for joint in range(len(self.machine.drives)))
+        return first.sequence // self.machine.samples_per_cycle
 
-    async def _find(self, joint: int) -> None:
+    async def _find(self, joint: int) -> Reading:
         """Ask a drive where it is, to go on from there."""
         told = self.supervisor.sent_at[joint]
         reading = await self.machine.drives[joint].look(in_motion=True)
@@ -156,6 +157,7 @@ class Loop:
             self.supervisor.resume(joint, reading, time.monotonic())
         else:  # it was told something else meanwhile
             self.supervisor.heed(joint, reading)
+        return reading
 
     async def _tend(self, joint: int) -> None:
         """Tell a drive where to go for as long as others are awaited, rather than nothing.
@@ -166,16 +168,20 @@ class Loop:
         patience, look_at = SLACK_SAMPLES * period, 0.0
         while True:
             told = self._told_at(joint)
+            due = max(told + patience, look_at)
             with suppress(TimeoutError):
-                async with asyncio.timeout(max(told + patience, look_at) - time.monotonic()):
+                async with asyncio.timeout(due - time.monotonic()):
                     await self._followed.wait()
                     return
+            held_up = time.monotonic() - due > LOOK_PAUSE * period
             self._heed_signals()
             self.supervisor.refuse_after_abort()
             if self._told_at(joint) != told:  # nobody is awaited for long
                 patience = SLACK_SAMPLES * period
             elif drive.device.awaited_s > period:  # it is the one who is awaited
                 look_at = time.monotonic() + LOOK_PAUSE * period
+            elif held_up and due > look_at:  # by this computer, and so was whoever follows the plan: it goes first
+                look_at = due + period
             else:
                 await self._tell_alone(joint)
                 patience = period
@@ -230,7 +236,8 @@ class Loop:
         """Tell a drive its set-point, decided when its turn has come: by then it may have gone on by itself."""
         joint = self.machine.drives.index(drive)
         async with drive.device.turn():
-            if self.supervisor.is_stale(joint, time.monotonic()):
+            now = time.monotonic()
+            if self.supervisor.is_stale(joint, now) or self.supervisor.is_late(now):
                 await self._find(joint)
                 decide = self.supervisor.tend
             return await drive.exchange(decide(joint, time.monotonic()))
@@ -392,7 +399,7 @@ def run_to_its_end(run: Coroutine, note: Callable[[BaseException], None]) -> Non
     An exception that ends the loop itself, as KeyboardInterrupt does, is noted, and the loop goes on: the coroutine
     has drives to disable.
     """
-    with asyncio.Runner() as runner:
+    with asyncio.Runner(loop_factory=exact_event_loop) as runner:
         loop = runner.get_loop()
         task = loop.create_task(run)
         while True:

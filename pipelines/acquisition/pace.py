@@ -12,7 +12,8 @@ LEAN = 0.005
 STEP_BACK = 0.1
 """Share of a sample period to wait after a look that came too early."""
 SLOW = 0.3
-"""Share of a sample period after which an answer is too old to build on."""
+"""Share of a sample period after which an answer is too old to build on, where nobody knows when the next sample is
+latched."""
 
 
 @contextmanager
@@ -64,6 +65,8 @@ class PhaseLock:
         self._patience_s = patience_s
         self._due = time.perf_counter()
         self._found: int | None = None
+        self._early: tuple[float, int] | None = None
+        """When a look came too early, and which sample it found: the one after it was latched later than that."""
 
     async def wait(self, last: int) -> int:
         """Wait until a sample after ``last`` is latched that was not waited for yet; return it, or ``last`` if none is.
@@ -71,17 +74,30 @@ class PhaseLock:
         What was waited for and not brought by an exchange has had its time all the same.
         """
         began = time.perf_counter()
-        before = last if self._found is None else self._found
+        looked = last if self._found is None else self._found
+        before = max(last, looked)
         while True:
             await asyncio.sleep(max(0.0, self._due - time.perf_counter()))
             asked = time.perf_counter()
             found, now = await self._counter(), time.perf_counter()
-            if now - asked > SLOW * self._period and now - began < self._patience_s:
+            if now > self._fresh_until(found, asked) and now - began < self._patience_s:
                 continue  # by now another sample may be latched
             if found != before:
-                self._due += (found - before - LEAN) * self._period
+                self._due += (found - looked - LEAN) * self._period
                 self._found = found
                 return found
             if now - began > self._patience_s:
                 return last
+            self._early, looked = (asked, found), found
             self._due = now + STEP_BACK * self._period
+
+    def _fresh_until(self, found: int, asked: float) -> float:
+        """Return until when a sample that a look found is surely the newest, host's clock, s; ``asked`` is the look's.
+
+        Samples follow one another in equal periods since the last look that came too early.
+        """
+        soon = asked + SLOW * self._period
+        if self._early is None:
+            return soon
+        since, then = self._early
+        return max(soon, since + (found - then) * (1.0 - LEAN) * self._period)

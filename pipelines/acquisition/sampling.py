@@ -89,16 +89,29 @@ class Recorded:
         assert drive.ring  # a rig file that asks for recorders has one for every drive
         self._drive, self._block = drive, drive.ring.block
         self._drained: int | None = None
+        self._draining: asyncio.Task[list[Reading] | DeviceError] | None = None
 
     async def samples(self, reading: Reading) -> list[Reading]:
-        """Return what was drained; mostly nothing, until a read is worth its while."""
-        if self._drained is not None and reading.sequence < self._drained + self._block:
+        """Return what was drained since the last cycle; mostly nothing, until a read is worth its while."""
+        is_due = self._drained is None or reading.sequence >= self._drained + self._block
+        if self._draining is None and is_due:
+            self._draining = asyncio.create_task(self._drain(reading.sequence))
+        # Beside the cycle, for the next set-point must not wait for it; in lockstep the drives do.
+        if self._draining is None or not (self._drive.in_lockstep or self._draining.done()):
             return []
+        found, self._draining = await self._draining, None
+        if not isinstance(found, list):
+            raise found
+        return found
+
+    async def _drain(self, newest: int) -> list[Reading] | DeviceError:
         try:
-            samples = await self._drive.drain(reading.sequence)
+            samples = await self._drive.drain(newest)
         except Unanswered:
             return []  # the ring keeps them: the next drain brings what this one did not
-        self._drained = samples[-1].sequence if samples else reading.sequence
+        except DeviceError as error:
+            return error
+        self._drained = samples[-1].sequence if samples else newest
         return samples
 
 

@@ -107,6 +107,10 @@ class Supervisor:
         counts = [rig.map.drive[drive.map].write.reference.step for drive in rig.drive]
         self._nearest = np.maximum(counts, NO_LAG_RAD)
         """(J,) rad within which a set-point is another: drives cannot be told it more finely."""
+        self._ahead = np.zeros_like(self.sent)
+        """(J,) samples by which each drive's counter is ahead of the machine's cycles when its set-points come."""
+        self._behind: list[float | None] = [None for _ in rig.drive]
+        """By how much, rad, a drive was behind the plan when it was asked after a silence; None where it was not."""
         self._held = [0 for _ in rig.drive]
         """For how many samples each drive has been held at rest in the stop."""
         self._in_force = self.sent.copy()
@@ -179,6 +183,7 @@ class Supervisor:
         self._found_at = now
         self._heard_at[:] = now
         for j, found in enumerate(row.drives):
+            self._ahead[j] = found.sequence - row.sequence * self.samples_per_cycle
             self._streams[j].begin(found, now)
             self._told[j].tell(found.sequence, float(self.sent[j]))
         self._go(State.RAMP)
@@ -214,6 +219,11 @@ class Supervisor:
             return bool(self._unheard[joint] >= SLACK_SAMPLES)
         return bool(now - self._heard_at[joint] > SLACK_SAMPLES / self.rate)
 
+    def is_late(self, now: float) -> bool:
+        """Tell whether the sample found last is no longer the newest, so that what is due at it is due no more."""
+        follows = self.state in FOLLOWING and self.rig.clock != "lockstep"
+        return follows and now - self._found_at > 1.0 / self.rate
+
     def resume(self, joint: int, reading: Reading, now: float) -> None:
         """Go on from where a drive is that was told nothing for a while: some hold meanwhile, others go on.
 
@@ -232,7 +242,19 @@ class Supervisor:
             place = np.clip(reading.angle, *sorted((sent, sent + self._pace[joint] * silent_s)))
         speed = (place - sent) / silent_s if np.isnan(reading.velocity) else reading.velocity
         self.base[joint] = self._in_force[joint] = place
+        self._behind[joint] = None if self.rig.clock == "lockstep" else self._planned(joint, reading, now) - place
         self._speed[joint] = np.clip(speed, *sorted((0.0, self._speed[joint])))
+
+    def _planned(self, joint: int, reading: Reading, now: float) -> float:
+        """Return where a drive that follows the plan is at a sample of its own, rad.
+
+        Set-points come when its counter is so far ahead of the machine's, and the one before is reached then.
+        """
+        latest = self._found + (now - self._found_at) * self.rate + SLACK_SAMPLES
+        cycle = np.clip((reading.sequence - self._ahead[joint]) / self.samples_per_cycle, self._found, latest)
+        whole, share = divmod(float(cycle) - self._first - 1.0, 1.0)
+        before, after = (self._path(self._index(self._first + int(whole) + k))[joint] for k in range(2))
+        return float(before + share * (after - before))
 
     def tend(self, joint: int, now: float) -> float:
         """Return the set-point (rad) of a drive that would else be told nothing, since another one is awaited.
@@ -334,10 +356,16 @@ class Supervisor:
             is_new = False
         else:
             is_new = stream.take(found, now)
+            self._meet(joint, found)
             # What was sent with the question takes effect after the sample that it brought.
             self._told[joint].tell(found.sequence, float(self.sent[joint]))
         stream.refuse_silence(now)
         return is_new
+
+    def _meet(self, joint: int, found: Reading) -> None:
+        """Note how far a drive's counter was ahead when a set-point came; one that came late tells of itself alone."""
+        ahead = found.sequence - self._found * self.samples_per_cycle
+        self._ahead[joint] = min(self._ahead[joint] + RATE_TOLERANCE * self.samples_per_cycle, ahead)
 
     def _travel(self, row: Row) -> float:
         """Return how far the joints were told to go up to a sample, all together, rad."""
@@ -501,8 +529,13 @@ class Supervisor:
         DeviceError
             The plan leaps there or leaves its limits, or is too far ahead.
         """
-        drive, base, moves = self.rig.drive[joint], float(self.base[joint]), float(self._speed[joint])
+        drive, moves = self.rig.drive[joint], float(self._speed[joint])
         due, before, earlier = (float(self._path(self._index(found - back))[joint]) for back in range(3))
+        if (behind := self._behind[joint]) is not None:
+            # From where it is once it reaches the set-point before this one: it goes on since it was asked.
+            self.base[joint] = self._in_force[joint] = before - behind
+            self._behind[joint] = None
+        base = float(self.base[joint])
         refuse_leap(drive, before, due, 1.0 / self.rate)
         along, was, lag = (due - before) * self.rate, (before - earlier) * self.rate, before - base
         if lag == 0.0 and moves == was:

@@ -24,6 +24,7 @@ from pymodbus.constants import ExcCodes
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from pipelines.errors import SettingsError, about
+from pipelines.event_loop import exact_event_loop
 from pipelines.mechanics.motion import CUFFS
 from pipelines.registers import Block
 from pipelines.rig.clocks import OwnClock
@@ -416,6 +417,8 @@ def serve_file(
         with suppress(PermissionError, AttributeError):  # Linux grants it to privileged users
             os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
-    for number in asyncio.run(until_stopped()):
+    with asyncio.Runner(loop_factory=exact_event_loop) as runner:
+        came = runner.run(until_stopped())
+    for number in came:
         if number != signal.SIGINT:  # Ctrl-C is how it is meant to end; who else asked for it is told so
             signal.raise_signal(number)

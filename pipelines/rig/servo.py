@@ -1,11 +1,15 @@
 """What a virtual drive makes of control words, set-points and silence: when its motor follows, and where to."""
 
-from math import ceil, isfinite
+from math import ceil, floor, isfinite
 
 from pipelines.settings.rig import DriveMap
 
 EXTRAPOLATED = 5
 """Cycles over which a drive goes on at its set-points' speed when none comes; then it slows down."""
+EARLY, LATE = 0.25, 0.5
+"""Shares of a cycle by which a set-point is clearly that one and not another, though it comes early or late."""
+CATCH = 0.02
+"""Share of how early or late a set-point comes that the drive's own cycles follow."""
 
 
 class Servo:
@@ -47,8 +51,8 @@ class Servo:
         self._told, self._control = rest, registers.disable
         self._last, self._step, self._unheard = rest, 0.0, 0
         self._pace = 0.0
-        self._way = samples_per_cycle
-        """Samples from when the set-point came to when it is to be reached."""
+        self._from, self._way = rest, float(samples_per_cycle)
+        """Where it was when the set-point came, and samples from then to when it is to be reached."""
 
     @property
     def enabled(self) -> bool:
@@ -68,16 +72,27 @@ class Servo:
         """Take a set-point (rad) and a control word."""
         # It holds where it is told no number: arithmetic would carry that on for ever.
         told = reference if isfinite(reference) else self._last
+        cycles = self._cycles_to(told)
         # The set-points' own speed: the way back from having gone on too far is none to go on at.
-        cycles = max(round(self._unheard / self._cycle), 1)
-        self._pace = (told - self._told) / (cycles * self._cycle) if self.enabled else 0.0
-        # A cycle after the one before was to be reached; anew where that would be too soon, or too late.
+        if cycles:
+            self._pace = (told - self._told) / (cycles * self._cycle) if self.enabled else 0.0
+        # A cycle after the one before was to be reached; by and by a cycle after it comes.
         way = self._way - self._unheard + cycles * self._cycle
-        self._way = way if 0.5 * self._cycle <= way <= 1.5 * self._cycle else self._cycle
+        self._from, self._way = self._last, max(way + CATCH * (self._cycle - way), 1.0)
         self._unheard = 0
         if control == self._map.fault_reset:
             self.fault = False
         self._told, self._control = told, control
+
+    def _cycles_to(self, told: float) -> int:
+        """Return how many set-points a new one (rad) is after the last one; 0 where it corrects that.
+
+        The time tells; what is very late could be another one, and is what goes on at their speed.
+        """
+        waited = (self._unheard + self._cycle - self._way) / self._cycle
+        if (clear := floor(waited + EARLY)) != floor(waited - LATE):
+            return clear
+        return min(floor(waited), ceil(waited), key=lambda n: abs(told - self._told - n * self._cycle * self._pace))
 
     def next(self, angle: float) -> tuple[float, bool]:
         """Return the set-point (rad) for the next sample and whether the motor follows it.
@@ -94,8 +109,10 @@ class Servo:
     def _reference(self) -> float:
         if self._control == self._map.halt:
             return self._last
+        if (after := self._unheard + 1) <= self._way:
+            return self._from + (self._told - self._from) * after / self._way
         if self._unheard < self._way:
-            return self._last + (self._told - self._last) / (self._way - self._unheard)
+            return self._told + self._pace * (after - self._way)
         step = self._pace
         if self._unheard >= self._cycle * (1 + EXTRAPOLATED):
             step = self._step

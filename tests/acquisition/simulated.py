@@ -410,7 +410,7 @@ def _patched(simulated, time, run, plan, own):
     with ExitStack() as stack:
         for module in (drive, loop, machine, pace, sensor):
             stack.enter_context(patch.object(module, "time", time))
-        stack.enter_context(patch("asyncio.events.new_event_loop", lambda: time))
+        stack.enter_context(patch("pipelines.acquisition.loop.exact_event_loop", lambda: time))
         # A line gives everybody their turn; every request then goes to the simulated rig.
         for request in (check_identity, read, write, exchange):
             stack.enter_context(patch.object(Device, request.__name__, request))

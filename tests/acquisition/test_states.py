@@ -146,8 +146,8 @@ def follow(supervisor, k):
     return sent
 
 
-def told(reference, velocity=np.nan, enabled=True):
-    return Reading(0, 0.0, reference, 0.0, 0.0, velocity, 20.0, reference, enabled=enabled)
+def told(reference, velocity=np.nan, enabled=True, sequence=0):
+    return Reading(sequence, 0.0, reference, 0.0, 0.0, velocity, 20.0, reference, enabled=enabled)
 
 
 @pytest.mark.parametrize("gone_on", [0.0, 0.01, 0.03])
@@ -157,7 +157,7 @@ def test_after_missed_samples_set_points_walk_back_to_the_plan_gently_from_where
     supervisor.begin(row(100), 10.0)
     before = follow(supervisor, 101)
     assert supervisor.missed(106, 10.0 + 6 / RATE)
-    supervisor.resume(0, told(before + gone_on), 10.0 + 6 / RATE)
+    supervisor.resume(0, told(before + gone_on, sequence=106), 10.0 + 6 / RATE)
     sent = np.array([before + gone_on, *(follow(supervisor, k) for k in range(106, 220))])
     speed, plan = RATE * np.diff(sent), np.arange(106, 220) * 1.5 / RATE - 150 / RATE
     a = supervisor.rig.safety.deceleration_rad_s2
@@ -165,6 +165,24 @@ def test_after_missed_samples_set_points_walk_back_to_the_plan_gently_from_where
     assert speed.max() <= 0.8 * 3.0 + 1e-9  # short of the speed limit
     assert (sent[1:] - plan).max() <= 2.0 * a / RATE**2, "it does not overshoot"
     assert sent[-1] == pytest.approx(plan[-1], abs=1e-12), "the plan again"
+
+
+@pytest.mark.parametrize("on_by", [0, 1])
+def test_a_drive_that_went_on_with_the_plan_through_a_silence_is_led_on_though_it_is_asked_a_sample_later(
+    supervisor, on_by
+):
+    path = np.arange(1, 129)[:, np.newaxis] * [1.5 / RATE, 0.0]
+    supervisor.take(Plan(path, 50, 100), np.zeros(2))
+    enable(supervisor)
+    supervisor.begin(row(100), 10.0)
+    for k in range(101, 111):
+        follow(supervisor, k)
+    now = 10.0 + 13 / RATE
+    assert supervisor.missed(113, now)
+    # At sample n the set-point is reached that was sent at the one before.
+    supervisor.resume(0, told(path[113 + on_by - 102][0], velocity=1.5, sequence=113 + on_by), now)
+    sent = [follow(supervisor, k) for k in range(113, 120)]
+    assert sent == pytest.approx(path[113 - 101 : 120 - 101, 0], abs=1e-9)
 
 
 def supervisor_speed_before(before, gone_on):
@@ -179,7 +197,7 @@ def test_a_set_point_that_comes_soon_after_a_late_one_leads_back_to_the_plan_no_
     supervisor.begin(row(100), 10.0)
     before = follow(supervisor, 101)
     assert supervisor.missed(111, 10.0 + 11 / RATE)
-    supervisor.resume(0, told(before), 10.0 + 11 / RATE)
+    supervisor.resume(0, told(before, sequence=111), 10.0 + 11 / RATE)
     late = 10.0 + 11.8 / RATE
     first = step(supervisor, 111, late)[0]
     soon = step(supervisor, 112, late + 0.2 / RATE)[0]
@@ -205,7 +223,7 @@ def test_a_drive_that_went_on_while_it_was_led_back_to_a_standing_plan_is_found_
     assert not supervisor.is_stale(1, at), "it is held"
     sent = supervisor.sent[0]
     moved = 2.0 * (sent - 0.1)
-    supervisor.resume(0, told(sent + moved), at)
+    supervisor.resume(0, told(sent + moved, sequence=104), at)
     assert supervisor.base[0] == pytest.approx(sent + moved)
 
 
