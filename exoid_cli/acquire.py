@@ -127,7 +127,14 @@ def _record(
         )  # fmt: skip
     if outcome.missed:
         console.warn(f"{outcome.path}: {outcome.missed} samples were missed; `exoid show` lists the gaps")
-    console.emit({"path": outcome.path, "samples": outcome.samples, "missed": outcome.missed})
+    elif outcome.left_out:
+        console.warn(
+            f"{outcome.path}: no sample was missed, but {outcome.left_out} set-points were left out, since cycles took "
+            f"longer than {1e3 / rate:g} ms: the leg moved unevenly; lower acquire.sample_rate_hz"
+        )
+    console.emit(
+        {"path": outcome.path, "samples": outcome.samples, "missed": outcome.missed, "left_out": outcome.left_out}
+    )
     console.say(f"{outcome.path}: {outcome.samples} samples of run {run}, {outcome.missed} missed")
 
 

@@ -54,6 +54,8 @@ class Outcome:
     path: Path
     samples: int
     missed: int
+    left_out: int
+    """Set-points that were left out, from the way to its beginning to that from its end."""
 
 
 def acquire(
@@ -266,7 +268,7 @@ def _recorded(output: Path, lock: Lock, kind: type[ExoidError], told: str, fault
     if account.abort:
         rest = f", its {samples} samples so far are in {place}" if samples else " before the recording began"
         raise kind(told + rest) from fault
-    return Outcome(place, samples, account.missed)
+    return Outcome(place, samples, account.missed, account.found.get("latency", {}).get("left_out", 0))
 
 
 def _left(supervisor: Supervisor, why: str) -> str:

@@ -98,7 +98,8 @@ class Loop:
     def found(self) -> dict[str, Any]:
         """Return what the run found out for the recording's metadata."""
         clocks, latency = self.sampling.clocks(self._recording_began or 0.0), self._latencies.metadata()
-        return ({"clocks": clocks} if clocks else {}) | ({"latency": latency} if latency else {})
+        late = {"latency": latency | {"left_out": self.supervisor.left_out}} if latency else {}
+        return ({"clocks": clocks} if clocks else {}) | late
 
     def _pace(self) -> Lockstep | PhaseLock:
         rig = self.machine.rig

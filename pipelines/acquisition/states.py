@@ -122,6 +122,8 @@ class Supervisor:
         self._let_go = [False for _ in rig.drive]
         """Which drives have told a fault, or that they were no longer enabled; by the next word they may be again."""
         self._start = self.sent
+        self.left_out = 0
+        """How many set-points were left out, for samples were found too late or not at all."""
         self._first = self._found = 0
         self._advanced = True
         """Whether the sample found last is another one than before: there is one step a sample."""
@@ -301,6 +303,10 @@ class Supervisor:
         while self.state is not self._due(self._index(found)):
             self._go(FOLLOWING[FOLLOWING.index(self.state) + 1])
         self._advanced = found > self._found
+        if left_out := max(found - self._found - 1, 0):
+            self.left_out += left_out
+            for stream, ahead in zip([*self._streams, *self._records], [*self._ahead, *self._ahead], strict=True):
+                stream.leave_out(int(found * self.samples_per_cycle + ahead))
         self._found, self._found_at = found, now
 
     def step(self, joint: int, now: float) -> float:
@@ -332,7 +338,7 @@ class Supervisor:
             raise DeviceError(why)
         new = [self._is_new(j, found, now) for j, found in enumerate(answers.drives)]
         if why := self._limits.cuff_violation(answers) or self._straying(answers):
-            raise DeviceError(why)
+            raise DeviceError(self._streams[0].after_jerk(why))
         row = answers.row
         if row is None or not new[0]:  # the first drive's counter is the machine's
             return None

@@ -41,8 +41,8 @@ class Stream:
         self._held = {name: Held() for name in CHANGING}
         self._gone = 0.0
         self._settle_s = rig.safety.settle_s
-        self._found_again: int | None = None
-        """The sample that came after the last one that was missed."""
+        self._jerked_at: int | None = None
+        """The sample that came after the last one that was missed, or by which set-points had been left out."""
         self._first: Reading | None = None
         self._last: Reading | None = None
         self._newest_at_first: int | None = None
@@ -105,10 +105,10 @@ class Stream:
         elif found.sequence == before.sequence:
             return False
         if found.sequence - before.sequence > self._cycle:
-            self._found_again = found.sequence
+            self._jerked_at = found.sequence
         why = (
             self._clock(before, found)
-            or sample_violation(self._drive, before, found, self._rate)
+            or self._broken_limit(before, found)
             or self._step(before, found)
             or self._leap(before, found)
             or self._echo(before, found)
@@ -164,28 +164,45 @@ class Stream:
         if not abs(speed) <= limit:
             return (
                 f"{self._label}: its angle leapt from {before.angle:.4f} to {found.angle:.4f} rad within "
-                f"{seconds:.4f} s, faster than its limit of {limit:g} rad/s; {self._jerked(found)}check the encoder, "
+                f"{seconds:.4f} s, faster than its limit of {limit:g} rad/s; {self._or_else(found)}check the encoder, "
                 "or the word order in the rig file"
             )
         told = 0.5 * (before.velocity + found.velocity)
         if samples == 1 and abs(speed - told) > SPEED_SHARE * limit:
             return (
                 f"{self._label}: its angle went on at {speed:.3f} rad/s while it told a speed of {told:.3f} rad/s; "
-                f"{self._jerked(found)}check the encoder, or the registers of angle and velocity in the rig file"
+                f"{self._or_else(found)}check the encoder, or the registers of angle and velocity in the rig file"
             )
         return None
 
-    def _jerked(self, found: Reading) -> str:
+    def leave_out(self, sequence: int) -> None:
+        """Note that set-points were left out before a sample."""
+        self._jerked_at = sequence
+
+    def after_jerk(self, why: str, found: Reading | None = None) -> str:
+        """Return why to stop, with what may have jerked the leg shortly before the sample that was found."""
+        jerked = self._jerked(found or self._last)
+        return f"{why}; {jerked}" if jerked else why
+
+    def _broken_limit(self, before: Reading, found: Reading) -> str | None:
+        why = sample_violation(self._drive, before, found, self._rate)
+        return why and self.after_jerk(why, found)
+
+    def _or_else(self, found: Reading) -> str:
+        jerked = self._jerked(found)
+        return f"{jerked}; else " if jerked else ""
+
+    def _jerked(self, found: Reading | None) -> str:
         """Return in words that the leg may have jerked, where its drive was told nothing shortly before; or nothing."""
-        if self._found_again is None:
+        if self._jerked_at is None or found is None:
             return ""
-        seconds = (found.sequence - self._found_again) / self._rate
+        seconds = max(found.sequence - self._jerked_at, 0) / self._rate
         if seconds > self._settle_s:
             return ""
         when = f"{seconds:.3f} s before it" if seconds else "before it"
         return (
-            f"samples were missed {when}, which may jerk a leg: see why answers are lost or late, or make the motion "
-            "slower; else "
+            f"samples or set-points were missed {when}, which may jerk a leg: see why answers are lost or late, or "
+            "make the motion slower"
         )
 
     def _echo(self, before: Reading, found: Reading) -> str | None:

@@ -96,6 +96,7 @@ class Latency(Keys):
     median_ms: NotNegative
     p99_ms: NotNegative
     longest_ms: NotNegative
+    left_out: Annotated[int, Field(ge=0)] = 0
 
 
 class RunKeys(TableKeys):

@@ -85,8 +85,20 @@ def test_after_missed_samples_a_jerk_of_the_leg_is_named_before_the_registers(hi
     take(hip, *(moved(number) for number in range(again, again + after)))
     with pytest.raises(DeviceError) as raised:
         take(hip, replace(moved(again + after), **damage))
-    told = f"rad/s; samples were missed {when}, which may jerk a leg: see why answers are lost or late, or make the "
-    assert f"{told}motion slower; else {REGISTERS}" in str(raised.value)
+    told = (
+        f"rad/s; samples or set-points were missed {when}, which may jerk a leg: see why answers are lost or late, or "
+    )
+    assert f"{told}make the motion slower; else {REGISTERS}" in str(raised.value)
+
+
+def test_a_limit_that_is_broken_after_set_points_were_left_out_is_told_with_them_though_no_sample_is_missing(hip):
+    swing(hip, BEGINS + 400)
+    hip.leave_out(BEGINS + 400)
+    take(hip, *(moved(number) for number in range(BEGINS + 400, BEGINS + 435)))
+    with pytest.raises(
+        DeviceError, match=r"torque 900.0 N·m is above .*; samples or set-points were missed 0.035 s bef"
+    ):
+        take(hip, replace(moved(BEGINS + 435), torque=900.0))
 
 
 def test_samples_that_were_missed_long_before_are_no_reason(hip):
