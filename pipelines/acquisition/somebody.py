@@ -17,6 +17,11 @@ def unnoticed(rig: RigSettings) -> list[str]:
             f"({rig.safety.with_human.following_error_rad or rig.safety.following_error_rad:g} rad), and until then "
             "the leg leaps back by as much on its release"
         )
+    if deaf := [drive.joint for drive in rig.drive if not rig.map.drive[drive.map].fault_mask]:
+        missing.append(
+            f"the rig file has no fault_mask for the drive of {' and '.join(deaf)}: a fault that it reports is noticed only "
+            "by what the leg does then"
+        )
     return missing
 
 

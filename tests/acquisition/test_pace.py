@@ -93,3 +93,49 @@ def test_a_counter_that_stands_still_is_not_waited_for_for_ever(clock):
 
     assert asyncio.run(PhaseLock(1 / PERIOD, counter, 1.0).wait(7)) == 7
     assert clock.now < 101.1
+
+
+def test_what_an_exchange_found_is_not_waited_for_again(clock):
+    """After a silence the drives are asked, and a sample may have gone by meanwhile."""
+
+    async def counter():
+        clock.now += 0.0003
+        return int((clock.now - 100.0) / PERIOD)
+
+    async def run():
+        lock, last, found = PhaseLock(1 / PERIOD, counter, 1.0), 0, []
+        for cycle in range(100):
+            found.append(await lock.wait(last))
+            last = found[-1]
+            if cycle == 50:
+                clock.now += PERIOD
+                last += 1
+            clock.now += 0.0006
+        return found
+
+    steps = np.diff(asyncio.run(run()))
+    assert steps[50] == 2
+    assert set(np.delete(steps, 50)) == {1}
+
+
+def test_an_answer_that_took_half_a_sample_is_built_on_once_it_is_known_when_samples_come(clock):
+    took, looks = [0.0003], []
+
+    async def counter():
+        looks.append(clock.now)
+        found = int((clock.now - 100.0) / PERIOD)
+        clock.now += took[0]
+        return found
+
+    async def run():
+        lock, last = PhaseLock(1 / PERIOD, counter, 1.0), 0
+        for _ in range(60):
+            last = await lock.wait(last)
+            clock.now += 0.0006
+        took[0] = 0.5 * PERIOD
+        looks.clear()
+        return last, await lock.wait(last)
+
+    last, found = asyncio.run(run())
+    assert found == last + 1
+    assert len(looks) == 1

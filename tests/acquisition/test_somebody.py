@@ -54,3 +54,13 @@ def test_a_drive_that_does_not_say_whether_it_is_enabled_is_warned_of(lab):
     (warning,) = unnoticed(lab(("enabled_mask = 0x006F", "enabled_mask = 0x0000"), ("enabled_value = 0x0027", "")))
     assert "no enabled_mask for the drive of hip and knee" in warning
     assert "0.1 rad" in warning
+
+
+def test_a_drive_whose_faults_nobody_reads_is_warned_of(lab):
+    (warning,) = unnoticed(
+        lab(
+            ("fault_mask = 0x0008", "fault_mask = 0x0000"),
+            ('faults = { 3 = "fault, see the error code at register 30" }', ""),
+        )
+    )
+    assert "no fault_mask for the drive of hip and knee" in warning
