@@ -182,7 +182,7 @@ class Loop:
             elif drive.device.awaited_s > period:  # it is the one who is awaited
                 look_at = time.monotonic() + LOOK_PAUSE * period
             elif held_up and due > look_at:  # by this computer, and so was whoever follows the plan: it goes first
-                look_at = due + period
+                look_at = time.monotonic() + period
             else:
                 await self._tell_alone(joint)
                 patience = period

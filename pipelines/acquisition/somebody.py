@@ -19,8 +19,8 @@ def unnoticed(rig: RigSettings) -> list[str]:
         )
     if deaf := [drive.joint for drive in rig.drive if not rig.map.drive[drive.map].fault_mask]:
         missing.append(
-            f"the rig file has no fault_mask for the drive of {' and '.join(deaf)}: a fault that it reports is noticed only "
-            "by what the leg does then"
+            f"the rig file has no fault_mask for the drive of {' and '.join(deaf)}: a fault that it reports is noticed "
+            "only by what the leg does then"
         )
     return missing
 

@@ -109,8 +109,9 @@ class Supervisor:
         """(J,) rad within which a set-point is another: drives cannot be told it more finely."""
         self._ahead = np.zeros_like(self.sent)
         """(J,) samples by which each drive's counter is ahead of the machine's cycles when its set-points come."""
-        self._behind: list[float | None] = [None for _ in rig.drive]
-        """By how much, rad, a drive was behind the plan when it was asked after a silence; None where it was not."""
+        self._behind: list[tuple[float, float] | None] = [None for _ in rig.drive]
+        """By how much, rad, a drive that goes on was behind the plan when it was asked after a silence, and in which of
+        the machine's cycles; None where it was not asked."""
         self._held = [0 for _ in rig.drive]
         """For how many samples each drive has been held at rest in the stop."""
         self._in_force = self.sent.copy()
@@ -244,19 +245,22 @@ class Supervisor:
             place = np.clip(reading.angle, *sorted((sent, sent + self._pace[joint] * silent_s)))
         speed = (place - sent) / silent_s if np.isnan(reading.velocity) else reading.velocity
         self.base[joint] = self._in_force[joint] = place
-        self._behind[joint] = None if self.rig.clock == "lockstep" else self._planned(joint, reading, now) - place
+        self._behind[joint] = self._behind_plan(joint, reading, float(place))
         self._speed[joint] = np.clip(speed, *sorted((0.0, self._speed[joint])))
 
-    def _planned(self, joint: int, reading: Reading, now: float) -> float:
-        """Return where a drive that follows the plan is at a sample of its own, rad.
+    def _behind_plan(self, joint: int, reading: Reading, place: float) -> tuple[float, float] | None:
+        """Return by how much (rad) a drive is behind the plan that goes on by itself, and when; None where it holds.
 
-        Set-points come when its counter is so far ahead of the machine's, and the one before is reached then.
+        It goes on until its next set-point comes, as the plan does: where it was when it was asked is soon past. Its
+        set-points come when its counter is so far ahead of the machine's, and the one before is reached then.
         """
-        latest = self._found + (now - self._found_at) * self.rate + SLACK_SAMPLES
-        cycle = np.clip((reading.sequence - self._ahead[joint]) / self.samples_per_cycle, self._found, latest)
-        whole, share = divmod(float(cycle) - self._first - 1.0, 1.0)
+        goes_on = (place - self.sent[joint]) * self._pace[joint] > self._nearest[joint] * abs(self._pace[joint])
+        if self.rig.clock == "lockstep" or not goes_on:
+            return None
+        cycle = float(reading.sequence - self._ahead[joint]) / self.samples_per_cycle
+        whole, share = divmod(cycle - self._first - 1.0, 1.0)
         before, after = (self._path(self._index(self._first + int(whole) + k))[joint] for k in range(2))
-        return float(before + share * (after - before))
+        return float(before + share * (after - before)) - place, cycle
 
     def tend(self, joint: int, now: float) -> float:
         """Return the set-point (rad) of a drive that would else be told nothing, since another one is awaited.
@@ -537,12 +541,11 @@ class Supervisor:
         """
         drive, moves = self.rig.drive[joint], float(self._speed[joint])
         due, before, earlier = (float(self._path(self._index(found - back))[joint]) for back in range(3))
-        if (behind := self._behind[joint]) is not None:
-            # From where it is once it reaches the set-point before this one: it goes on since it was asked.
-            self.base[joint] = self._in_force[joint] = before - behind
-            self._behind[joint] = None
-        base = float(self.base[joint])
         refuse_leap(drive, before, due, 1.0 / self.rate)
+        if (asked := self._behind[joint]) and abs(found - asked[1]) <= 1.0:
+            # From where it is once it reaches the set-point before this one: it goes on since it was asked.
+            self.base[joint] = self._in_force[joint] = before - asked[0]
+        base = float(self.base[joint])
         along, was, lag = (due - before) * self.rate, (before - earlier) * self.rate, before - base
         if lag == 0.0 and moves == was:
             return due, along
@@ -629,6 +632,7 @@ class Supervisor:
         self.sent[joint] = self.base[joint] = reference
         self.sent_at[joint], self._speed[joint] = now, speed
         self._unheard[joint] += 1
+        self._behind[joint] = None
         return reference
 
 
