@@ -127,10 +127,10 @@ def _record(
         )  # fmt: skip
     if outcome.missed:
         console.warn(f"{outcome.path}: {outcome.missed} samples were missed; `exoid show` lists the gaps")
-    elif outcome.left_out:
+    if outcome.left_out > outcome.missed:  # else they are those of the samples
         console.warn(
-            f"{outcome.path}: no sample was missed, but {outcome.left_out} set-points were left out, since cycles took "
-            f"longer than {1e3 / rate:g} ms: the leg moved unevenly; lower acquire.sample_rate_hz"
+            f"{outcome.path}: {outcome.left_out} set-points were left out, since cycles took longer than "
+            f"{1e3 / rate:g} ms or answers were lost: the leg moved unevenly there; lower acquire.sample_rate_hz"
         )
     console.emit(
         {"path": outcome.path, "samples": outcome.samples, "missed": outcome.missed, "left_out": outcome.left_out}

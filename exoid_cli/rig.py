@@ -23,7 +23,10 @@ def rig(
     port: Annotated[
         int | None, typer.Option(min=0, max=65535, help="One port for all devices, 0 for a free one; else the file's.")
     ] = None,
-    sample_rate_hz: Annotated[float | None, typer.Option(min=1.0, help="Samples a second; else the plant's.")] = None,
+    sample_rate_hz: Annotated[
+        float | None,
+        typer.Option("--rate-hz", "--sample-rate-hz", min=1.0, help="Samples a second; else the plant's."),
+    ] = None,
     bind: Annotated[str, typer.Option(help="Address to listen on.")] = LOOPBACK,
     anyone: Annotated[bool, typer.Option("--anyone", help="Allow a --bind that other computers can reach.")] = False,
     until_input_ends: Annotated[bool, typer.Option(hidden=True, help="Stop when standard input is closed.")] = False,

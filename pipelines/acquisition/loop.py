@@ -118,6 +118,7 @@ class Loop:
         finally:
             self._followed.set()
             follow.cancel()
+            self.sampling.end()
             await _outlive([follow], self.supervisor.abort)
             for task in ended:
                 if error := asyncio.CancelledError() if task.cancelled() else task.exception():
@@ -129,12 +130,14 @@ class Loop:
         while not self.supervisor.has_followed(last):
             found = await pace.wait(last.sequence)
             self._heed_signals()
-            if self.supervisor.missed(found, time.monotonic()):
+            found_at = time.monotonic()
+            if self.supervisor.missed(found, found_at):
                 try:
-                    found = max(found, await self._resume())
+                    newest, found_at = await self._resume()
                 except Unanswered:
                     continue
-            self.supervisor.next(found, time.monotonic())
+                found = max(found, newest)
+            self.supervisor.next(found, found_at)
             answers = await self._exchange(self.supervisor.step)
             row = self.supervisor.judge(answers, time.monotonic())
             if row is None:
@@ -145,20 +148,20 @@ class Loop:
             if time.monotonic() - self._reported >= REPORT_S:
                 self._tell()
 
-    async def _resume(self) -> int:
-        """Ask the drives what they made of a silence; return the cycle that they are in by now."""
-        first, *_ = await all_answers(self._find(joint) for joint in range(len(self.machine.drives)))
-        return first.sequence // self.machine.samples_per_cycle
+    async def _resume(self) -> tuple[int, float]:
+        """Ask the drives what they made of a silence; return the cycle that the first one told, and when that was."""
+        (first, told_at), *_ = await all_answers(self._find(joint) for joint in range(len(self.machine.drives)))
+        return first.sequence // self.machine.samples_per_cycle, told_at
 
-    async def _find(self, joint: int) -> Reading:
-        """Ask a drive where it is, to go on from there."""
+    async def _find(self, joint: int) -> tuple[Reading, float]:
+        """Ask a drive where it is, to go on from there; return what it told, and when, host's clock, s."""
         told = self.supervisor.sent_at[joint]
-        reading = await self.machine.drives[joint].look(in_motion=True)
+        reading, now = await self.machine.drives[joint].look(in_motion=True), time.monotonic()
         if self.supervisor.sent_at[joint] == told:
-            self.supervisor.resume(joint, reading, time.monotonic())
+            self.supervisor.resume(joint, reading, now)
         else:  # it was told something else meanwhile
             self.supervisor.heed(joint, reading)
-        return reading
+        return reading, now
 
     async def _tend(self, joint: int) -> None:
         """Tell a drive where to go for as long as others are awaited, rather than nothing.

@@ -75,7 +75,7 @@ class PhaseLock:
         """
         began = time.perf_counter()
         looked = last if self._found is None else self._found
-        before = max(last, looked)
+        before = max(last, looked)  # an exchange may have found a later one than the look before it
         while True:
             await asyncio.sleep(max(0.0, self._due - time.perf_counter()))
             asked = time.perf_counter()
@@ -97,7 +97,8 @@ class PhaseLock:
         Samples follow one another in equal periods since the last look that came too early.
         """
         soon = asked + SLOW * self._period
-        if self._early is None:
+        since, then = self._early or (asked, found)
+        # Looks come too early every so often; where none has for long, the clocks are further apart than they lean.
+        if not 0 <= found - then <= 0.5 / LEAN:
             return soon
-        since, then = self._early
         return max(soon, since + (found - then) * (1.0 - LEAN) * self._period)

@@ -32,6 +32,9 @@ class Sampling(Protocol):
     async def rows(self, row: Row) -> list[Row]:
         """Return rows that are whole now that a cycle brought this one, oldest first."""
 
+    def end(self) -> None:
+        """Ask the drives for nothing more beside the cycle."""
+
     def clocks(self, since_s: float) -> dict[str, dict]:
         """Return what is known of the drives' clocks, by joint, ``since_s`` of the first one's time."""
 
@@ -42,6 +45,9 @@ class Latched:
     async def rows(self, row: Row) -> list[Row]:
         """Return the cycle's row."""
         return [row]
+
+    def end(self) -> None:
+        """Do nothing: the cycle alone asks the drives."""
 
     def clocks(self, since_s: float) -> dict[str, dict]:
         """Return nothing: there is one clock."""
@@ -70,6 +76,11 @@ class Cycled:
                 raise found
         return [reading]
 
+    def end(self) -> None:
+        """Look no more: the drive is to be slowed down."""
+        if self._second:
+            self._second.cancel()
+
     async def _look_again(self) -> Reading | DeviceError:
         """Look at the drive when its next sample is due, or as near to that as is in reach: that tells most."""
         low, high = (share * self._period_s for share in SECOND_LOOK)
@@ -93,13 +104,24 @@ class Recorded:
 
     async def samples(self, reading: Reading) -> list[Reading]:
         """Return what was drained since the last cycle; mostly nothing, until a read is worth its while."""
+        found = self._collected() if self._draining and self._draining.done() else []
         is_due = self._drained is None or reading.sequence >= self._drained + self._block
         if self._draining is None and is_due:
+            # Beside the cycle, for the next set-point must not wait for it; in lockstep the drives do.
             self._draining = asyncio.create_task(self._drain(reading.sequence))
-        # Beside the cycle, for the next set-point must not wait for it; in lockstep the drives do.
-        if self._draining is None or not (self._drive.in_lockstep or self._draining.done()):
-            return []
-        found, self._draining = await self._draining, None
+            if self._drive.in_lockstep:
+                await self._draining
+                return self._collected()
+        return found
+
+    def end(self) -> None:
+        """Ask for nothing more: the drive is to be slowed down."""
+        if self._draining:
+            self._draining.cancel()
+
+    def _collected(self) -> list[Reading]:
+        assert self._draining  # and it is done
+        found, self._draining = self._draining.result(), None
         if not isinstance(found, list):
             raise found
         return found
@@ -157,6 +179,11 @@ class Streams:
         if not np.isnan(row.forces).all():
             self._forces[row.drives[0].sequence] = row.forces
         return list(self._whole(told))
+
+    def end(self) -> None:
+        """Ask the drives for nothing more beside the cycle."""
+        for source in self._sources:
+            source.end()
 
     def _whole(self, told: Sequence[Sequence[Reading]]) -> Iterator[Row]:
         for drives in self._alignment.rows(told):

@@ -20,7 +20,7 @@ def unnoticed(rig: RigSettings) -> list[str]:
     if deaf := [drive.joint for drive in rig.drive if not rig.map.drive[drive.map].fault_mask]:
         missing.append(
             f"the rig file has no fault_mask for the drive of {' and '.join(deaf)}: a fault that it reports is noticed "
-            "only by what the leg does then"
+            "only once it says that it is no longer enabled, or the leg does not follow"
         )
     return missing
 

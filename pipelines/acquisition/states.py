@@ -33,6 +33,8 @@ SLACK_SAMPLES = 2
 """How far set-points may be ahead of their speed limit for a moment: they come in step with samples, which the host
 sees up to one sample late or early."""
 
+DRIFT = 0.01
+"""Share of a cycle by which drives' clocks may part in one: far more than any two do."""
 NO_LAG_RAD = 1e-9
 """What rounding leaves between a set-point and the plan."""
 LONGEST_RETURN_S = 5.0
@@ -109,9 +111,9 @@ class Supervisor:
         """(J,) rad within which a set-point is another: drives cannot be told it more finely."""
         self._ahead = np.zeros_like(self.sent)
         """(J,) samples by which each drive's counter is ahead of the machine's cycles when its set-points come."""
-        self._behind: list[tuple[float, float] | None] = [None for _ in rig.drive]
-        """By how much, rad, a drive that goes on was behind the plan when it was asked after a silence, and in which of
-        the machine's cycles; None where it was not asked."""
+        self._goes_on_since: list[float | None] = [None for _ in rig.drive]
+        """In which of the machine's cycles a drive that goes on by itself was where it is led on from; None where it
+        holds, or was told something since."""
         self._held = [0 for _ in rig.drive]
         """For how many samples each drive has been held at rest in the stop."""
         self._in_force = self.sent.copy()
@@ -245,22 +247,21 @@ class Supervisor:
             place = np.clip(reading.angle, *sorted((sent, sent + self._pace[joint] * silent_s)))
         speed = (place - sent) / silent_s if np.isnan(reading.velocity) else reading.velocity
         self.base[joint] = self._in_force[joint] = place
-        self._behind[joint] = self._behind_plan(joint, reading, float(place))
         self._speed[joint] = np.clip(speed, *sorted((0.0, self._speed[joint])))
-
-    def _behind_plan(self, joint: int, reading: Reading, place: float) -> tuple[float, float] | None:
-        """Return by how much (rad) a drive is behind the plan that goes on by itself, and when; None where it holds.
-
-        It goes on until its next set-point comes, as the plan does: where it was when it was asked is soon past. Its
-        set-points come when its counter is so far ahead of the machine's, and the one before is reached then.
-        """
-        goes_on = (place - self.sent[joint]) * self._pace[joint] > self._nearest[joint] * abs(self._pace[joint])
-        if self.rig.clock == "lockstep" or not goes_on:
-            return None
+        goes_on = (place - sent) * self._pace[joint] > self._nearest[joint] * abs(self._pace[joint])
         cycle = float(reading.sequence - self._ahead[joint]) / self.samples_per_cycle
-        whole, share = divmod(cycle - self._first - 1.0, 1.0)
-        before, after = (self._path(self._index(self._first + int(whole) + k))[joint] for k in range(2))
-        return float(before + share * (after - before)) - place, cycle
+        self._goes_on_since[joint] = cycle if goes_on and self.rig.clock != "lockstep" else None
+
+    def _lead_on(self, joint: int, found: int) -> None:
+        """Lead a drive that goes on by itself on from where it is once a sample is found, not where it was when asked.
+
+        Asked longer ago than a sample, it may have done anything since.
+        """
+        since = self._goes_on_since[joint]
+        if since is not None and abs(found - since) <= 1.0:
+            self.base[joint] += self._speed[joint] * (found - since) / self.rate
+            self._in_force[joint] = self.base[joint]
+            self._goes_on_since[joint] = None
 
     def tend(self, joint: int, now: float) -> float:
         """Return the set-point (rad) of a drive that would else be told nothing, since another one is awaited.
@@ -310,7 +311,8 @@ class Supervisor:
         if left_out := max(found - self._found - 1, 0):
             self.left_out += left_out
             for stream, ahead in zip([*self._streams, *self._records], [*self._ahead, *self._ahead], strict=True):
-                stream.leave_out(int(found * self.samples_per_cycle + ahead))
+                since, until = ((k * self.samples_per_cycle + int(ahead)) for k in (self._found, found))
+                stream.leave_out(since, until)
         self._found, self._found_at = found, now
 
     def step(self, joint: int, now: float) -> float:
@@ -365,17 +367,20 @@ class Supervisor:
             stream.miss(found)
             is_new = False
         else:
-            is_new = stream.take(found, now)
-            self._meet(joint, found)
+            if is_new := stream.take(found, now):
+                self._meet(joint, found)
             # What was sent with the question takes effect after the sample that it brought.
             self._told[joint].tell(found.sequence, float(self.sent[joint]))
         stream.refuse_silence(now)
         return is_new
 
     def _meet(self, joint: int, found: Reading) -> None:
-        """Note how far a drive's counter was ahead when a set-point came; one that came late tells of itself alone."""
+        """Note how far a drive's counter was ahead when its set-point came: the least of late, for one may come late.
+
+        It may grow slowly, as clocks of their own drift apart.
+        """
         ahead = found.sequence - self._found * self.samples_per_cycle
-        self._ahead[joint] = min(self._ahead[joint] + RATE_TOLERANCE * self.samples_per_cycle, ahead)
+        self._ahead[joint] = min(self._ahead[joint] + DRIFT * self.samples_per_cycle, ahead)
 
     def _travel(self, row: Row) -> float:
         """Return how far the joints were told to go up to a sample, all together, rad."""
@@ -542,9 +547,7 @@ class Supervisor:
         drive, moves = self.rig.drive[joint], float(self._speed[joint])
         due, before, earlier = (float(self._path(self._index(found - back))[joint]) for back in range(3))
         refuse_leap(drive, before, due, 1.0 / self.rate)
-        if (asked := self._behind[joint]) and abs(found - asked[1]) <= 1.0:
-            # From where it is once it reaches the set-point before this one: it goes on since it was asked.
-            self.base[joint] = self._in_force[joint] = before - asked[0]
+        self._lead_on(joint, found)
         base = float(self.base[joint])
         along, was, lag = (due - before) * self.rate, (before - earlier) * self.rate, before - base
         if lag == 0.0 and moves == was:
@@ -632,7 +635,7 @@ class Supervisor:
         self.sent[joint] = self.base[joint] = reference
         self.sent_at[joint], self._speed[joint] = now, speed
         self._unheard[joint] += 1
-        self._behind[joint] = None
+        self._goes_on_since[joint] = None
         return reference
 
 

@@ -41,8 +41,8 @@ class Stream:
         self._held = {name: Held() for name in CHANGING}
         self._gone = 0.0
         self._settle_s = rig.safety.settle_s
-        self._jerked_at: int | None = None
-        """The sample that came after the last one that was missed, or by which set-points had been left out."""
+        self._untold: tuple[int, int] | None = None
+        """Between which samples the drive was told nothing last, for samples were missed or set-points left out."""
         self._first: Reading | None = None
         self._last: Reading | None = None
         self._newest_at_first: int | None = None
@@ -104,8 +104,8 @@ class Stream:
             self.begin(found, now)
         elif found.sequence == before.sequence:
             return False
-        if found.sequence - before.sequence > self._cycle:
-            self._jerked_at = found.sequence
+        if found.sequence - before.sequence >= 2 * self._cycle:  # one more or less than a cycle is the host's doing
+            self._untold = before.sequence, found.sequence
         why = (
             self._clock(before, found)
             or self._broken_limit(before, found)
@@ -175,9 +175,9 @@ class Stream:
             )
         return None
 
-    def leave_out(self, sequence: int) -> None:
-        """Note that set-points were left out before a sample."""
-        self._jerked_at = sequence
+    def leave_out(self, since: int, until: int) -> None:
+        """Note that set-points were left out between two samples."""
+        self._untold = since, until
 
     def after_jerk(self, why: str, found: Reading | None = None) -> str:
         """Return why to stop, with what may have jerked the leg shortly before the sample that was found."""
@@ -194,9 +194,9 @@ class Stream:
 
     def _jerked(self, found: Reading | None) -> str:
         """Return in words that the leg may have jerked, where its drive was told nothing shortly before; or nothing."""
-        if self._jerked_at is None or found is None:
+        if self._untold is None or found is None or found.sequence < self._untold[0]:
             return ""
-        seconds = max(found.sequence - self._jerked_at, 0) / self._rate
+        seconds = max(found.sequence - self._untold[1], 0) / self._rate
         if seconds > self._settle_s:
             return ""
         when = f"{seconds:.3f} s before it" if seconds else "before it"

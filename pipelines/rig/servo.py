@@ -92,7 +92,9 @@ class Servo:
         waited = (self._unheard + self._cycle - self._way) / self._cycle
         if (clear := floor(waited + EARLY)) != floor(waited - LATE):
             return clear
-        return min(floor(waited), ceil(waited), key=lambda n: abs(told - self._told - n * self._cycle * self._pace))
+        return min(
+            max(floor(waited), 0), ceil(waited), key=lambda n: abs(told - self._told - n * self._cycle * self._pace)
+        )
 
     def next(self, angle: float) -> tuple[float, bool]:
         """Return the set-point (rad) for the next sample and whether the motor follows it.

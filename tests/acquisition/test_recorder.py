@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -282,3 +283,32 @@ def test_clocks_that_drift_are_found_corrected_and_told(record_in_real_time):
 def test_clocks_that_drift_while_no_time_goes_by_are_refused(rig_file, replace):
     with pytest.raises(SettingsError, match='clock: found "lockstep", in which no time goes by'):
         load_rig(rig_file("plain", replace=replace))
+
+
+class SlowRecord:
+    """A drive whose record takes a whole cycle to be drained."""
+
+    in_lockstep = False
+
+    def __init__(self):
+        self.ring, self.begun = SimpleNamespace(block=10), []
+
+    async def drain(self, newest):
+        self.begun.append(newest)
+        await asyncio.sleep(0)
+        return [SimpleNamespace(sequence=newest)]
+
+
+def test_a_record_is_drained_in_each_cycle_beside_the_set_points():
+    async def run():
+        drive, brought = SlowRecord(), []
+        recorded = sampling.Recorded(drive)
+        for newest in range(0, 100, 10):
+            brought += [sample.sequence for sample in await recorded.samples(SimpleNamespace(sequence=newest))]
+            await asyncio.sleep(0.001)
+        recorded.end()
+        return drive.begun, brought
+
+    begun, brought = asyncio.run(run())
+    assert begun == list(range(0, 100, 10))
+    assert brought == begun[:-1]

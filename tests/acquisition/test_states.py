@@ -185,6 +185,27 @@ def test_a_drive_that_went_on_with_the_plan_through_a_silence_is_led_on_though_i
     assert sent == pytest.approx(path[113 - 101 : 120 - 101, 0], abs=1e-9)
 
 
+def test_set_points_that_are_left_out_are_counted_and_told_with_the_limit_that_is_broken_then(supervisor):
+    supervisor.take(Plan(np.arange(1, 129)[:, np.newaxis] * [1.5 / RATE, 0.0], 50, 100), np.zeros(2))
+    enable(supervisor)
+    supervisor.begin(row(100), 10.0)
+    follow(supervisor, 101)
+    assert supervisor.left_out == 0
+    supervisor.next(105, 10.0 + 5 / RATE)
+    assert supervisor.left_out == 3
+    assert "set-points were missed before it" in supervisor._streams[0].after_jerk("too much", row(105).drives[0])
+
+
+def test_what_is_due_at_a_sample_is_due_no_more_once_the_next_one_is_there(supervisor):
+    supervisor.take(Plan(np.arange(1, 129)[:, np.newaxis] * [1.5 / RATE, 0.0], 50, 100), np.zeros(2))
+    enable(supervisor)
+    assert not supervisor.is_late(10.0), "nothing is followed yet"
+    supervisor.begin(row(100), 10.0)
+    supervisor.next(101, 10.0 + 1 / RATE)
+    assert not supervisor.is_late(10.0 + 1.9 / RATE)
+    assert supervisor.is_late(10.0 + 2.1 / RATE)
+
+
 def supervisor_speed_before(before, gone_on):
     """Return how fast (rad/s) the drive is found to move: between rest and the plan's own speed."""
     return min(gone_on / (5 / RATE), 1.5) if before else 0.0

@@ -93,7 +93,7 @@ def test_after_missed_samples_a_jerk_of_the_leg_is_named_before_the_registers(hi
 
 def test_a_limit_that_is_broken_after_set_points_were_left_out_is_told_with_them_though_no_sample_is_missing(hip):
     swing(hip, BEGINS + 400)
-    hip.leave_out(BEGINS + 400)
+    hip.leave_out(BEGINS + 380, BEGINS + 400)
     take(hip, *(moved(number) for number in range(BEGINS + 400, BEGINS + 435)))
     with pytest.raises(
         DeviceError, match=r"torque 900.0 N·m is above .*; samples or set-points were missed 0.035 s bef"
@@ -169,3 +169,20 @@ def test_silence_is_borne_for_the_watchdogs_time_and_its_last_reason_told(hip):
     hip.miss(Unanswered("drive hip: did not answer"))
     with pytest.raises(Unanswered, match="did not answer"):
         hip.refuse_silence(10.26)
+
+
+def test_a_cycle_that_brings_a_sample_more_than_usual_is_no_jerk(hip):
+    """Where drives record themselves, the host's cycle takes one of their samples more now and then."""
+    swing(hip, BEGINS + 100)
+    take(hip, moved(BEGINS + 105))
+    assert hip.after_jerk("too much") == "too much"
+    take(hip, moved(BEGINS + 115))
+    assert "too much; samples or set-points were missed before it" in hip.after_jerk("too much")
+
+
+def test_a_record_from_before_set_points_were_left_out_is_not_blamed_on_them(hip):
+    swing(hip, BEGINS + 100)
+    hip.leave_out(BEGINS + 110, BEGINS + 120)
+    assert hip.after_jerk("too much") == "too much"
+    take(hip, moved(BEGINS + 100))
+    assert hip.after_jerk("too much", moved(BEGINS + 112)) != "too much"
