@@ -4,6 +4,7 @@ import asyncio
 import os
 import selectors
 import sys
+from contextlib import suppress
 
 MOST_FILES = 512
 """Open files up to which the exact loop is used: it serves 1024 at most."""
@@ -16,6 +17,9 @@ def exact_event_loop() -> asyncio.AbstractEventLoop:
     """
     descriptor = os.open(os.devnull, os.O_RDONLY)  # the lowest that is free
     os.close(descriptor)
-    if sys.platform == "win32" or descriptor > MOST_FILES:
-        return asyncio.new_event_loop()
-    return asyncio.SelectorEventLoop(selectors.SelectSelector())
+    if sys.platform != "win32" and descriptor <= MOST_FILES:
+        selector = selectors.SelectSelector()
+        with suppress(OSError):  # where nothing but sockets can be waited for
+            selector.select(0.0)
+            return asyncio.SelectorEventLoop(selector)
+    return asyncio.new_event_loop()

@@ -24,6 +24,8 @@ from pipelines.event_loop import exact_event_loop
 REPORT_S = 0.1
 DISABLE_TRIES = 3
 """How often a drive is told to disable, each time but the first on a new connection."""
+MOST_ENDED = 1000
+"""How often the event loop may be ended by what comes from outside until a run is given up."""
 LOOK_PAUSE = 0.25
 """Share of a sample after which it is looked again whether a drive is told nothing."""
 
@@ -406,11 +408,11 @@ def run_to_its_end(run: Coroutine, note: Callable[[BaseException], None]) -> Non
     with asyncio.Runner(loop_factory=exact_event_loop) as runner:
         loop = runner.get_loop()
         task = loop.create_task(run)
-        while True:
+        for left in reversed(range(MOST_ENDED)):
             try:
                 return loop.run_until_complete(task)
             except BaseException as error:
-                if task.done():
+                if task.done() or not left:  # a loop that ends each time will not disable a drive any more
                     raise
                 note(error)
 
