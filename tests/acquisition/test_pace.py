@@ -69,7 +69,12 @@ def test_after_a_busy_moment_it_is_known_which_sample_the_exchange_finds(clock):
     assert second == int((clock.now - 100.0) / PERIOD)
 
 
-def test_after_an_exchange_that_was_not_answered_no_sample_is_missed_but_its_own(clock):
+def steps_about(clock, took_s, brought):
+    """Steps from sample to sample found in 100 cycles, where the exchange of cycle 50 takes so long.
+
+    ``brought`` returns the sample that it brings, of the one before it and the one that was found.
+    """
+
     async def counter():
         clock.now += 0.0003
         return int((clock.now - 100.0) / PERIOD)
@@ -78,12 +83,23 @@ def test_after_an_exchange_that_was_not_answered_no_sample_is_missed_but_its_own
         lock, last, found = PhaseLock(1 / PERIOD, counter, 1.0), 0, []
         for cycle in range(100):
             found.append(await lock.wait(last))
-            clock.now += 3.6 * PERIOD if cycle == 50 else 0.0006
-            last = last if cycle == 50 else found[-1]
+            clock.now += took_s if cycle == 50 else 0.0006
+            last = brought(last, found[-1]) if cycle == 50 else found[-1]
         return found
 
-    steps = np.diff(asyncio.run(run()))
+    return np.diff(asyncio.run(run()))
+
+
+def test_after_an_exchange_that_was_not_answered_no_sample_is_missed_but_its_own(clock):
+    steps = steps_about(clock, 3.6 * PERIOD, lambda last, found: last)
     assert steps[50] > 1
+    assert set(np.delete(steps, 50)) == {1}
+
+
+def test_what_an_exchange_found_is_not_waited_for_again(clock):
+    """After a silence the drives are asked, and a sample may have gone by meanwhile."""
+    steps = steps_about(clock, PERIOD + 0.0006, lambda last, found: found + 1)
+    assert steps[50] == 2
     assert set(np.delete(steps, 50)) == {1}
 
 
@@ -93,29 +109,6 @@ def test_a_counter_that_stands_still_is_not_waited_for_for_ever(clock):
 
     assert asyncio.run(PhaseLock(1 / PERIOD, counter, 1.0).wait(7)) == 7
     assert clock.now < 101.1
-
-
-def test_what_an_exchange_found_is_not_waited_for_again(clock):
-    """After a silence the drives are asked, and a sample may have gone by meanwhile."""
-
-    async def counter():
-        clock.now += 0.0003
-        return int((clock.now - 100.0) / PERIOD)
-
-    async def run():
-        lock, last, found = PhaseLock(1 / PERIOD, counter, 1.0), 0, []
-        for cycle in range(100):
-            found.append(await lock.wait(last))
-            last = found[-1]
-            if cycle == 50:
-                clock.now += PERIOD
-                last += 1
-            clock.now += 0.0006
-        return found
-
-    steps = np.diff(asyncio.run(run()))
-    assert steps[50] == 2
-    assert set(np.delete(steps, 50)) == {1}
 
 
 def test_an_answer_that_took_half_a_sample_is_built_on_once_it_is_known_when_samples_come(clock):
