@@ -113,11 +113,9 @@ class Servo:
             return self._last
         if (after := self._unheard + 1) <= self._way:
             return self._from + (self._told - self._from) * after / self._way
-        if self._unheard < self._way:
-            return self._told + self._pace * (after - self._way)
-        step = self._pace
+        reference = self._told + self._pace * (after - self._way)
         if self._unheard >= self._cycle * (1 + EXTRAPOLATED):
-            step = self._step
-            step = max(abs(step) - self._slowing, 0.0) * (1 if step > 0 else -1)
+            slower = max(abs(self._step) - self._slowing, 0.0)
+            reference = self._last + (slower if self._step > 0 else -slower)
         low, high = self._limits
-        return min(max(self._last + step, low), high)
+        return min(max(reference, low), high)
