@@ -261,7 +261,6 @@ class Supervisor:
         if since is not None and abs(found - since) <= 1.0:
             self.base[joint] += self._speed[joint] * (found - since) / self.rate
             self._in_force[joint] = self.base[joint]
-            self._goes_on_since[joint] = None
 
     def tend(self, joint: int, now: float) -> float:
         """Return the set-point (rad) of a drive that would else be told nothing, since another one is awaited.
@@ -310,9 +309,10 @@ class Supervisor:
         self._advanced = found > self._found
         if left_out := max(found - self._found - 1, 0):
             self.left_out += left_out
-            for stream, ahead in zip([*self._streams, *self._records], [*self._ahead, *self._ahead], strict=True):
-                since, until = ((k * self.samples_per_cycle + int(ahead)) for k in (self._found, found))
+            for stream, record, ahead in zip(self._streams, self._records, self._ahead, strict=True):
+                since, until = (cycle * self.samples_per_cycle + int(ahead) for cycle in (self._found, found))
                 stream.leave_out(since, until)
+                record.leave_out(since, until)
         self._found, self._found_at = found, now
 
     def step(self, joint: int, now: float) -> float:

@@ -105,7 +105,7 @@ class Stream:
         elif found.sequence == before.sequence:
             return False
         if found.sequence - before.sequence >= 2 * self._cycle:  # one more or less than a cycle is the host's doing
-            self._untold = before.sequence, found.sequence
+            self.leave_out(before.sequence, found.sequence)
         why = (
             self._clock(before, found)
             or self._broken_limit(before, found)
@@ -176,7 +176,7 @@ class Stream:
         return None
 
     def leave_out(self, since: int, until: int) -> None:
-        """Note that set-points were left out between two samples."""
+        """Note that the drive was told nothing between two samples."""
         self._untold = since, until
 
     def after_jerk(self, why: str, found: Reading | None = None) -> str:

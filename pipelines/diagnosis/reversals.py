@@ -20,6 +20,7 @@ from pipelines.diagnosis.observations import Baseline, Run
 from pipelines.effects import PreslidingHysteresis
 from pipelines.effects.friction import Friction
 from pipelines.estimation.angle_noise import CUTOFF_HZ
+from pipelines.estimation.regression import turns
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.slow_motion import filtered, unsure
 from pipelines.model import Model
@@ -74,9 +75,8 @@ class _About:
         return float(self.near.sum() / self.motion.sample_rate_hz)
 
     @classmethod
-    def of(cls, made: Fit, baseline: Baseline, run: Run, j: int) -> "_About | None":
+    def of(cls, motion: Motion, model: Model, baseline: Baseline, j: int) -> "_About | None":
         """Return None where the angle as read is not known, or the joint never turns round."""
-        motion, model = run.motion, model_of_run(made, baseline, run)
         label = Friction(baseline.joints[j], on=baseline.machine).label
         coulomb = [(effect.label, p.name) == (label, "coulomb") for effect, p in model.linear_parameters]
         level, near = float(model.linear_values[coulomb].sum()), _near(motion, j)
@@ -97,9 +97,7 @@ class _About:
 
 def _near(motion: Motion, j: int) -> NDArray:
     """Tell which samples are about a joint's reversals and can be trusted below the cut-off, (n,) bool."""
-    turned = np.zeros(len(motion), dtype=bool)
-    turned[1:] = np.diff(motion.dq[:, j] > 0)
-    about = dilate(turned, round(NEAR_S * motion.sample_rate_hz))
+    about = dilate(turns(motion)[:, j], round(NEAR_S * motion.sample_rate_hz))
     return np.asarray(about & motion.valid & ~unsure(motion, CUTOFF_HZ))
 
 
@@ -110,11 +108,15 @@ Side = Callable[[_About], NDArray]
 def built_up(made: Fit, baseline: Baseline, train: Sequence[Run], validate: Sequence[Run]) -> list[BuildUp]:
     """Return the joints whose friction builds up; the travel is told by the runs to train on, and the others judge."""
     known = {cause.label for cause in made.causes}
+    # Once: what a run has for itself is learnt for that.
+    runs = [[(run.motion, model_of_run(made, baseline, run)) for run in some] for some in (train, validate)]
     found = []
     for j, joint in enumerate(baseline.joints):
-        runs = [[_About.of(made, baseline, run, j) for run in some] for some in (train, validate)]
-        about = [[one for one in some if one is not None] for some in runs]
-        if PreslidingHysteresis(joint, on=baseline.machine).label in known or not all(about):
+        if PreslidingHysteresis(joint, on=baseline.machine).label in known:
+            continue
+        seen = [[_About.of(*run, baseline, j) for run in some] for some in runs]
+        about = [[one for one in some if one is not None] for some in seen]
+        if not all(about):
             continue
         if (one := _of_joint(about[0], about[1], baseline, j)) is not None:
             found.append(one)
@@ -130,18 +132,23 @@ def _of_joint(train: Sequence[_About], validate: Sequence[_About], baseline: Bas
         return None
     travels = np.geomspace(shortest, longest, TRAVELS)
     over = [_side_over(0.5 * count, travel) for travel in travels]
-    best = int(np.argmin([_power(train, side) for side in over]))
+    best, trained = _best(train, over)
     if best in (0, TRAVELS - 1):
         return None  # at once, as far as the encoder tells, or over more than what is about a reversal
     rivals = [_side_at_once, *(_side_by_speed(speed * scale.speed) for speed in SPEEDS), *map(_side_late, LATE_S)]
-    rival = rivals[int(np.argmin([_power(train, side) for side in rivals]))]
-    ratios = [_power(some, over[best]) / _power(some, rival) for some in (train, validate)]
+    rival, beaten = _best(train, rivals)
+    left = _power(validate, over[best])
+    ratios = trained / beaten, left / _power(validate, rivals[rival])
     independent = CUTOFF_HZ * sum(about.seconds for about in train)
     if max(ratios) > 1.0 - TAKEN or -0.5 * independent * np.log(ratios[0]) < NEEDED:
         return None
-    return BuildUp(
-        joint, float(travels[best]), *(float(np.sqrt(_power(validate, side))) for side in (rivals[0], over[best]))
-    )
+    return BuildUp(joint, float(travels[best]), *np.sqrt([_power(validate, _side_at_once), left]).tolist())
+
+
+def _best(some: Sequence[_About], sides: Sequence[Side]) -> tuple[int, float]:
+    """Return which side leaves the least power, and how much."""
+    powers = [_power(some, side) for side in sides]
+    return int(np.argmin(powers)), min(powers)
 
 
 def _power(some: Sequence[_About], side: Side) -> float:

@@ -250,8 +250,7 @@ def _turning(d: Diagnosis, one: BuildUp) -> str:
         f"within {NEAR_S:g} s of its reversals, where no cause is looked for, {the(one.joint)}'s friction does not "
         f"turn round at once: it builds up over {1e3 * one.travel:.2g} m{joint.unit('angle')} of travel "
         f"({PreslidingHysteresis.name}, or play between encoder and friction), which takes the {joint.effort} error "
-        "there from "
-        f"{amount(machine, one.joint, one.at_once)} to {amount(machine, one.joint, one.over_travel)} below "
+        f"there from {amount(machine, one.joint, one.at_once)} to {amount(machine, one.joint, one.over_travel)} below "
         f"{CUTOFF_HZ:g} Hz, on runs no fit has seen; the model has it turn round at once"
     )
 

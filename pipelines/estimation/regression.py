@@ -103,9 +103,14 @@ def away_from_turns(motion: Motion) -> NDArray:
 
     Where a joint stops, friction jumps and so does the acceleration of every link; filtered, neither is at its time.
     """
-    turned = np.zeros(len(motion), dtype=bool)
-    turned[1:] = np.any(np.diff(motion.dq > 0, axis=0), axis=1)
-    return np.asarray(~dilate(turned, round(TURN_S * motion.sample_rate_hz)))
+    return np.asarray(~dilate(np.any(turns(motion), axis=1), round(TURN_S * motion.sample_rate_hz)))
+
+
+def turns(motion: Motion) -> NDArray:
+    """Tell for each sample and joint whether it has turned round since the sample before: (n, J) bool."""
+    turned = np.zeros(motion.dq.shape, dtype=bool)
+    turned[1:] = np.diff(motion.dq > 0, axis=0)
+    return turned
 
 
 def regressions(run: Run, model: Model) -> Iterator[Regression]:
