@@ -94,9 +94,9 @@ $(INSTALLED): pyproject.toml requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $@
 
-# What exoid is compared with is heavy, and nothing else needs it.
+# What exoid is compared with is heavy, and nothing else needs it. Some of it comes as source, with a build system of its own.
 $(VENV)/.peers: $(INSTALLED)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation -c requirements.lock --editable ".[peers]"
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c requirements.lock --editable ".[peers]"
 	@touch $@
 
 clean: ## remove results and caches; the environment stays

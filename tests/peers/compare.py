@@ -66,20 +66,21 @@ def _compared(files: Sequence[Path], answers: list[Answer], judged: Log, truth: 
     ours, held_out = exoid_fit.identify(files)
     said = exoid_fit.diagnose(files)
     return {
-        "torque_rms": np.sqrt(np.mean(held_out.torque**2, axis=0)).tolist(),
+        "torque_rms": held_out.error(np.zeros_like(held_out.motion.torque)).tolist(),
         "tools": {a.tool: _scored(a, held_out, judged, truth) for a in [*answers, ours]},
-        "diagnosed": {
-            "status": said.status, "causes": said.causes, "error": said.error.tolist(), "seconds": said.seconds,
-        },
-    }  # fmt: skip
+        "diagnosed": {"status": said.status, "causes": said.causes, "seconds": said.seconds}
+        | _errors(held_out, said.torque),
+    }
+
+
+def _errors(held_out: HeldOut, predicted: NDArray) -> dict[str, list[float]]:
+    return {"error": held_out.error(predicted).tolist(), "slow_error": held_out.slow_error(predicted).tolist()}
 
 
 def _scored(answer: Answer, held_out: HeldOut, judged: Log, truth: NDArray | None) -> dict[str, Any]:
-    found = {
-        "error": held_out.error(answer, judged).tolist(),
-        "seconds": answer.seconds,
-        "says": list(answer.says),
-    }
+    motion = held_out.motion
+    predicted = answer.torque(motion.q, motion.dq, motion.ddq, judged)
+    found = {"seconds": answer.seconds, "says": list(answer.says)} | _errors(held_out, predicted)
     if truth is None:
         return found
     off = answer.half_widths_off(truth)

@@ -6,30 +6,36 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.diagnose import diagnose as find
+from pipelines.diagnosis.fitted_model import model_of_run
 from pipelines.diagnosis.verdict import verdict
+from pipelines.estimation.regression import away_from_reversals, block_average
 from pipelines.identification import identify as fit
-from pipelines.identification.validation import residuals
+from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.read import read_motions
-from tests.peers.answer import NAMES, Answer, Log
+from tests.peers.answer import NAMES, Answer
+from tests.real.relative_error import slow_error
 
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Blocks of 25 ms of the validation run, away from reversals: where every tool is scored. (n, 2) each."""
+    """The validation run, on which every tool's torque (n, 2) N·m is held against the measured one."""
 
-    q: NDArray
-    dq: NDArray
-    ddq: NDArray
-    torque: NDArray
+    motion: Motion
 
-    def error(self, answer: Answer, log: Log) -> NDArray:
-        """RMS (2,) N·m of what a tool's model leaves."""
-        left = self.torque - answer.torque(self.q, self.dq, self.ddq, log)
+    def error(self, predicted: NDArray) -> NDArray:
+        """RMS (2,) N·m of what is left in blocks of 25 ms away from reversals."""
+        block = block_average(self.motion)
+        starts = block.starts(self.motion.segment)
+        moving = self.motion.valid & away_from_reversals(self.motion).all(axis=1)
+        left = block.mean(self.motion.torque - predicted, starts)[block.all(moving, starts)]
         return np.sqrt(np.mean(left**2, axis=0))
+
+    def slow_error(self, predicted: NDArray) -> NDArray:
+        """RMS (2,) N·m of what is left below 5 Hz, reversals included."""
+        return slow_error(predicted, self.motion).rms
 
 
 @dataclass(frozen=True)
@@ -39,8 +45,8 @@ class Diagnosed:
     status: str
     causes: tuple[str, ...]
     """Effect, joint, values and probability of each, in words."""
-    error: NDArray
-    """RMS (2,) N·m that the extended model leaves."""
+    torque: NDArray
+    """(n, 2) N·m that the extended model predicts of the validation run."""
     seconds: float
 
 
@@ -54,29 +60,31 @@ def identify(files: Sequence[Path]) -> tuple[Answer, HeldOut]:
     table = found.parameters.iloc[[0, 1, 2, 3, 4, 6, 5, 7]]
     values = table["value"].to_numpy(float)
     half_width = (table["ci95_high"] - table["ci95_low"]).to_numpy(float) / 2.0
-    judged = [motion for motion in motions if motion.purpose == "validate"]
-    rows = pa.concat_tables(residuals(judged, found.models, "baseline")).to_pandas()
-    rows = rows[rows["scored"]]
-    quantities = ("angle_rad", "velocity_rad_s", "acceleration_rad_s2", "torque_nm")
-    held_out = HeldOut(*(rows[[f"{joint}_{name}" for joint in motions[0].joints]].to_numpy() for name in quantities))
-    return Answer("exoid", values, NAMES, values, half_width, np.asarray, seconds), held_out
+    return Answer("exoid", values, NAMES, values, half_width, np.asarray, seconds), HeldOut(_judged(motions))
 
 
 def diagnose(files: Sequence[Path]) -> Diagnosed:
     """Name what the baseline misses."""
     begun = time.process_time()
-    said = verdict(find(read_motions(files)))
-    return Diagnosed(
-        said["status"],
-        tuple(_in_words(cause) for cause in said["causes"]),
-        np.array(list(said["extended_rmse_nm"].values())),
-        time.process_time() - begun,
-    )
+    motions = read_motions(files)
+    found = find(motions)
+    said = verdict(found)
+    seconds = time.process_time() - begun
+    model = model_of_run(found.choice.named.fit, found.baseline, found.validate[0])
+    causes = tuple(_in_words(cause) for cause in said["causes"])
+    return Diagnosed(said["status"], causes, model.torque(_judged(motions)), seconds)
+
+
+def _judged(motions: Sequence[Motion]) -> Motion:
+    """Return the run to validate on."""
+    (motion,) = (motion for motion in motions if motion.purpose == "validate")
+    return motion
 
 
 def _in_words(cause: dict) -> str:
     values = ", ".join(
-        f"{row['name']} {row['value']:.3g} [{row['ci95'][0]:.3g}, {row['ci95'][1]:.3g}] {row['unit']}"
+        f"{row['name']} {row['value']:.3g} [{row['ci95'][0]:.3g}, {row['ci95'][1]:.3g}]"
+        + f" {row['unit']}" * (row["unit"] != "1")
         for row in cause["parameters"]
     )
     return f"{cause['effect']} at {cause['joint']} ({cause['probability']:.2f}): {values}"
