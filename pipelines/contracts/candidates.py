@@ -19,9 +19,9 @@ CANDIDATES = Contract(
         Column("train_score", "", "score on the train runs", nullable=True),
         per_joint("rmse_before", "validate RMSE of the baseline", nullable=True),
         per_joint("rmse_after", "validate RMSE with the causes", nullable=True),
-        Column("gain_nm", "N·m", "RMSE taken away on the validate runs", nullable=True),
-        Column("gain_low_nm", "N·m", "lower end of the gain's 95 % interval", nullable=True),
-        Column("gain_high_nm", "N·m", "upper end of the gain's 95 % interval", nullable=True),
+        Column("gain_nm", "N·m", "what the causes take together of the baseline's RMSE, where most", nullable=True),
+        Column("gain_low_nm", "N·m", "lower end of its 95 % interval", nullable=True),
+        Column("gain_high_nm", "N·m", "upper end of its 95 % interval", nullable=True),
         Column("probability", "", "how likely the causes are the true ones, 0 to 1", nullable=True),
         Column(
             "verdict", "", "what became of it", dtype=TEXT,

@@ -1,4 +1,8 @@
-"""What naming a cause gains on validation runs, with an interval from whole periods."""
+"""What naming causes gains on validation runs, with an interval from whole periods.
+
+A cause's gain, wherever a user reads of one, is what the error grows by where that cause alone is left out and all
+else is fitted anew. What a set of causes takes together is of the error of rigid body and friction.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -160,9 +160,10 @@ def _tie(effect: Effect, rival: Effect, probability: float) -> dict[str, Any]:
 def _evidence(d: Diagnosis, label: str, effect: Effect, worth: float, joint: str, alike: dict[str, float]) -> list[str]:
     before = d.without[label].errors.rms[d.baseline.joints.index(joint)]
     machine = d.baseline.machine
+    others_leave = " that the other causes leave" if len(d.causes) > 1 else ""
     sentences = [
         f"it takes {number(machine, worth)} of {amount(machine, joint, before)} of {machine.joint(joint).effort} error "
-        f"at {the(joint)} on runs no fit has seen"
+        f"at {the(joint)}{others_leave} on runs no fit has seen"
     ]
     if _may_be_chance(d, label):
         sentences.append("that gain may be chance: its 95 % interval includes nought")

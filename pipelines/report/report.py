@@ -327,7 +327,7 @@ def _candidates(session: Session) -> list[dict[str, Any]]:
                 for joint in session.joints
                 if np.isfinite(row[joint.column("rmse_after")])
             ],
-            "gain": _gain(row) if more is None or named is None else digits(row["gain_nm"] - named["gain_nm"]),
+            "taken": _taken(row) if more is None or named is None else _gain(session, named, row),
             # Whose reason it is, the row says.
             "reason": labels_in_words(row["reason"].removeprefix(f"{' and '.join(sorted(more or ()))} "), labels),
         }
@@ -342,8 +342,14 @@ def _beyond(row: dict[Any, Any], named: dict[Any, Any] | None) -> list[str] | No
     return [label for label in row["causes"] if label not in set(named["causes"])]
 
 
-def _gain(row: dict[Any, Any]) -> str:
-    """Return a gain with its interval, which one short run cannot have."""
+def _gain(session: Session, less: dict[Any, Any], more: dict[Any, Any]) -> str:
+    """Return what a set gains over a smaller one, at the joint where most."""
+    after = [joint.column("rmse_after") for joint in session.joints]
+    return digits(max(less[column] - more[column] for column in after))
+
+
+def _taken(row: dict[Any, Any]) -> str:
+    """Return what a set takes of the baseline's error with its interval, which one short run cannot have."""
     if not np.isfinite(row["gain_nm"]):
         return "–"
     low, high = row["gain_low_nm"], row["gain_high_nm"]

@@ -52,6 +52,8 @@ def worst_joint(session: Session) -> Joint | None:
 def _cause_tiles(verdict: dict[str, Any], cause: dict[str, Any]) -> list[Tile]:
     gain, (low, high) = cause["gain"]["rmse_reduction_nm"], cause["gain"]["ci95"]
     joint = cause["gain"]["joint"]
+    left = verdict["extended_rmse_nm"][joint]
+    beside = ", beside the other causes" if len(verdict["causes"]) > 1 else ""
     unit, ties = torque_unit(verdict, joint), len(ties_of(cause))
     words = cause_in_words(cause)
     return [
@@ -63,10 +65,10 @@ def _cause_tiles(verdict: dict[str, Any], cause: dict[str, Any]) -> list[Tile]:
         ),
         Tile(
             f"gain of {words}",
-            digits(-gain),
+            digits(gain),
             unit,
-            f"of {digits(verdict['baseline_rmse_nm'][joint])} {unit} at {the(joint)}; 95 %: "
-            f"{digits(-high)} … {digits(-low)}",
+            f"{digits(left + gain)} → {digits(left)} {unit} at {the(joint)}{beside}; 95 %: "
+            f"{digits(low)} … {digits(high)}",
         ),
     ]
 

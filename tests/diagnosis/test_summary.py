@@ -115,6 +115,17 @@ def test_odds_are_those_among_the_causes_that_exoid_knows_in_their_own_words(stu
     assert "of the other causes that exoid knows the next, torque offset at the knee, is 40 times less likely" in told
 
 
+def test_a_gain_is_what_the_cause_takes_of_the_error_that_the_others_leave(stuck):
+    label, told = "parallel_spring@knee", verdict(stuck)
+    gain = told["causes"][0]["gain"]
+    taken, left = gain["rmse_reduction_nm"], told["extended_rmse_nm"][gain["joint"]]
+    said = f"it takes {taken:.2f} of {left + taken:.2f} N·m of torque error at the {gain['joint']}"
+    assert told["causes"][0]["evidence"][0] == f"{said} on runs no fit has seen"
+    two = replace(stuck, likely=stuck.likely | {"base_tilt": {"base_tilt": 0.9}})
+    beside = _evidence(two, label, ParallelSpring("knee"), taken, gain["joint"], {label: 0.9})[0]
+    assert beside == f"{said} that the other causes leave on runs no fit has seen"
+
+
 def test_two_causes_are_they_and_a_rest_at_the_worst_joint_is_not_noise(stuck):
     said = _finding(with_errors(stuck, [0.5, 1.5]), [SPRING, STRIBECK], None)
     assert "; and Stribeck friction at the hip (probability 0.97). With them the knee's" in said

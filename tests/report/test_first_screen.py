@@ -86,11 +86,25 @@ def test_a_verdict_of_an_older_version_leads_with_its_summary_and_tells_no_fault
     assert "faults of acquisition" not in top(folder)
 
 
+def gains(folder, *causes):
+    write_verdict(folder, causes=causes)
+    return [tile for tile in tiles(find([folder])) if tile.title.startswith("gain")]
+
+
 def test_each_gain_says_what_it_is_of(tmp_path):
     folder = write_session(tmp_path / "leg")
-    write_verdict(folder, causes=[cause(), cause("backlash")])
-    gains = [tile.title for tile in tiles(find([folder])) if tile.title.startswith("gain")]
-    assert gains == ["gain of cogging at the knee", "gain of backlash at the knee"]
+    assert [tile.title for tile in gains(folder, cause(), cause("backlash"))] == [
+        "gain of cogging at the knee", "gain of backlash at the knee",
+    ]  # fmt: skip
+
+
+def test_a_gain_is_of_the_error_that_the_other_causes_leave(tmp_path):
+    folder = write_session(tmp_path / "leg")
+    (alone,) = gains(folder, cause())
+    assert (alone.big, alone.unit) == ("0.504", "N·m")
+    assert alone.small == "0.818 → 0.314 N·m at the knee; 95 %: 0.450 … 0.550"
+    of_two, _ = gains(folder, cause() | {"gain": cause()["gain"] | {"rmse_reduction_nm": 0.1}}, cause("backlash"))
+    assert of_two.small.startswith("0.414 → 0.314 N·m at the knee, beside the other causes;")
 
 
 RIGHT_EDGES = """() => {

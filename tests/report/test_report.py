@@ -182,6 +182,7 @@ def test_a_set_that_holds_what_is_named_tells_what_it_adds_in_words(tmp_path):
     table = CANDIDATES.read(path)
     rows = table.frame.copy()
     rows["causes"] = [["cogging@knee"], ["cogging@knee", "base_tilt"]]
+    rows["rmse_after_hip_nm"], rows["rmse_after_knee_nm"] = [0.31, 0.30], [0.31, 0.29]
     rows["gain_nm"], rows.loc[1, "reason"] = [0.41, 0.43], "base_tilt adds too little beside cogging@knee"
     CANDIDATES.write(path, rows, table.metadata)
     line = re.search(r"<tr><td class=\"n\">2</td>.*?</tr>", report(find([folder])))[0]
@@ -289,14 +290,14 @@ def test_a_budget_below_the_floor_says_so_and_gives_no_second_floor(tmp_path):
     assert at.segments[0].label == "noise floor"
 
 
-def test_gains_have_a_unit_in_the_heading_and_none_an_interval_of_no_width(tmp_path):
+def test_what_is_taken_has_a_unit_in_the_heading_and_none_an_interval_of_no_width(tmp_path):
     folder = write_session(tmp_path / "leg")
     path = folder / "diagnosed" / "candidates.parquet"
     table = CANDIDATES.read(path)
     table.frame[["gain_nm", "gain_low_nm", "gain_high_nm"]] = 0.41
     CANDIDATES.write(path, table.frame, table.metadata)
     page = report(find([folder]))
-    assert "gain, 95 %, N·m" in page
+    assert "taken, 95 %, N·m" in page
     assert "0.410 (no interval)" in page
     assert "0.410 (0.410" not in page
 
