@@ -25,6 +25,7 @@ from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.pace import urgent
 from pipelines.acquisition.plan import check_start, check_trajectory, make_plan
 from pipelines.acquisition.recorded import account_of, place_for, write_recording
+from pipelines.acquisition.rehearsal import refuse_unkept_rate
 from pipelines.acquisition.resolution import refuse_coarse_set_points
 from pipelines.acquisition.sampling import sampling_of
 from pipelines.acquisition.signs import refuse_mirrored_set_points
@@ -156,6 +157,8 @@ async def _record(
         start = await _ready(machine, supervisor.rate, reset_faults, stopped_by)
         plan = make_plan(rig, trajectory, start, run.duration_s, supervisor.rate)
         supervisor.take(plan, start)
+        if rig.clock == "real_time":
+            await _heeding(refuse_unkept_rate(machine, supervisor.rate), stopped_by)
         sampling = sampling_of(machine, supervisor.rate, supervisor.judge_records)
         await _heeding(machine.empty_records(), stopped_by)
         try:

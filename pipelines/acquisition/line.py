@@ -236,9 +236,12 @@ class Line:
         """Return what became of the connection, and for whom."""
         others = f", and with it {', '.join(self.devices)}" if self._name else ""
         # Under TLS 1.3 a client is turned away only once it takes the connection for made.
-        turned_away = isinstance(self._settings, TlsLine) and not self._has_answered
-        maybe = ", or the other end does not trust what certificate and key in the rig file show" if turned_away else ""
-        return f"the line is lost{others}; check cable and power{maybe}"
+        if isinstance(self._settings, TlsLine) and not self._has_answered:
+            return (
+                f"the other end closed the line before its first answer{others}; it does not trust what certificate "
+                "and key in the rig file show, or has stopped"
+            )
+        return f"the line is lost{others}; check cable and power"
 
     async def _refusal(self) -> str:
         """Return why there is no connection; the client tells its log alone."""

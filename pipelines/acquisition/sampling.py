@@ -2,7 +2,8 @@
 
 import asyncio
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Sequence
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -54,43 +55,71 @@ class Latched:
         return {}
 
 
+class Beside:
+    """A request to a drive that goes on beside the cycle, which must not wait for it; one at a time."""
+
+    def __init__(self) -> None:
+        self._request: asyncio.Task[list[Reading] | DeviceError] | None = None
+
+    @property
+    def is_under_way(self) -> bool:
+        """Whether a request was begun of which it is not known yet what it brought."""
+        return self._request is not None
+
+    @property
+    def is_answered(self) -> bool:
+        """Whether what it brought is there."""
+        return self._request is not None and self._request.done()
+
+    def begin(self, ask: Callable[[], Awaitable[list[Reading]]]) -> None:
+        """Begin a request."""
+        self._request = asyncio.create_task(self._outcome(ask))
+
+    async def brought(self) -> list[Reading]:
+        """Wait for what the request brings, and return it; nothing where there was none, or no answer."""
+        if self._request is None:
+            return []
+        found, self._request = await self._request, None
+        if isinstance(found, DeviceError):
+            raise found
+        return found
+
+    def end(self) -> None:
+        """Wait no more: the drive is to be slowed down."""
+        if self._request:
+            self._request.cancel()
+
+    async def _outcome(self, ask: Callable[[], Awaitable[list[Reading]]]) -> list[Reading] | DeviceError:
+        try:
+            return await ask()
+        except Unanswered:
+            return []
+        except DeviceError as error:
+            return error
+
+
 class Cycled:
     """Samples of one drive that the cycle brought, and a second look at each for a drive with a clock of its own."""
 
     def __init__(self, drive: Drive, period_s: float, *, looks_again: bool) -> None:
         self._drive, self._period_s, self._looks_again = drive, period_s, looks_again
         self._dither = np.random.default_rng(0)
-        self._second: asyncio.Task[Reading | DeviceError] | None = None
+        self.beside = Beside()
 
     async def samples(self, reading: Reading) -> list[Reading]:
         """Return what came since the last cycle: the second look at the last one, and this one's reading."""
-        if not self._looks_again:
-            return [reading]
-        seen = [] if self._second is None else [await self._second]
-        # Beside the cycle, which must not wait for it.
-        self._second = asyncio.create_task(self._look_again())
-        for found in seen:
-            if isinstance(found, Reading):
-                return [found, reading]
-            if not isinstance(found, Unanswered):
-                raise found
-        return [reading]
+        seen = await self.beside.brought()
+        if self._looks_again:
+            self.beside.begin(self._look_again)
+        return [*seen, reading]
 
-    def end(self) -> None:
-        """Look no more: the drive is to be slowed down."""
-        if self._second:
-            self._second.cancel()
-
-    async def _look_again(self) -> Reading | DeviceError:
+    async def _look_again(self) -> list[Reading]:
         """Look at the drive when its next sample is due, or as near to that as is in reach: that tells most."""
         low, high = (share * self._period_s for share in SECOND_LOOK)
         due = self._drive.bounds.ahead(time.perf_counter()) if self._drive.bounds else None
         aim = self._dither.uniform(low, high) if due is None else due + self._dither.normal(0.0, AIM) * self._period_s
         await asyncio.sleep(float(np.clip(aim, low, high)))
-        try:
-            return await self._drive.look(in_motion=True)
-        except DeviceError as error:
-            return error
+        return [await self._drive.look(in_motion=True)]
 
 
 class Recorded:
@@ -100,39 +129,21 @@ class Recorded:
         assert drive.ring  # a rig file that asks for recorders has one for every drive
         self._drive, self._block = drive, drive.ring.block
         self._drained: int | None = None
-        self._draining: asyncio.Task[list[Reading] | DeviceError] | None = None
+        self.beside = Beside()
 
     async def samples(self, reading: Reading) -> list[Reading]:
         """Return what was drained since the last cycle; mostly nothing, until a read is worth its while."""
-        found = self._collected() if self._draining and self._draining.done() else []
+        found = await self.beside.brought() if self.beside.is_answered else []
         is_due = self._drained is None or reading.sequence >= self._drained + self._block
-        if self._draining is None and is_due:
-            # Beside the cycle, for the next set-point must not wait for it; in lockstep the drives do.
-            self._draining = asyncio.create_task(self._drain(reading.sequence))
-            if self._drive.in_lockstep:
-                await self._draining
-                return self._collected()
+        if is_due and not self.beside.is_under_way:
+            self.beside.begin(partial(self._drain, reading.sequence))
+            if self._drive.in_lockstep:  # the drives wait
+                return found + await self.beside.brought()
         return found
 
-    def end(self) -> None:
-        """Ask for nothing more: the drive is to be slowed down."""
-        if self._draining:
-            self._draining.cancel()
-
-    def _collected(self) -> list[Reading]:
-        assert self._draining  # and it is done
-        found, self._draining = self._draining.result(), None
-        if not isinstance(found, list):
-            raise found
-        return found
-
-    async def _drain(self, newest: int) -> list[Reading] | DeviceError:
-        try:
-            samples = await self._drive.drain(newest)
-        except Unanswered:
-            return []  # the ring keeps them: the next drain brings what this one did not
-        except DeviceError as error:
-            return error
+    async def _drain(self, newest: int) -> list[Reading]:
+        """Drain the ring; of what is not answered it keeps the samples, and the next drain brings them."""
+        samples = await self._drive.drain(newest)
         self._drained = samples[-1].sequence if samples else newest
         return samples
 
@@ -145,16 +156,12 @@ class Streams:
         self._machine, self._judge = machine, judge
         self._rate_hz = cycle_hz * machine.samples_per_cycle
         self._own = rig.clocks == "own"
-        period = 1.0 / self._rate_hz
-        self._sources: list[Recorded | Cycled] = [
-            Recorded(drive) if rig.sampling == "recorder" else Cycled(drive, period, looks_again=j > 0)
-            for j, drive in enumerate(drives)
-        ]
+        self._sources = sources_of(machine, cycle_hz)
         self._drifts = [Drift(self._rate_hz) for _ in drives[1:]]
         self._leads = machine.leads
         self._alignment = Alignment([self._position(j) for j in range(len(self._drifts))])
         for drive in drives if self._own else ():
-            drive.bounds = Bounds(period)
+            drive.bounds = Bounds(1.0 / self._rate_hz)
         self._forces: dict[int, NDArray] = {}
         self._bucket_ends: float | None = None
         self._last: Row | None = None
@@ -183,7 +190,7 @@ class Streams:
     def end(self) -> None:
         """Ask the drives for nothing more beside the cycle."""
         for source in self._sources:
-            source.end()
+            source.beside.end()
 
     def _whole(self, told: Sequence[Sequence[Reading]]) -> Iterator[Row]:
         for drives in self._alignment.rows(told):
@@ -225,6 +232,16 @@ class Streams:
         return found
 
 
+def sources_of(machine: Machine, cycle_hz: float) -> list[Recorded | Cycled]:
+    """Return where each drive's samples come from, where they are not kept as the cycle brings them; else nothing."""
+    rig, period = machine.rig, 1.0 / (cycle_hz * machine.samples_per_cycle)
+    if rig.sampling == "recorder":
+        return [Recorded(drive) for drive in machine.drives]
+    if rig.clocks == "common":
+        return []
+    return [Cycled(drive, period, looks_again=j > 0) for j, drive in enumerate(machine.drives)]
+
+
 def sampling_of(machine: Machine, cycle_hz: float, judge: Judge) -> Sampling:
     """Return how the samples of a machine are to be had; set-points go out at ``cycle_hz``.
 
@@ -233,7 +250,7 @@ def sampling_of(machine: Machine, cycle_hz: float, judge: Judge) -> Sampling:
     DeviceError
         Where the lines are too slow to tell which samples belong together.
     """
-    if machine.rig.sampling == "cyclic" and machine.rig.clocks == "common":
+    if not sources_of(machine, cycle_hz):
         return Latched()
     if machine.rig.clocks == "common" and machine.leads_are_vague:
         raise DeviceError(

@@ -287,11 +287,11 @@ class Supervisor:
         silent = Unanswered("others are awaited")
         told = tuple(reading if j == joint else silent for j in range(len(self.rig.drive)))
         answers = Answers(told, np.full((len(CUFFS), 3), np.nan), None)
-        if why := self._dropped(answers) or self._limits.violation(answers):
+        if why := self._dropped(answers):
             raise DeviceError(why)
         # The sample was latched before the set-point that was sent with the question takes effect.
-        if why := self._limits.straying(answers, self.base, late=1):
-            raise DeviceError(why)
+        if why := self._limits.violation(answers) or self._limits.straying(answers, self.base, late=1):
+            raise DeviceError(self._after_jerk(why))
         self._told[joint].tell(reading.sequence, float(self.sent[joint]))
 
     def next(self, found: int, now: float) -> None:
@@ -344,13 +344,17 @@ class Supervisor:
             raise DeviceError(why)
         new = [self._is_new(j, found, now) for j, found in enumerate(answers.drives)]
         if why := self._limits.cuff_violation(answers) or self._straying(answers):
-            raise DeviceError(self._streams[0].after_jerk(why))
+            raise DeviceError(self._after_jerk(why))
         row = answers.row
         if row is None or not new[0]:  # the first drive's counter is the machine's
             return None
         if why := self._cuffs.doubt(row.forces, row.sequence, self._travel(row)):
             raise DeviceError(why)
         return row
+
+    def _after_jerk(self, why: str) -> str:
+        """Return why to stop, with what may have jerked the leg shortly before: one drive moves the whole of it."""
+        return next((told for stream in self._streams if (told := stream.after_jerk(why)) != why), why)
 
     def _straying(self, answers: Answers) -> str | None:
         """Return which joint is too far from its set-point; without the machine's counter nobody knows from which."""

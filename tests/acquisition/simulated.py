@@ -377,6 +377,9 @@ def _patched(simulated, time, run, plan, own):
     async def check_identity(device, identity):
         pass
 
+    async def keeps_any_rate(machine, cycle_hz):
+        """Events come by the number of requests, and are to befall the run itself."""
+
     async def ask(device, write, read, within_s):
         async def request(device_id):
             return await simulated.answer(device, write, read, within_s)
@@ -415,6 +418,7 @@ def _patched(simulated, time, run, plan, own):
         for request in (check_identity, read, write, exchange):
             stack.enter_context(patch.object(Device, request.__name__, request))
         stack.enter_context(patch.object(Line, "connect", connect))
+        stack.enter_context(patch("pipelines.acquisition.acquire.refuse_unkept_rate", keeps_any_rate))
         stack.enter_context(patch.object(ModbusBaseClient, "connected", True))
         stack.enter_context(patch.object(Supervisor, "abort", watched_abort))
         stack.enter_context(patch.object(Supervisor, "_go", watched_go))

@@ -306,7 +306,7 @@ def test_a_record_is_drained_in_each_cycle_beside_the_set_points():
         for newest in range(0, 100, 10):
             brought += [sample.sequence for sample in await recorded.samples(SimpleNamespace(sequence=newest))]
             await asyncio.sleep(0.001)
-        recorded.end()
+        recorded.beside.end()
         return drive.begun, brought
 
     begun, brought = asyncio.run(run())

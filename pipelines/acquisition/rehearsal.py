@@ -1,0 +1,60 @@
+"""Whether the cycles of a run to come follow one another fast enough, tried with every device, telling none anything.
+
+How long answers take is known of neither a device nor a computer before it was tried, and a set-point that is left out
+jerks a leg. So it is tried while the drives are disabled still.
+"""
+
+from math import ceil
+
+from pipelines.acquisition.drive import Drive, Reading
+from pipelines.acquisition.machine import Machine, all_answers
+from pipelines.acquisition.pace import PhaseLock
+from pipelines.acquisition.sampling import sources_of
+from pipelines.errors import DeviceError
+
+REHEARSED_S, FEWEST = 0.5, 20
+"""How long it is tried, and the fewest cycles that takes."""
+MOST_LATE = 0.1
+"""Share of late cycles beyond which no run is begun: a computer may be busy with something else for a moment."""
+
+
+async def refuse_unkept_rate(machine: Machine, cycle_hz: float) -> None:
+    """Refuse set-points more often than cycles can follow one another, after ``machine.look``; nothing is written.
+
+    Raises
+    ------
+    DeviceError
+        Tells how many cycles came late.
+    """
+    cycles = max(FEWEST, ceil(REHEARSED_S * cycle_hz))
+    late = await _late(machine, cycle_hz, cycles)
+    if late <= MOST_LATE * cycles:
+        return
+    remedies = ["lower acquire.sample_rate_hz", "close what else this computer does"]
+    if machine.sensors:
+        remedies.insert(1, "raise `every` of the sensors")
+    raise DeviceError(
+        f"{late} of {cycles} cycles in which every device was asked took longer than the {1e3 / cycle_hz:g} ms from "
+        f"one set-point to the next; {', '.join(remedies[:-1])}, or {remedies[-1]}; nothing was moved"
+    )
+
+
+async def _late(machine: Machine, cycle_hz: float, cycles: int) -> int:
+    """Make cycles as a run in real time does; return how many of them let a sample go by."""
+    pace = PhaseLock(cycle_hz, machine.count, machine.rig.safety.watchdog_s)
+    sources = sources_of(machine, cycle_hz)
+    late, last = 0, await machine.count()
+    for cycle in range(cycles):
+        found = await pace.wait(last)
+        late += found > last + 1
+        last = found
+        row = (await machine.cycle(cycle, _look)).row
+        if row and sources:
+            await all_answers(source.samples(reading) for source, reading in zip(sources, row.drives, strict=True))
+    for source in sources:
+        await source.beside.brought()
+    return late
+
+
+async def _look(drive: Drive) -> Reading:
+    return await drive.look(in_motion=True)
