@@ -19,9 +19,11 @@ def thinned(motion: Motion) -> Motion:
     motion, starts = replace(motion, forces=motion.felt), every.starts(motion.segment)
     averaged: dict[str, Any] = {
         name: every.mean(getattr(motion, name), starts)
-        for name in ("time", "q", "dq", "ddq", "torque", "forces", "reference", "measured_angle", "temperature")
+        for name in ("time", "q", "dq", "ddq", "torque", "forces", "reference", "temperature")
         if getattr(motion, name) is not None
     }
+    if motion.measured_angle is not None:  # a mean of readings is no reading: it has counts that the encoder lacks
+        averaged["measured_angle"] = motion.measured_angle[starts + every.decimation // 2]
     blocks = BlockAverage(max(1, round(block_average(motion).decimation / every.decimation)))
     rate = motion.sample_rate_hz / every.decimation
     return replace(

@@ -53,6 +53,14 @@ def test_forces_that_were_read_with_each_set_point_alone_are_there_at_200_hz(fas
     assert apart < 0.05 * whole.forces.std()
 
 
+def test_the_angle_as_it_was_read_keeps_the_counts_of_its_encoder(fast):
+    count = 1e-3
+    read = count * np.round(fast.q / count)
+    thin = thinned(replace(fast, measured_angle=read))
+    assert_allclose(thin.measured_angle, read[2::5])
+    assert np.abs(thin.measured_angle - thin.q).max() <= 0.5 * count + 1e-9
+
+
 def test_a_slow_recording_is_left_as_it_is(fast):
     thin = thinned(fast)
     assert thinned(thin) is thin
