@@ -105,6 +105,7 @@ class Reversal(_Object):
     travel: Number
     unit: str
     at_once_rmse_nm: Number
+    otherwise_rmse_nm: Number
     over_travel_rmse_nm: Number
 
 

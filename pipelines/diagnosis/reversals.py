@@ -17,7 +17,7 @@ from pipelines.diagnosis.choice import NEEDED
 from pipelines.diagnosis.fit import Fit
 from pipelines.diagnosis.fitted_model import model_of_run
 from pipelines.diagnosis.observations import Baseline, Run
-from pipelines.effects import PreslidingHysteresis
+from pipelines.effects import Backlash, JointElasticity, PreslidingHysteresis
 from pipelines.effects.friction import Friction
 from pipelines.estimation.angle_noise import CUTOFF_HZ
 from pipelines.estimation.regression import turns
@@ -29,15 +29,20 @@ from pipelines.signals.blocks import dilate
 NEAR_S = 0.12
 """About a reversal: as long as a low-pass of ``CUTOFF_HZ`` feels what happens there."""
 SHORTEST, LONGEST = 2e-5, 0.01
-"""rad of travel, on an exoskeleton's scale: what builds up over more shows away from reversals too."""
+"""rad of travel, on an exoskeleton's scale: over less is at once, and what builds up over more shows away from
+reversals too."""
 TRAVELS = 16
 SPEEDS = (0.02, 0.04, 0.08, 0.16, 0.32)
 """rad/s, on an exoskeleton's scale, within which friction that goes with speed turns round."""
-LATE_S = (0.01, 0.02, 0.04)
-"""After the reversal: friction does so where a torque is read late, and nobody knows."""
+LATE_S = (0.02, 0.04, 0.06)
+"""After the reversal, as far as ``time_delay`` goes: friction does so where a torque is read late, and nobody knows."""
 ROUNDING = 1e-9
 TAKEN = 0.2
 """Share of the error's power about reversals that a travel must take beyond what speed or a delay takes."""
+COUNTS = 2
+"""Of the encoder: over a shorter travel friction changes sides between two readings."""
+GIVES = (PreslidingHysteresis, Backlash, JointElasticity)
+"""Causes by which friction changes sides over a travel of the angle as it is read; where one is named, that is told."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +53,10 @@ class BuildUp:
     travel: float
     """rad, m at a prismatic joint: that over which 63 % of it change sides."""
     at_once: float
+    otherwise: float
     over_travel: float
-    """N·m rms about reversals of the validation runs, below ``CUTOFF_HZ``: what either friction leaves."""
+    """N·m rms about reversals of the validation runs, below ``CUTOFF_HZ``: what friction leaves that changes sides at
+    once, in the best way that is no travel, and over it."""
 
 
 @dataclass(frozen=True)
@@ -76,11 +83,12 @@ class _About:
 
     @classmethod
     def of(cls, motion: Motion, model: Model, baseline: Baseline, j: int) -> "_About | None":
-        """Return None where the angle as read is not known, or the joint never turns round."""
+        """Return None where the angle as read is not known, nor the motion at 5 Hz, or the joint never turns round."""
         label = Friction(baseline.joints[j], on=baseline.machine).label
         coulomb = [(effect.label, p.name) == (label, "coulomb") for effect, p in model.linear_parameters]
         level, near = float(model.linear_values[coulomb].sum()), _near(motion, j)
-        if motion.measured_angle is None or level <= 0.0 or not near.any():
+        # A motion that was filtered as low as the torque is here lacks some of what its torque holds.
+        if motion.measured_angle is None or motion.cutoff_hz <= CUTOFF_HZ or level <= 0.0 or not near.any():
             return None
         read, speed = np.ascontiguousarray(motion.measured_angle[:, j]), motion.dq[:, j]
         told = model.with_linear(np.where(coulomb, 0.0, model.linear_values)).torque(motion)
@@ -112,7 +120,7 @@ def built_up(made: Fit, baseline: Baseline, train: Sequence[Run], validate: Sequ
     runs = [[(run.motion, model_of_run(made, baseline, run)) for run in some] for some in (train, validate)]
     found = []
     for j, joint in enumerate(baseline.joints):
-        if PreslidingHysteresis(joint, on=baseline.machine).label in known:
+        if known & {gives(joint, on=baseline.machine).label for gives in GIVES}:
             continue
         seen = [[_About.of(*run, baseline, j) for run in some] for some in runs]
         about = [[one for one in some if one is not None] for some in seen]
@@ -127,7 +135,7 @@ def _of_joint(train: Sequence[_About], validate: Sequence[_About], baseline: Bas
     joint = baseline.joints[j]
     scale = baseline.machine.scale(joint)
     count = max(_count(about.read) for about in (*train, *validate))
-    shortest, longest = max(SHORTEST * scale.travel, count), LONGEST * scale.travel
+    shortest, longest = max(SHORTEST * scale.travel, COUNTS * count), LONGEST * scale.travel
     if 2.0 * shortest > longest:
         return None
     travels = np.geomspace(shortest, longest, TRAVELS)
@@ -135,14 +143,17 @@ def _of_joint(train: Sequence[_About], validate: Sequence[_About], baseline: Bas
     best, trained = _best(train, over)
     if best in (0, TRAVELS - 1):
         return None  # at once, as far as the encoder tells, or over more than what is about a reversal
-    rivals = [_side_at_once, *(_side_by_speed(speed * scale.speed) for speed in SPEEDS), *map(_side_late, LATE_S)]
-    rival, beaten = _best(train, rivals)
+    by_speed = [_side_by_speed(speed * scale.speed) for speed in SPEEDS]
+    # At once by the angle as it was read, too: what that alone gains is not the travel's.
+    as_read = _side_over(0.5 * count, SHORTEST * scale.travel)
+    rivals = [_side_at_once, as_read, *by_speed, *map(_side_late, LATE_S)]
+    beaten, otherwise = (_best(some, rivals)[1] for some in (train, validate))
     left = _power(validate, over[best])
-    ratios = trained / beaten, left / _power(validate, rivals[rival])
     independent = CUTOFF_HZ * sum(about.seconds for about in train)
+    ratios = trained / beaten, left / otherwise
     if max(ratios) > 1.0 - TAKEN or -0.5 * independent * np.log(ratios[0]) < NEEDED:
         return None
-    return BuildUp(joint, float(travels[best]), *np.sqrt([_power(validate, _side_at_once), left]).tolist())
+    return BuildUp(joint, float(travels[best]), *np.sqrt([_power(validate, _side_at_once), otherwise, left]).tolist())
 
 
 def _best(some: Sequence[_About], sides: Sequence[Side]) -> tuple[int, float]:

@@ -239,6 +239,7 @@ def _reversal(d: Diagnosis, one: BuildUp) -> dict[str, Any]:
         "travel": one.travel,
         "unit": d.baseline.machine.joint(one.joint).unit("angle"),
         "at_once_rmse_nm": one.at_once,
+        "otherwise_rmse_nm": one.otherwise,
         "over_travel_rmse_nm": one.over_travel,
     }
 
@@ -248,11 +249,13 @@ def _turning(d: Diagnosis, one: BuildUp) -> str:
     machine = d.baseline.machine
     joint = machine.joint(one.joint)
     return (
-        f"within {NEAR_S:g} s of its reversals, where no cause is looked for, {the(one.joint)}'s friction does not "
-        f"turn round at once: it builds up over {1e3 * one.travel:.2g} m{joint.unit('angle')} of travel "
-        f"({PreslidingHysteresis.name}, or play between encoder and friction), which takes the {joint.effort} error "
-        f"there from {amount(machine, one.joint, one.at_once)} to {amount(machine, one.joint, one.over_travel)} below "
-        f"{CUTOFF_HZ:g} Hz, on runs no fit has seen; the model has it turn round at once"
+        f"within {NEAR_S:g} s of its reversals, most of it left out of every fit, {the(one.joint)}'s friction "
+        f"changes sides over about {1e3 * one.travel:.1g} m{joint.unit('angle')} of travel of its angle as read: "
+        f"{PreslidingHysteresis.name}, or play or give between encoder and friction, which are alike there. That takes "
+        f"the {joint.effort} error there from {amount(machine, one.joint, one.at_once)}, or "
+        f"{amount(machine, one.joint, one.otherwise)} at best without a travel, to "
+        f"{amount(machine, one.joint, one.over_travel)} below {CUTOFF_HZ:g} Hz on the runs to validate on; the "
+        "model has it change sides at once"
     )
 
 

@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from pipelines.diagnosis.candidates import Candidate
 from pipelines.diagnosis.diagnose import diagnose
-from pipelines.diagnosis.reversals import dahl
+from pipelines.diagnosis.fit import fit
+from pipelines.diagnosis.fitted_model import model_of_run
+from pipelines.diagnosis.reversals import built_up, dahl
+from pipelines.diagnosis.second_look import slower
 from pipelines.diagnosis.verdict import verdict
+from pipelines.effects import Backlash
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.read import read_motions
 from pipelines.settings.filter import FilterSettings
@@ -58,29 +63,69 @@ def diagnosed(folder, seed, travel, counts=COUNTS, late=0.0):
     return diagnose(read_motions(sorted((folder / "recordings").glob("*.parquet")), FilterSettings(), Geometry()))
 
 
-@pytest.mark.parametrize(("seed", "travel"), [(900_001, 0.001), (900_002, 0.002), (900_003, 0.004)])
-def test_bristles_of_milliradians_are_told_with_their_travel(tmp_path, seed, travel):
+# The knee of the last turns round so gently that friction 60 ms late does nearly as well on the run to validate on.
+@pytest.mark.parametrize(
+    ("seed", "travel", "joints"), [(900_001, 0.001, JOINTS), (900_002, 0.002, JOINTS), (900_003, 0.004, ("hip",))]
+)
+def test_bristles_of_milliradians_are_told_with_their_travel(tmp_path, seed, travel, joints):
     found = diagnosed(tmp_path, seed, travel)
     told = {one.joint: one for one in found.reversals}
-    assert set(told) == set(JOINTS)
+    assert set(told) == set(joints)
     for one in told.values():
         assert one.travel == pytest.approx(travel, rel=0.3)
+        assert one.over_travel < one.otherwise <= one.at_once
         assert one.over_travel < 0.7 * one.at_once
     said = verdict(found)
-    assert [(one["joint"], one["unit"]) for one in said["reversals"]] == [(joint, "rad") for joint in JOINTS]
-    assert sum("builds up over" in caveat for caveat in said["caveats"]) == 2
+    assert [(one["joint"], one["unit"]) for one in said["reversals"]] == [(joint, "rad") for joint in joints]
+    assert sum("changes sides over about" in caveat for caveat in said["caveats"]) == len(joints)
 
 
-@pytest.mark.parametrize("seed", range(900_001, 900_005))
-def test_a_faultless_joint_that_sticks_where_it_turns_round_is_given_no_travel(tmp_path, seed):
-    found = diagnosed(tmp_path, seed, None)
-    assert found.reversals == () and verdict(found)["reversals"] == []
+@pytest.fixture(scope="module", params=range(900_001, 900_005))
+def faultless(request, tmp_path_factory):
+    return diagnosed(tmp_path_factory.mktemp("faultless"), request.param, None)
 
 
-def test_an_encoder_whose_counts_are_as_long_as_the_travel_tells_none(tmp_path):
-    assert diagnosed(tmp_path, 900_002, 0.001, counts=2**12).reversals == ()
+def test_a_faultless_joint_that_sticks_where_it_turns_round_is_given_no_travel(faultless):
+    assert faultless.reversals == () and verdict(faultless)["reversals"] == []
 
 
-@pytest.mark.parametrize("late", [0.01, 0.04])
+@pytest.mark.parametrize("late", [0.045, 0.055])
+def test_friction_that_alone_is_late_is_given_no_travel(faultless, late):
+    made, baseline = faultless.choice.named.fit, faultless.baseline
+
+    def moved(run):
+        motion, model = run.motion, model_of_run(made, baseline, run)
+        side = np.sign(motion.dq)
+        then = np.column_stack([np.interp(motion.time - late, motion.time, one) for one in side.T])
+        friction = zip(model.linear_parameters, model.linear_values, strict=True)
+        level = [value for (_, parameter), value in friction if parameter.name == "coulomb"]
+        return replace(run, motion=replace(motion, torque=motion.torque + level * (then - side)))
+
+    train, validate = ([moved(run) for run in some] for some in (faultless.train, faultless.validate))
+    assert built_up(made, baseline, train, validate) == []
+
+
+@pytest.fixture(scope="module")
+def bristles(tmp_path_factory):
+    return diagnosed(tmp_path_factory.mktemp("bristles"), 900_001, 0.001)
+
+
+def test_of_a_joint_whose_play_is_named_nothing_more_is_told(bristles):
+    bank, baseline = bristles.bank, bristles.baseline
+    play = Candidate(Backlash("hip", on=baseline.machine), ((1e-4,),) * len(bank.runs))
+    made = fit((play,), bank.runs, baseline, bank.weights)
+    assert [one.joint for one in built_up(made, baseline, bristles.train, bristles.validate)] == ["knee"]
+
+
+def test_a_motion_that_was_filtered_as_low_as_its_torque_is_looked_at_tells_none(bristles):
+    slow = [[replace(run, motion=slower(run.motion)) for run in some] for some in (bristles.train, bristles.validate)]
+    assert built_up(bristles.choice.named.fit, bristles.baseline, *slow) == []
+
+
+def test_a_travel_of_less_than_three_counts_of_the_encoder_would_read_too_short_and_is_not_told(tmp_path):
+    assert diagnosed(tmp_path, 900_001, 0.002, counts=2**13).reversals == ()
+
+
+@pytest.mark.parametrize("late", [0.01, 0.055])
 def test_friction_that_turns_round_at_once_and_is_read_late_is_given_no_travel(tmp_path, late):
     assert diagnosed(tmp_path, 900_002, None, late=late).reversals == ()

@@ -43,7 +43,6 @@ def measured(found: dict[str, Diagnosed], data: Path) -> dict[str, str]:
         made["A0-swings-zeros"] = tables.with_zeros(found["A0-swings"], published)
     if "A0-fourier" in found:
         made["A0-orders"] = tables.by_order(found["A0-fourier"])
-        made["A0-reversals"] = tables.reversals(found["A0-fourier"])
     for key, one in found.items():
         made[f"{key}-turning"] = tables.turning(one)
         if any(cause["each_run"] for cause in one.verdict["causes"]):

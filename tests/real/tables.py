@@ -8,16 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.presliding_hysteresis import PreslidingHysteresis
 from pipelines.label import cause_label, effect_told
 from pipelines.mechanics.motion import Motion
-from pipelines.model import Model
 from tests.real.machines import LOGS, Diagnosed, of_purpose, symmetric, with_rotor
 from tests.real.published import EMPS, EMPS_ERRORS, double_pendulum, their_torque
 from tests.real.relative_error import TorqueError, decimated_error, fitted, slow_error, slow_fit
 
-TRAVELS = np.concatenate([[0.0], np.geomspace(1e-5, 0.03, 36)])
-"""rad or m over which friction may build up; 0 where it does so at once."""
 SHIFTS_S = np.linspace(-0.012, 0.012, 13)
 """By which a prediction is moved along the stamps; positive where the angles are older than their stamps."""
 
@@ -122,50 +118,6 @@ def by_order(d: Diagnosed) -> str:
 def turning(d: Diagnosed) -> str:
     """Return what the verdict says of friction at reversals."""
     return "\n>\n".join(f"> But {caveat}." for caveat in d.verdict["caveats"] if "reversals" in caveat) or "> Nothing."
-
-
-def built_up(named: Mapping[str, Model], motion: Motion, travels: Sequence[float]) -> NDArray:
-    """Return the torque (n, J) of a run's model whose Coulomb friction builds up over a travel after each reversal."""
-    model = named[motion.file]
-    torque = model.torque(motion)
-    for (effect, parameter), value in zip(model.linear_parameters, model.linear_values, strict=True):
-        if parameter.name == "coulomb":
-            j = motion.joints.index(effect.joint)
-            if travels[j] > 0.0:
-                share = PreslidingHysteresis(effect.joint, on=motion.machine).columns(motion, (travels[j],))[:, j, 0]
-                torque[:, j] += value * (share - np.sign(motion.dq[:, j]))
-    return torque
-
-
-def reversals(d: Diagnosed) -> str:
-    """Return what friction that builds up after each reversal, over a travel that training tells, would take away."""
-    named = {motion.file: d.model_of(motion) for motion in d.motions}
-    trained, held_out = of_purpose(d.motions, "train"), of_purpose(d.motions, "validate")
-    joints = d.motions[0].joints
-
-    def over(travels: Sequence[float], among: Sequence[Motion]) -> NDArray:
-        return np.mean([slow_error(built_up(named, motion, travels), motion).percent for motion in among], axis=0)
-
-    tried = np.array([over([travel] * len(joints), trained) for travel in TRAVELS])
-    best = TRAVELS[tried.argmin(axis=0)]
-    rows = [
-        (
-            joint,
-            f"{1e3 * best[j]:.1f}",
-            *(f"{over(t, among)[j]:.2f}" for among in (trained, held_out) for t in (0.0 * best, best)),
-        )
-        for j, joint in enumerate(joints)
-    ]
-    unit = d.motions[0].machine.joints[0].unit("angle")
-    headings = (
-        "joint",
-        f"travel, m{unit}",
-        "at once, trained on, %",
-        "over the travel, %",
-        "at once, held out, %",
-        "over the travel, %",
-    )
-    return table(headings, rows)
 
 
 def _both(error: TorqueError) -> tuple[str, str]:

@@ -42,11 +42,12 @@ def test_friction_that_goes_with_the_load_of_a_planetary_gear_is_named_and_foret
 
 def test_at_reversals_friction_builds_up_over_a_travel_of_some_counts_of_the_encoder(fourier):
     count = 0.000381
-    told = {one["joint"]: one for one in fourier.verdict["reversals"]}
-    assert set(told) == {"shoulder", "elbow"}
-    for one in told.values():
-        assert 2.0 * count < one["travel"] < 10.0 * count
-        assert one["over_travel_rmse_nm"] < 0.8 * one["at_once_rmse_nm"]
+    # The elbow's is hardly three counts: to turn round at once by the angle as it is read does nearly as well.
+    (told,) = fourier.verdict["reversals"]
+    assert told["joint"] == "shoulder"
+    assert 2.0 * count < told["travel"] < 10.0 * count
+    assert told["over_travel_rmse_nm"] ** 2 < 0.8 * told["otherwise_rmse_nm"] ** 2
+    assert told["otherwise_rmse_nm"] < told["at_once_rmse_nm"]
 
 
 def errors(found, theirs):
@@ -56,7 +57,8 @@ def errors(found, theirs):
 
 
 def assert_noise_of_the_angles_passes_for_nothing(found):
-    """Inertia and gravity nearly cancel in a free swing: noise must pass for no cause, nor for a wrong sign."""
+    """Inertia and gravity nearly cancel in a free swing: noise must pass for no cause, travel or wrong sign."""
+    assert found.verdict["reversals"] == []
     assert not any("reversed" in fault["what"] for fault in found.verdict["data_faults"])
     assert any("no torque goes with" in caveat for caveat in found.verdict["caveats"])
 

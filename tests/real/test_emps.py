@@ -38,3 +38,7 @@ def test_diagnose_names_the_worn_screw_and_reaches_the_published_error(diagnosis
     relative, crossed = _errors(found, diagnosis.motions)
     assert relative <= EMPS_ERRORS["asymmetric"][0]
     assert crossed <= EMPS_ERRORS["asymmetric"][1]
+
+
+def test_the_few_reversals_of_the_screw_which_are_all_alike_show_no_travel(diagnosis):
+    assert diagnosis.verdict["reversals"] == []
