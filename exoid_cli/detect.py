@@ -82,6 +82,7 @@ def _is_trajectory(files: Sequence[Path]) -> bool:
 
 def _planned(files: Sequence[Path], experiment: Any, rig: Path | None, runs: str, power: float, report: Any) -> list:
     from pipelines.diagnosis.detect import detectability
+    from pipelines.diagnosis.known import known_effects
     from pipelines.diagnosis.observations import baseline_of, observe
     from pipelines.diagnosis.planned import planned_motions, planned_noise
     from pipelines.diagnosis.session import refuse_unfit
@@ -101,7 +102,8 @@ def _planned(files: Sequence[Path], experiment: Any, rig: Path | None, runs: str
         refuse_unfit(motions)
     observed = [observe(motion) for motion in motions]
     noise = planned_noise(design.noise, design.sample_rate_hz, observed[0].block)
-    return detectability(observed, baseline_of(observed), noise, power, report)
+    known = known_effects(experiment.diagnose.known, motions[0].machine)
+    return detectability(observed, baseline_of(observed, known), noise, power, report)
 
 
 def _default_plant(experiment: Any) -> Any:
@@ -118,7 +120,7 @@ def _recorded(files: Sequence[Path], experiment: Any, power: float, report: Any)
 
     motions = read_motions(files, experiment.filter, geometry_from(experiment))
     refuse_another_mechanism(experiment.mechanism, motions)
-    return detectability_of_recorded(motions, power, report)
+    return detectability_of_recorded(motions, power, report, experiment.diagnose.known)
 
 
 def _show(found: Sequence["Detectable"]) -> None:

@@ -30,6 +30,13 @@ def diagnose(
     ] = None,
     config: ConfigOption = None,
     again: AgainOption = False,
+    known: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What drawings show beside rigid body and friction, as rotor_inertia@knee; more than once for more.",
+            show_default="[diagnose] known, nothing",
+        ),
+    ] = None,
     figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Whether to draw the figures.")] = True,
 ) -> None:
     """Name what rigid body and friction get wrong, extend the model with it, and measure the gain.
@@ -38,6 +45,7 @@ def diagnose(
     Examples:
       exoid diagnose
       exoid diagnose recordings/*.parquet -o diagnosed/
+      exoid diagnose recordings/*.parquet --known rotor_inertia@knee
     """
     from pipelines.contracts import CANDIDATES, PARAMETERS, RESIDUALS, describe
     from pipelines.contracts.atomic import all_or_none, open_folder, write_text
@@ -48,12 +56,15 @@ def diagnose(
     from pipelines.diagnosis.figures import FIGURES, draw
     from pipelines.diagnosis.verdict import verdict
     from pipelines.mechanics.read import geometry_from, read_motions, refuse_another_mechanism
+    from pipelines.settings.diagnose import DiagnoseSettings
 
-    if not files and output is None and figures:
+    if not files and output is None and figures and not known:
         only(context, place_of(config, lacking="no recording is given"), "diagnose", again=again)
         return
     files, output = inputs_and_folder("diagnose", files, output, config, "no recording is given")
     settings = settings_in_force(config)
+    if known:
+        settings = settings.model_copy(update={"diagnose": DiagnoseSettings(known=tuple(known))})
     tables = {"parameters": PARAMETERS, "residuals": RESIDUALS, "candidates": CANDIDATES}
     for name, contract in tables.items():
         contract.refuse_place(output / f"{name}.parquet")
@@ -61,10 +72,10 @@ def diagnose(
     refuse_another_mechanism(settings.mechanism, motions)
     open_folder(output)
     with console.progress("diagnosing", 1.0) as report:
-        found = find(motions, report)
+        found = find(motions, report, settings.diagnose.known)
     said = verdict(found)
     machine, geometry = motions[0].machine, motions[0].geometry
-    heeded = settings.sections_about(machine.is_exoskeleton, "mechanism", "filter")
+    heeded = settings.sections_about(machine.is_exoskeleton, "mechanism", "filter", "diagnose")
     shared = {"joints": motions[0].joint_metadata} | describe(files, heeded)
     hashed = zip(motions, files, strict=True) if found.each_run else ()  # whole files are read for that
     recordings = {motion.file: recording_behind(path) for motion, path in hashed}

@@ -20,6 +20,7 @@ ERRORS = {
 def show_verdict(said: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
     """Print a verdict/1 document about a machine of these joints."""
     from pipelines.contracts.joints import HIP_AND_KNEE, either
+    from pipelines.label import cause_label
 
     console.say(said["summary"])
     for caveat in said["caveats"]:
@@ -37,6 +38,10 @@ def show_verdict(said: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
         f"{either(joint.unit('torque') for joint in joints)}",
         numbers=", ".join((*told.values(), "excess left")),
     )
+    for told in said.get("known", ()):
+        console.say(f"\n{cause_label(told)}, known beforehand")
+        for parameter in told["parameters"]:
+            console.note(_in_words(parameter))
     for cause in said["causes"]:
         _show_cause(cause)
     if said["causes"]:

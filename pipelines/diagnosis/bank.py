@@ -66,7 +66,7 @@ def fill(
     where: list[slice] = []
     columns = [untouched]
     at = baseline.size
-    effects = list(proposals(baseline.machine, [run.motion.run for run in runs]))
+    effects = list(proposals(baseline, [run.motion.run for run in runs]))
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
         for candidate in worth_a_look(effect, scan):

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.gram import Gram, gram_of, solve
 from pipelines.diagnosis.observations import FOLDS, Baseline, Run
 from pipelines.effects import EFFECTS, Effect, Parameter, Side
-from pipelines.mechanics.machine import Machine
 from pipelines.model import Model, Term
 
 WORN = ("mass_off_axis", "payload_change")
@@ -94,12 +93,18 @@ def lowest(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> float:
     return WAVES * 2.0 * np.pi / swept
 
 
-def proposals(machine: Machine, kinds: Sequence[str]) -> Iterator[Effect]:
-    """Yield every effect at every place of a machine where it can be, in the kinds of each run at hand."""
+def proposals(baseline: Baseline, kinds: Sequence[str]) -> Iterator[Effect]:
+    """Yield every effect at every place of a machine where it can be, in the kinds of each run at hand.
+
+    What is in the baseline already is none.
+    """
+    machine, known = baseline.machine, {effect.label for effect in baseline.known}
     for effect in EFFECTS:
         if effect.name in BASELINE or not set(effect.acts_in) & set(kinds):
             continue
         for joint in effect.possible(machine):
+            if effect(joint=joint, on=machine).label in known:
+                continue
             yield effect(joint=joint, on=machine)
             if effect.may_differ and len(kinds) > 1:
                 yield effect(joint=joint, on=machine, each_run=True)

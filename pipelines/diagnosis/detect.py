@@ -36,6 +36,7 @@ from pipelines.diagnosis.evaluate import evaluate
 from pipelines.diagnosis.fit import fit
 from pipelines.diagnosis.floor import Floor, noise_floor
 from pipelines.diagnosis.gram import solve
+from pipelines.diagnosis.known import known_effects
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, observe, with_load
 from pipelines.diagnosis.scan import BENDING, values_of
 from pipelines.diagnosis.search import SHAPE_COST, imperfection
@@ -227,7 +228,7 @@ def detectability(
     """
     sight = Sight.of(runs, baseline, floor)
     # What the wearer may carry instead of the machine goes by the same name; the machine's is reported.
-    effects = [e for e in proposals(baseline.machine, baseline.kinds) if e.run is None and not e.each_run]
+    effects = [e for e in proposals(baseline, baseline.kinds) if e.run is None and not e.each_run]
     looks: dict[Effect, list[Look]] = {}
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
@@ -242,7 +243,10 @@ def detectability(
 
 
 def detectability_of_recorded(
-    motions: Sequence[Motion], power: float = POWER, report: Callable[[float, str], None] = lambda share, what: None
+    motions: Sequence[Motion],
+    power: float = POWER,
+    report: Callable[[float, str], None] = lambda share, what: None,
+    known: Sequence[str] = (),
 ) -> list[Detectable]:
     """Return the same for recorded motions, their noise measured from what does not repeat between periods.
 
@@ -252,7 +256,7 @@ def detectability_of_recorded(
     refuse_unfit(motions)
     motions = [thinned(m) for m in motions]
     runs = [observe(m) for m in motions if m.purpose == "train"] or [observe(m) for m in motions]
-    baseline = baseline_of(runs)
+    baseline = baseline_of(runs, known_effects(known, runs[0].motion.machine))
     active = np.any([run.usable.any(axis=0) for run in runs], axis=0).astype(float)
     plain = fit((), runs, baseline, active)
     plain = fit((), runs, baseline, plain.weights)

@@ -27,6 +27,7 @@ from pipelines.diagnosis.fit import Fit, fit, residuals_on
 from pipelines.diagnosis.fitted_model import model_of_run, values_of_each_run
 from pipelines.diagnosis.floor import Floor, noise_floor
 from pipelines.diagnosis.gain import Gain, errors_of, gain
+from pipelines.diagnosis.known import known_effects
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, like_trained, observe, with_load
 from pipelines.diagnosis.reversals import BuildUp, built_up
 from pipelines.diagnosis.search import imperfection
@@ -144,7 +145,9 @@ class Diagnosis:
         return {other: p for other, p in odds.items() if p >= ALIKE * odds[label]}
 
 
-def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = silent) -> Diagnosis:
+def diagnose(
+    motions: Sequence[Motion], report: Callable[[float, str], None] = silent, known: Sequence[str] = ()
+) -> Diagnosis:
     """Find what the rigid body with Coulomb and viscous friction gets wrong, and why.
 
     Selection, shapes and shared parameters use ``train`` runs; every error is measured on ``validate`` runs, which
@@ -156,14 +159,17 @@ def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = s
         Runs of one machine, some to train and some to validate.
     report : callable, optional
         Told the share that is done, 0 to 1, and what is being tried.
+    known : sequence of str, optional
+        Labels of what the machine is known to have besides rigid body and friction: part of the baseline.
 
     Raises
     ------
     InputError
-        Where there is no run to train or none to validate on.
+        Where there is no run to train or none to validate on, or no baseline can have what is ``known``.
     """
     motions = on_one_scale(motions)
     refuse_unfit(motions)
+    beside = known_effects(known, motions[0].machine)
     faults = tuple(find_faults(motions))
     sound = [thinned(motion) for motion in excluding(motions, faults)]
     train, validate = _dealt(sound)
@@ -171,7 +177,7 @@ def diagnose(motions: Sequence[Motion], report: Callable[[float, str], None] = s
         train, validate = _dealt(sound, CUTOFF_HZ)
     if not any(fault.spoils for fault in faults):
         _refuse_without_floor(validate)
-    look = partial(_look, faults=faults, noisy_angles=noisy, report=report)
+    look = partial(_look, known=beside, faults=faults, noisy_angles=noisy, report=report)
     first = look(train, validate)
     if noisy or first.spoilt or not (first.status == "unknown_cause" or (first.unsteady and _rings(first))):
         return first
@@ -190,12 +196,13 @@ def _rings(found: Diagnosis) -> bool:
 def _look(
     train: Sequence[Run],
     validate: Sequence[Run],
+    known: Sequence[Effect],
     faults: tuple[Fault, ...],
     noisy_angles: bool,
     report: Callable[[float, str], None],
 ) -> Diagnosis:
     """Diagnose at the bandwidth that the runs have."""
-    baseline = baseline_of(train)
+    baseline = baseline_of(train, known)
     bank = fill(train, baseline, lambda share, what: report(SEARCH_SHARE * share, what))
     empty = fit((), bank.runs, baseline, bank.weights)
     validate = tuple(with_load(like_trained(run, baseline), baseline, empty.values) for run in validate)

@@ -5,8 +5,8 @@ joint that they exert on the person. The second pair is a second measurement of 
 what separates causes in the drive or the structure from causes in the person.
 
 Baseline parameters, in the order of the columns: the rigid body (a leg's X1..X4) of the machine, that of the person,
-Coulomb and viscous friction of each joint, the force sensors' zeros. With one kind of run and no cuff
-forces one rigid body takes the place of the two.
+Coulomb and viscous friction of each joint, what else the machine is known to have, the force sensors' zeros. With one
+kind of run and no cuff forces one rigid body takes the place of the two.
 """
 
 from collections.abc import Sequence
@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.effects import Effect, Side
 from pipelines.effects.friction import Friction
 from pipelines.estimation.regression import away_from_reversals, away_from_turns, block_average
 from pipelines.mechanics.machine import Machine
@@ -135,6 +136,8 @@ class Baseline:
     kinds: tuple[str, ...]
     machine: Machine
     cuffs: bool
+    known: tuple[Effect, ...] = ()
+    """What else the machine is known to have; each acts like friction, by linear parameters that all runs share."""
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -154,15 +157,19 @@ class Baseline:
     @property
     def size(self) -> int:
         """Number of columns."""
-        return self.body * len(self.bodies) + 2 * len(self.joints) + ZEROS * self.cuffs
+        return self.body * len(self.bodies) + sum(len(e.linear) for e in self.beside_bodies) + ZEROS * self.cuffs
+
+    @property
+    def beside_bodies(self) -> tuple[Effect, ...]:
+        """Friction of each joint, and what the machine is known to have; in the order of the columns."""
+        return (*(Friction(joint, on=self.machine) for joint in self.joints), *self.known)
 
     @property
     def names(self) -> list[str]:
         """What messages call the columns, but for the cuffs' zeros, which are the last."""
         body = [p.name for p in self.machine.mechanism.parameters]
         person = [f"the person's {name}" for name in body] if len(self.bodies) == 2 else []
-        friction = [f"{joint} {p.name}" for joint in self.joints for p in Friction(joint, on=self.machine).linear]
-        return body + person + friction
+        return body + person + [f"{effect.joint} {p.name}" for effect in self.beside_bodies for p in effect.linear]
 
     def columns(self, motor: Motion, link: Motion, human: Motion | None = None) -> NDArray:
         """Baseline columns at full rate, (n, O, size).
@@ -186,9 +193,10 @@ class Baseline:
             out[:, :J, p : 2 * p] = person
             out[:, J:, p : 2 * p] = person
         at = p * len(self.bodies)
-        for joint in self.joints:
-            out[:, :J, at : at + 2] = Friction(joint, on=self.machine).columns(motor)
-            at += 2
+        for effect in self.beside_bodies:
+            own = effect.columns(motor if effect.side is Side.DRIVE else link)
+            out[:, :J, at : at + own.shape[2]] = own
+            at += own.shape[2]
         if self.cuffs and motor.run == "with_human":
             L1, cos_knee, sin_knee = g.thigh_length_m, np.cos(link.q[:, 1]), np.sin(link.q[:, 1])
             d_thigh, d_shank = g.thigh_cuff_distance_m or 0.0, g.shank_cuff_distance_m or 0.0
@@ -199,10 +207,10 @@ class Baseline:
         return out
 
 
-def baseline_of(runs: Sequence[Run]) -> Baseline:
-    """Return the baseline that the kinds of run at hand allow."""
+def baseline_of(runs: Sequence[Run], known: Sequence[Effect] = ()) -> Baseline:
+    """Return the baseline that the kinds of run at hand allow, with what else the machine is ``known`` to have."""
     kinds = tuple(k for k in ("exo_alone", "with_human") if any(run.motion.run == k for run in runs))
-    return Baseline(kinds, runs[0].motion.machine, any(run.has_cuffs for run in runs))
+    return Baseline(kinds, runs[0].motion.machine, any(run.has_cuffs for run in runs), tuple(known))
 
 
 def like_trained(run: Run, baseline: Baseline) -> Run:

@@ -12,7 +12,6 @@ from pipelines.diagnosis.fit import Fit
 from pipelines.diagnosis.gain import scored
 from pipelines.diagnosis.observations import Baseline, Run
 from pipelines.diagnosis.uncertainty import Uncertainty
-from pipelines.effects.friction import Friction
 from pipelines.effects.rigid_body import RigidBody
 
 
@@ -39,10 +38,13 @@ def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.Data
             slope[[b * baseline.body + i for b in bodies]] = 1.0
             add("rigid_body", p.name, p.symbol, p.unit, None, run, "inertia", slope, float(slope @ values))
     at = baseline.body * len(baseline.bodies)
-    for joint in baseline.joints:
-        for p in Friction(joint, on=baseline.machine).linear:
-            add("friction", p.name, p.symbol, p.unit, joint, None, "friction", _unit(size, at), values[at])
-            at += 1
+    for effect in baseline.beside_bodies:
+        step = "extension" if effect in baseline.known else "friction"
+        places = np.arange(at, at + len(effect.linear))
+        slopes = effect.jacobian(values[places]) @ np.eye(size)[places]
+        for p, value, slope in zip(effect.parameters, effect.physical(values[places]), slopes, strict=True):
+            add(effect.name, p.name, p.symbol, p.unit, effect.joint, None, step, slope, float(value))
+        at += len(effect.linear)
     one_way = [False] * len(rows) + [p.typical[0] >= 0 for cause in fit.causes for p in cause.effect.parameters]
     for number, cause in enumerate(fit.causes):
         effect = cause.effect
@@ -74,12 +76,6 @@ def _bodies(baseline: Baseline) -> dict[str, list[int]]:
     if len(baseline.bodies) == 1:
         return {baseline.bodies[0]: [0]}
     return {"exo_alone": [0], "with_human": [0, 1], "human": [1]}
-
-
-def _unit(size: int, at: int) -> NDArray:
-    slope = np.zeros(size)
-    slope[at] = 1.0
-    return slope
 
 
 def _in_run(fit: Fit, sure: Uncertainty, number: int, run: int) -> tuple[NDArray, NDArray]:

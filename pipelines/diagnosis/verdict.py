@@ -66,12 +66,24 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
             joint.name: {"torque": joint.unit("torque"), "angle": joint.unit("angle")}
             for joint in d.baseline.machine.joints
         },
+        "known": [_known(d, effect) for effect in d.baseline.known],
         "causes": causes,
         "data_faults": [{"file": f.file, "channel": f.channel, "what": f.what} for f in d.faults],
         "residual": left.as_json() if left else None,
         "runs": sorted({run.motion.run for run in d.validate}),
         "noise_floor_from": _floor_from(d),
     }
+
+
+def _known(d: Diagnosis, effect: Effect) -> dict[str, Any]:
+    return {"effect": effect.name, "joint": effect.joint, "parameters": _values(_rows(d.parameters, effect))}
+
+
+def _values(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    return [
+        {"name": r["name"], "value": r["value"], "unit": r["unit"], "ci95": [r["ci95_low"], r["ci95_high"]]}
+        for r in rows
+    ]
 
 
 def _depends_on(before: Sequence[Dependence], after: Sequence[Dependence]) -> dict[str, list[dict[str, Any]]]:
@@ -101,10 +113,7 @@ def _cause(d: Diagnosis, label: str) -> dict[str, Any]:
         "joint": effect.joint,
         "side": str(effect.side),
         "probability": _probability(d, sum(alike.values())),
-        "parameters": [
-            {"name": r["name"], "value": r["value"], "unit": r["unit"], "ci95": [r["ci95_low"], r["ci95_high"]]}
-            for r in rows
-        ],
+        "parameters": _values(rows),
         "gain": {
             "rmse_reduction_nm": worth.value,
             "ci95": [worth.low, worth.high],
@@ -230,7 +239,13 @@ def _caveats(d: Diagnosis) -> list[str]:
         for joint, share in _floor_that_hides(d).items()
     ]
     turning = [_turning(d, one) for one in d.reversals]
-    return [noisy] * d.noisy_angles + hiding * (not d.spoilt) + turning + _of_one_run(d) + _of_one_kind(d)
+    known = [
+        f"{effect.label} was told to be there: it is part of what is called rigid body and friction here, and whether "
+        "these data show it was not asked"
+        for effect in d.baseline.known
+    ]
+    shown = hiding * (not d.spoilt) + turning
+    return known + [noisy] * d.noisy_angles + shown + _of_one_run(d) + _of_one_kind(d)
 
 
 def _reversal(d: Diagnosis, one: BuildUp) -> dict[str, Any]:

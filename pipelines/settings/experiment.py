@@ -9,6 +9,7 @@ from pipelines.errors import SettingsError
 from pipelines.settings.acquire import AcquireSettings, RunSettings
 from pipelines.settings.base import Settings, load_toml
 from pipelines.settings.design import DesignSettings
+from pipelines.settings.diagnose import DiagnoseSettings
 from pipelines.settings.filter import FilterSettings
 from pipelines.settings.identify import IdentifySettings
 from pipelines.settings.mechanism import MechanismSettings
@@ -35,6 +36,7 @@ class Experiment(Settings):
     run: tuple[RunSettings, ...] = Field(default_factory=_four_runs, description="The runs, in order.")
     filter: FilterSettings = Field(FilterSettings(), description="Filtering.")
     identify: IdentifySettings = Field(IdentifySettings(), description="Identification.")
+    diagnose: DiagnoseSettings = Field(DiagnoseSettings(), description="Diagnosis.")
     simulate: SimulateSettings = Field(SimulateSettings(), description="Simulation.")
 
     _path: Path = PrivateAttr(default=Path("exoid.toml"))

@@ -97,7 +97,7 @@ def graph(experiment: Experiment, config: Path, out: Path, imported: ImportedRun
     words = ("identify", *_words(motions))
     steps.append(step("identify", parameters, motions.values(), counted, *words, beside=IDENTIFIED))
     if validate:  # a diagnosis measures its gain on validation runs; without one there is none
-        verdict, counted = out / "diagnosed" / "verdict.json", ("filter", "mechanism")
+        verdict, counted = out / "diagnosed" / "verdict.json", ("filter", "mechanism", "diagnose")
         words = ("diagnose", *_words(recordings))
         steps.append(step("diagnose", verdict, recordings.values(), counted, *words, beside=DIAGNOSED))
         extended = verdict.with_name("parameters.parquet")

@@ -25,7 +25,7 @@ def split(experiment: Experiment, folder: Path) -> None:
     imported.refuse_damaged()
     # Names that make knows stand for the places, so that the rules hold wherever make is told to work.
     steps = graph(experiment, Path("$(CONFIG)"), Path("$(OUT)"), imported)
-    sections = experiment.sections("mechanism", "design", "acquire", "filter", "identify", "simulate")
+    sections = experiment.sections("mechanism", "design", "acquire", "filter", "identify", "diagnose", "simulate")
     if any(step.stage == "acquire" for step in steps):
         experiment.refuse_missing_files()
         _add_what_is_recorded(experiment, sections)

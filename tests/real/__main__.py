@@ -33,11 +33,11 @@ def measured(found: dict[str, Diagnosed], data: Path) -> dict[str, str]:
     made = {"verdicts": tables.verdicts(found)} if set(found) == set(LOGS) else {}
     if "emps" in found:
         made |= {"emps": tables.emps(found), "emps-pulses": tables.flexibility(found["emps"])}
-    for name in ("A0", "C1"):
-        if any(key.startswith(name) for key in found):
-            made[name] = tables.pendulum(name, found, data)
+    for mark, keys in {"A0": ("A0-fourier", "A0-swings"), "C1": ("C1-swings",), "C1-known": ("C1-known",)}.items():
+        if here := [found[key] for key in keys if key in found]:
+            made[mark] = tables.pendulum(here, data / "double_pendulum" / f"{mark[:2]}_published_parameters.yml")
     if any(len(one.motions[0].joints) == 2 for one in found.values()):
-        made["timing"] = tables.timing(found)
+        made["timing"] = tables.timing({key: one for key, one in found.items() if not LOGS[key].known})
     if "A0-swings" in found:
         published = data / "double_pendulum" / "A0_published_parameters.yml"
         made["A0-swings-zeros"] = tables.with_zeros(found["A0-swings"], published)
@@ -47,6 +47,8 @@ def measured(found: dict[str, Diagnosed], data: Path) -> dict[str, str]:
         made[f"{key}-turning"] = tables.turning(one)
         if any(cause["each_run"] for cause in one.verdict["causes"]):
             made[f"{key}-each-run"] = tables.of_each_run(one)
+        if LOGS[key].known:
+            made[f"{key}-known"] = tables.known(one)
         made |= {f"{key}-depends": tables.depends(one), f"{key}-says": f"> {one.verdict['summary']}"}
     return made
 

@@ -33,14 +33,21 @@ class Logs:
     files: str
     """Pattern in the folder of real data."""
     map: str
+    known: tuple[str, ...] = ()
+    """What its makers' drawings show beside rigid body and friction."""
 
     @property
     def commands(self) -> str:
         """What a user types to get from these logs to a verdict."""
         return (
             f"exoid import ../shared/data/{self.files} --map datasets/maps/{self.map} -o recordings/\n"
-            "exoid diagnose recordings/*.parquet --out diagnosed/"
+            f"exoid diagnose recordings/*.parquet{' '.join(('', *self.told))} --out diagnosed/"
         )
+
+    @property
+    def told(self) -> list[str]:
+        """What the diagnosis is told."""
+        return [word for label in self.known for word in ("--known", label)]
 
 
 LOGS = {
@@ -50,6 +57,12 @@ LOGS = {
     ),
     "A0-swings": Logs("Double pendulum A0, swings", "double_pendulum/A0_swing_*.csv", "double_pendulum.toml"),
     "C1-swings": Logs("Double pendulum C1, swings", "double_pendulum/C1_swing_*.csv", "double_pendulum_C1.toml"),
+    "C1-known": Logs(
+        "Double pendulum C1, its rotor known",
+        "double_pendulum/C1_swing_*.csv",
+        "double_pendulum_C1.toml",
+        ("rotor_inertia@elbow",),
+    ),
     "simple": Logs("Simple pendulum", "simple_pendulum/*.csv", "simple_pendulum.toml"),
     "xl330": Logs("XL330", "xl330/*.json", "xl330.toml"),
     "modexo": Logs("modexo", "modexo/*.csv", "modexo.toml"),
@@ -138,7 +151,7 @@ def diagnosed(logs: Logs, data: Path, folder: Path, figures: bool = False) -> Di
     recorded = recordings(logs, data, folder / "recordings")
     out = folder / "diagnosed"
     drawn = "--figures" if figures else "--no-figures"
-    _exoid("diagnose", *map(str, recorded), "--out", str(out), drawn)
+    _exoid("diagnose", *map(str, recorded), *logs.told, "--out", str(out), drawn)
     told = json.loads((out / "verdict.json").read_text(encoding="utf-8"))
     return Diagnosed(motions(recorded), told, PARAMETERS.read(out / "parameters.parquet").frame, out)
 

@@ -79,13 +79,11 @@ def emps(found: Mapping[str, Diagnosed]) -> str:
     )
 
 
-def pendulum(name: str, found: Mapping[str, Diagnosed], data: Path) -> str:
+def pendulum(found: Sequence[Diagnosed], published: Path) -> str:
     """Return the torque error of every run of a double pendulum, beside that of its makers' parameters."""
-    theirs = double_pendulum(data / "double_pendulum" / f"{name}_published_parameters.yml")
+    theirs = double_pendulum(published)
     rows = []
-    for key, d in found.items():
-        if not key.startswith(name):
-            continue
+    for d in found:
         trained = of_purpose(d.motions, "train")
         plain, refitted = slow_fit(with_rotor(d.motions[0]), trained), d.refitted()
         for motion in d.motions:
@@ -99,6 +97,16 @@ def pendulum(name: str, found: Mapping[str, Diagnosed], data: Path) -> str:
     models = ("published", "least squares", "extended", "refitted")
     headings = ("run", "for", *(f"{model}, {unit}" for model in models for unit in ("N·m", "%")))
     return table(headings, rows)
+
+
+def known(d: Diagnosed) -> str:
+    """Return what was told to be there as it was fitted."""
+    rows = [
+        (cause_label(told), f"{p['value']:.3g} {p['unit']}", " … ".join(f"{end:.2g}" for end in p["ci95"]))
+        for told in d.verdict["known"]
+        for p in told["parameters"]
+    ]
+    return table(("known", "found", "95 % interval"), rows)
 
 
 def by_order(d: Diagnosed) -> str:

@@ -92,3 +92,19 @@ def test_half_a_swing_foretells_the_shoulder_better_than_its_makers_and_accuses_
     assert_noise_of_the_angles_passes_for_nothing(swings)
     ours, published = errors(swings, double_pendulum(real_data / "double_pendulum" / "C1_published_parameters.yml"))
     assert (ours[:, 0] < published[:, 0]).all()
+
+
+@pytest.mark.slow
+def test_with_the_rotor_that_its_makers_know_half_a_swing_foretells_every_run_better_than_they_do(
+    real_data, tmp_path_factory
+):
+    published_file = real_data / "double_pendulum" / "C1_published_parameters.yml"
+    swings = diagnosed(LOGS["C1-known"], real_data, tmp_path_factory.mktemp("C1-known"))
+    assert swings.causes == []
+    (rotor,) = swings.verdict["known"]
+    low, high = rotor["parameters"][0]["ci95"]
+    theirs = double_pendulum(published_file)
+    # What no motion tells apart from it is the rotor's coupling, -gr Ir.
+    assert low < (theirs["gr"] ** 2 + theirs["gr"]) * theirs["Ir"] < high
+    ours, published = errors(swings, theirs)
+    assert (ours < published).all()

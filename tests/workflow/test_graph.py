@@ -147,6 +147,8 @@ def test_only_what_depends_on_a_change_runs_again(make):
     assert make() == ["simulate", "simulate", "report"]
     make.change("[identify]\nfigures = true", "[identify]\nfigures = false")
     assert make() == [*FIT, "report"]
+    make.change("known = []", 'known = ["rotor_inertia@knee"]')
+    assert sorted(make()) == sorted([*DIAGNOSIS, "report"])
     make.change("order = 4", "order = 2")
     assert sorted(make()) == sorted(ALL_FROM_RECORDINGS)
     make.change("seed = 2", "seed = 22")

@@ -1,0 +1,44 @@
+"""What drawings show of a machine is part of the model that everything is held against, and is searched for no more."""
+
+import pytest
+
+from pipelines.diagnosis.candidate_table import candidates
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.verdict import verdict
+from pipelines.errors import InputError
+from pipelines.model import model_from_parameters
+from tests.diagnosis.sessions import session
+
+
+@pytest.mark.parametrize(
+    ("label", "values"),
+    [("rotor_inertia@knee", {"inertia": 0.12}), ("parallel_spring@knee", {"stiffness": 6.0, "rest_angle": -0.5})],
+)
+def test_what_is_known_is_fitted_to_its_truth_and_missed_no_more(label, values):
+    motions = session(*label.split("@"), seed=5, **values)
+    found = diagnose(motions, known=[label])
+    said = verdict(found)
+    assert said["status"] == "nothing_missing"
+    assert label in said["caveats"][0]
+    (known,) = said["known"]
+    for parameter in known["parameters"]:
+        low, high = parameter["ci95"]
+        assert low < values[parameter["name"]] < high
+    assert not any(label in tried for tried in candidates(found)["causes"])
+    terms = model_from_parameters(found.parameters, "with_human", motions[0].machine)
+    assert label in [term.effect.label for term in terms]
+
+
+def test_beside_what_is_known_something_else_is_found_all_the_same():
+    said = verdict(diagnose(session("torque_gain", "hip", seed=3, gain=1.08), known=["rotor_inertia@knee"]))
+    assert [(cause["effect"], cause["joint"]) for cause in said["causes"]] == [("torque_gain", "hip")]
+    low, high = said["known"][0]["parameters"][0]["ci95"]
+    assert low < 0.0 < high  # this leg has none
+
+
+@pytest.mark.parametrize(
+    "label", ["rotor_inertia@hip", "rotor_inertia", "backlash@knee", "friction@hip", "torque_offset@hip"]
+)
+def test_what_no_drawing_shows_or_the_joint_cannot_have_is_refused_with_what_can_be_told(label):
+    with pytest.raises(InputError, match=f"diagnose.known: found {label}, expected rotor_inertia@knee or "):
+        diagnose(session(seconds=10.0), known=[label])
