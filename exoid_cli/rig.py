@@ -25,7 +25,7 @@ def rig(
     ] = None,
     sample_rate_hz: Annotated[
         float | None,
-        typer.Option("--rate-hz", "--sample-rate-hz", min=1.0, help="Samples a second; else the plant's."),
+        typer.Option("--rate-hz", "--sample-rate-hz", min=1.0, max=1e5, help="Samples a second; else the plant's."),
     ] = None,
     bind: Annotated[str, typer.Option(help="Address to listen on.")] = LOOPBACK,
     anyone: Annotated[bool, typer.Option("--anyone", help="Allow a --bind that other computers can reach.")] = False,

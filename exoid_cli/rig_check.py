@@ -27,7 +27,9 @@ def check(
     config: ConfigOption = None,
     rate_hz: Annotated[
         float | None,
-        typer.Option(min=1.0, help="Samples a second that are wanted.", show_default="that of exoid.toml, if any"),
+        typer.Option(
+            min=1.0, max=1e5, help="Samples a second that are wanted.", show_default="that of exoid.toml, if any"
+        ),
     ] = None,
     run: Annotated[
         Literal["exo_alone", "with_human"],
@@ -100,6 +102,7 @@ def _show(report: "RigReport") -> None:
         ]
         headings = ("joint", "angle per set-point", "delay ms", "torque with speed")
         console.table(headings, rows, numbers=", ".join(headings[1:]))
+        console.note("The scale of the torque shows in no movement: hold a known weight, see docs/rig-check.md.")
     for what, rate in (("all devices", report.together), ("the drives alone", report.drives_alone)):
         if rate:
             _show_rate(what, rate, report.rate_hz)

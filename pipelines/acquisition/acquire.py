@@ -27,8 +27,8 @@ from pipelines.acquisition.plan import check_start, check_trajectory, make_plan
 from pipelines.acquisition.recorded import account_of, place_for, write_recording
 from pipelines.acquisition.rehearsal import refuse_unkept_rate
 from pipelines.acquisition.resolution import refuse_coarse_set_points
+from pipelines.acquisition.same_place import refuse_misplaced_set_points
 from pipelines.acquisition.sampling import sampling_of
-from pipelines.acquisition.signs import refuse_mirrored_set_points
 from pipelines.acquisition.somebody import refuse_unguarded
 from pipelines.acquisition.states import State, Supervisor
 from pipelines.contracts import RECORDING
@@ -104,7 +104,7 @@ def acquire(
         check_trajectory(rig, trajectory, run.duration_s, sample_rate_hz)
     with about(rig_path):
         refuse_coarse_set_points(rig, sample_rate_hz)
-        refuse_mirrored_set_points(rig)
+        refuse_misplaced_set_points(rig)
     if rig.clock == "real_time":
         with about(rig_path):
             for refuse in refusals(with_sensors=run.run == "with_human"):

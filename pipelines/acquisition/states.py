@@ -12,6 +12,7 @@ from math import copysign, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.acquisition.agreement import Agreement
 from pipelines.acquisition.counter import RATE_TOLERANCE
 from pipelines.acquisition.cuffs import Cuffs
 from pipelines.acquisition.drive import Condition, Reading
@@ -102,6 +103,8 @@ class Supervisor:
         self._told = [Told() for _ in rig.drive]
         self._streams = [Stream(rig, j, sample_rate_hz, told) for j, told in enumerate(self._told)]
         self._records = [Stream(rig, j, sample_rate_hz, told) for j, told in enumerate(self._told)]
+        recorded_hz = sample_rate_hz * self.samples_per_cycle
+        self._agreements = [Agreement(rig.label_of(drive), recorded_hz) for drive in rig.drive]
         self._speed = np.zeros_like(self.sent)
         """(J,) rad/s at which set-points move: a stop slows down from there, the way back to the plan begins there."""
         self._pace = np.zeros_like(self.sent)
@@ -405,8 +408,12 @@ class Supervisor:
         if why := next(filter(None, heeded), None):
             raise DeviceError(why)
         kept = []
-        for stream, newest, samples in zip(self._records, row.drives, records, strict=True):
+        of_drives = zip(self._records, self._agreements, row.drives, records, strict=True)
+        for stream, agreement, newest, samples in of_drives:
+            agreement.tell(newest)
             kept.append([found for found in samples if stream.take(found, now)])
+            for found in kept[-1]:
+                agreement.judge(found)
             stream.refuse_to_fall_behind(newest.sequence)
         return kept
 

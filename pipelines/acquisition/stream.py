@@ -169,9 +169,11 @@ class Stream:
             )
         told = 0.5 * (before.velocity + found.velocity)
         if samples == 1 and abs(speed - told) > SPEED_SHARE * limit:
+            mirrored = abs(speed + told) < SPEED_SHARE * abs(speed)
             return (
                 f"{self._label}: its angle went on at {speed:.3f} rad/s while it told a speed of {told:.3f} rad/s; "
-                f"{self._or_else(found)}check the encoder, or the registers of angle and velocity in the rig file"
+                f"{self._or_else(found)}{'turn the sign of one of the two, or ' if mirrored else ''}check the encoder, "
+                "or the registers of angle and velocity in the rig file"
             )
         return None
 

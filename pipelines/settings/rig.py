@@ -218,6 +218,11 @@ class DriveMap(Settings):
     identity: tuple[Identity, ...] = Field((), description="What tells the right device from a wrong one.")
     read: DriveRead = Field(description="Block that is read.")
     write: DriveWrite = Field(description="Block that is written as a whole, without gaps.")
+    own_scale: bool = Field(
+        False,
+        description="Set-points mean the same place as angles though their scale or offset is another; else that is "
+        "taken for a slip, and refused.",
+    )
     enable: int = Field(1, description="Control word that makes the drive follow its set-point.")
     disable: int = Field(0, description="Control word that takes the torque away.")
     halt: int | None = Field(None, description="Control word that holds the leg where a stop has led it; else enable.")

@@ -136,9 +136,9 @@ def record(tmp_path, excitation, rig_file, serve):
         duration_s=1.0, run="exo_alone", seed=0, fault=None, served_as=None, believed=None, rate_hz=200.0, **changes
     ):
         """``believed`` are changes of the rig file that acquisition reads, not of the rig that is there."""
-        port = free_port()
-        rig = rig_file(port=port, **changes)
-        seen = rig_file(port=port, replace=believed, **changes) if believed else rig
+        port, replace = free_port(), changes.pop("replace", None) or {}
+        rig = rig_file(port=port, replace=replace, **changes)
+        seen = rig_file(port=port, replace=replace | believed, **changes) if believed else rig
         settings = RunSettings(name="test", run=run, purpose="train", duration_s=duration_s, seed=seed)
         output = tmp_path / "test.parquet"
         with serve(rig, port, run, seed, fault) as served:

@@ -312,3 +312,18 @@ def test_a_record_is_drained_in_each_cycle_beside_the_set_points():
     begun, brought = asyncio.run(run())
     assert begun == list(range(0, 100, 10))
     assert brought == begun[:-1]
+
+
+RING_CURRENT = 'current = { address = 7, type = "int16", scale = 1.0'
+RING_ANGLE = 'angle = { address = 4, type = "int32", scale = 1e-6'
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "what"),
+    [(RING_CURRENT, RING_CURRENT.replace("1.0", "-1.0"), "torque"),
+     (RING_CURRENT, RING_CURRENT.replace("1.0", "0.5"), "torque"),
+     (RING_ANGLE, f"{RING_ANGLE}, offset = 0.05", "angle")],
+)  # fmt: skip
+def test_a_record_that_contradicts_the_exchanges_of_its_samples_ends_the_run(record, right, wrong, what):
+    with pytest.raises(DeviceError, match=rf"tells {what} .* while its own record holds"):
+        record(shipped="recorder", replace=LOCKSTEP, believed={right: wrong})

@@ -14,6 +14,7 @@ from pipelines.acquisition.drive import Reading
 from pipelines.acquisition.plan import make_plan
 from pipelines.acquisition.row import Row
 from pipelines.acquisition.safety import HOLD_SAMPLES, Limits, refuse_leap, slowed
+from pipelines.acquisition.same_place import refuse_misplaced_set_points
 from pipelines.contracts import RECORDING
 from pipelines.contracts.beside import journal_of
 from pipelines.errors import DeviceError, ExoidError, InputError, SettingsError
@@ -446,3 +447,30 @@ def test_a_drive_that_would_be_sent_to_the_mirror_image_of_where_it_stands_is_re
         record(served_as=served, replace={written: written.replace("1e-6", "-1e-6")})
     assert "write.reference.scale: found -1e-06 with 1e-06 of read.angle" in str(caught.value)
     assert not any(drive.servo.enabled for drive in served[0].rig.drives)
+
+
+WRITTEN = 'reference = { address = 200, type = "int32", scale = 1e-6, unit = "rad" }'
+IN_FLOATS = 'reference = { address = 200, type = "float32", unit = "rad" }'
+IN_DEGREES = 'reference = { address = 200, type = "int32", scale = 1e-4, unit = "deg" }'
+
+
+@pytest.mark.parametrize(
+    ("written", "found"),
+    [(WRITTEN.replace("1e-6", "4e-6"), "scale: found 4e-06 with 1e-06"),
+     (WRITTEN.replace("unit", "offset = 0.05, unit"), "offset: found 0.05 rad with 0 rad"),
+     (IN_DEGREES.replace("unit", "offset = 3.0, unit"), "offset: found 0.0523599 rad with 0 rad")],
+)  # fmt: skip
+def test_a_drive_that_would_be_sent_elsewhere_than_where_it_stands_is_refused_unless_that_is_meant(
+    rig_file, written, found
+):
+    with pytest.raises(
+        SettingsError, match=f"map.drive.servo.write.reference.{found} of read.angle, expected the same"
+    ):
+        refuse_misplaced_set_points(load_rig(rig_file(replace={WRITTEN: written})))
+    meant = {WRITTEN: written, "enable = 0x000F": "own_scale = true\nenable = 0x000F"}
+    refuse_misplaced_set_points(load_rig(rig_file(replace=meant)))
+
+
+@pytest.mark.parametrize("written", [WRITTEN, IN_FLOATS, IN_DEGREES])
+def test_set_points_may_be_counted_in_another_width_or_unit_than_angles(rig_file, written):
+    refuse_misplaced_set_points(load_rig(rig_file(replace={WRITTEN: written})))

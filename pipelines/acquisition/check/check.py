@@ -16,7 +16,7 @@ from pipelines.acquisition.embedded import embedded
 from pipelines.acquisition.feasible import refusals
 from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.pace import urgent
-from pipelines.acquisition.signs import mirrored_set_points
+from pipelines.acquisition.same_place import misplaced_set_points
 from pipelines.acquisition.somebody import refuse_seldom_read
 from pipelines.errors import DeviceError, InputError, SettingsError
 from pipelines.settings.acquire import RunSettings
@@ -113,7 +113,7 @@ async def _check(
     try:
         report = await look(machine, rate_hz, alone=alone)
         report.findings += unfit(rig, rate_hz)
-        report.findings += [Finding("rig", why) for why in mirrored_set_points(rig)]
+        report.findings += [Finding("rig", why) for why in misplaced_set_points(rig)]
         if operator and all(device.latency for device in report.devices):
             report.by_hand = True
             try:

@@ -8,6 +8,7 @@ from pipelines.acquisition.check import guided
 from pipelines.errors import DeviceError
 
 READ = 'angle = { address = 104, type = "int32", scale = 1e-6, unit = "rad" }'
+ENABLE = "enable = 0x000F"
 WRITE = 'reference = { address = 200, type = "int32", scale = 1e-6, unit = "rad" }'
 CURRENT = 'current = { address = 108, type = "int32", scale = 0.1, unit = "mA" }'
 VELOCITY = 'velocity = { address = 106, type = "int32", scale = 1e-5, unit = "rad/s" }'
@@ -42,7 +43,11 @@ def test_a_right_rig_answers_its_set_points(checked):
             "its angle goes against its set-point",
         ),
         ({}, {CURRENT: CURRENT.replace("0.1", "-0.1")}, "its torque goes against its speed"),
-        ({}, {WRITE: WRITE.replace("1e-6", "2e-6")}, "times as far as its set-point: unit or scale of"),
+        (
+            {},
+            {WRITE: WRITE.replace("1e-6", "2e-6"), ENABLE: f"own_scale = true\n{ENABLE}"},
+            "times as far as its set-point: unit or scale of",
+        ),
     ],
     ids=["sign of the angle", "sign of the current", "scale of the set-point"],
 )
