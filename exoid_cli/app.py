@@ -7,6 +7,7 @@ by SIGHUP, SIGQUIT and SIGTERM.
 import errno
 import glob
 import io
+import logging
 import os
 import sys
 import tempfile
@@ -111,6 +112,8 @@ def main() -> NoReturn:
     """Run exoid as the shell's command."""
     if not (sys.warnoptions or os.environ.get("EXOID_DEBUG")):
         warnings.simplefilter("ignore")  # of Python's libraries, about exoid's own lines: the tests heed them
+        # A signal that falls into one of several requests at once is told as what ended exoid, and by asyncio as well.
+        logging.getLogger("asyncio").setLevel(logging.CRITICAL)
     signals.heed()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):

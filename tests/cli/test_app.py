@@ -149,13 +149,19 @@ def test_what_a_device_did_is_told_with_its_exit_code_however_many_signals_come_
 
 
 MISTAKEN = """
-import ctypes, os, signal
+import asyncio, ctypes, os, signal
 from exoid_cli import app
 from pipelines.errors import DeviceError
 
 def interrupt():
     os.kill(os.getpid(), signal.SIGINT)
     signal.pause()
+
+async def request():
+    interrupt()
+
+async def several():
+    await asyncio.gather(request(), asyncio.sleep(1.0))
 
 @app.app.command("compile")
 def compiles(how: str):
@@ -166,6 +172,8 @@ def compiles(how: str):
             raise ImportError("a part of it is missing")
     if how == "executing":
         exec("interrupt()")
+    if how == "awaiting":
+        asyncio.run(several())
     ctypes.CFUNCTYPE(None)(interrupt)()  # as LLVM calls back at the end of a compilation
     raise DeviceError("made up") if how == "moving" else RuntimeError("no compiled object yet")
 
@@ -179,10 +187,11 @@ app.main()
         ("importing", 130, "exoid: stopped by Ctrl-C\n"),
         ("executing", 130, "exoid: stopped by Ctrl-C\n"),
         ("compiling", 130, "exoid: stopped by Ctrl-C\n"),
+        ("awaiting", 130, "exoid: stopped by Ctrl-C\n"),
         ("moving", 3, "exoid: made up\n"),  # what a device did is true nevertheless
     ],
 )
-def test_what_an_import_or_the_compiler_makes_of_ctrl_c_is_told_as_ctrl_c(tmp_path, how, code, line):
+def test_what_an_import_the_compiler_or_asyncio_makes_of_ctrl_c_is_told_as_ctrl_c(tmp_path, how, code, line):
     (tmp_path / "mistaken.py").write_text(MISTAKEN)
     command = [sys.executable, "-m", "mistaken", "compile", how]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
