@@ -280,5 +280,7 @@ def test_when_the_host_is_killed_the_drives_stop_the_leg_and_disable_themselves(
     again = start([*arguments[:-1], tmp_path / "two.parquet", "--reset-faults"])
     _, err = again.communicate(timeout=60)
     assert again.returncode == 0
-    # On a busy computer a run in real time may miss a sample, and tells so: no fault of a drive is left to tell.
-    assert all("samples were missed" in line for line in err.splitlines()), err
+    # On a busy computer a run in real time may miss a sample or leave a set-point out, and tells so: no fault of a
+    # drive is left to tell.
+    missed = "samples were missed", "set-points were left out"
+    assert all(any(words in line for words in missed) for line in err.splitlines()), err
