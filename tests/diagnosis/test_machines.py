@@ -11,6 +11,7 @@ from pipelines.contracts.joints import Joint
 from pipelines.diagnosis.candidate_table import candidates
 from pipelines.diagnosis.candidates import proposals
 from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.observations import Baseline
 from pipelines.diagnosis.verdict import verdict
 from pipelines.dynamics.assembly import assemble
 from pipelines.effects.backlash import Backlash
@@ -35,7 +36,7 @@ def motions(machine, **hidden):
 
 
 def labels(machine):
-    return {effect.label for effect in proposals(machine, ("exo_alone",))}
+    return {effect.label for effect in proposals(Baseline(("exo_alone",), machine, cuffs=False), ("exo_alone",))}
 
 
 @pytest.fixture(scope="module")
@@ -123,7 +124,7 @@ def test_only_what_a_machine_can_have_and_show_is_a_candidate():
 
 def test_ranges_go_with_the_machine_and_a_leg_keeps_its_own():
     (arm, _), (axis, _) = (on_one_scale(motions(machine)) for machine in (pendulum, slide))
-    by_label = {e.label: e for e in proposals(axis.machine, ("exo_alone",))}
+    by_label = {e.label: e for e in proposals(Baseline(("exo_alone",), axis.machine, cuffs=False), ("exo_alone",))}
     low, high = by_label["parallel_spring@axis"].linear[0].typical
     assert by_label["parallel_spring@axis"].linear[0].unit == "N/m"
     assert low > 20.0 and high / low == pytest.approx(20.0)
