@@ -60,6 +60,14 @@ class OneRun(_Object):
     """Null of what was learnt from its run alone, all else held; files of older versions lack it."""
 
 
+class Known(_Object):
+    """What was told to be there, and is part of the baseline."""
+
+    effect: str
+    joint: str | None
+    parameters: list[Parameter]
+
+
 class Cause(_Object):
     """One named cause."""
 
@@ -164,6 +172,8 @@ class Verdict(_Object):
     reversals: list[Reversal] = []
     """Files of older versions lack it."""
     units: dict[str, dict[str, str]]
+    known: list[Known] = []
+    """Files of older versions lack it."""
     causes: list[Cause]
     data_faults: list[Fault]
     residual: Residual | None
