@@ -41,7 +41,8 @@ class Machine:
         self.drives = [Drive(rig, settings, line_of(settings), samples_per_cycle) for settings in rig.drive]
         self.sensors = [Sensor(rig, settings, line_of(settings)) for settings in rig.sensor] if with_sensors else []
         self.samples_per_cycle = samples_per_cycle
-        self._latches = rig.sampling == "cyclic" and rig.clocks == "common"
+        self.latches = rig.sampling == "cyclic" and rig.clocks == "common"
+        """Whether a cycle brings one sample that all drives latched at the same instant."""
         self._parts: list[Drive | Sensor] = [*self.drives, *self.sensors]
         self.no_force = np.full((len(CUFFS), 3), np.nan)
         self.leads = [0 for _ in self.drives]
@@ -170,7 +171,7 @@ class Machine:
             forces = await self.felt(number)
         readings = [answer for answer in told if isinstance(answer, Reading)]
         whole = len(readings) == len(told)
-        if whole and self._latches:
+        if whole and self.latches:
             whole = await self._latch(readings)
             told = list(readings)
         row = Row(tuple(readings), forces, self.samples_per_cycle) if whole else None

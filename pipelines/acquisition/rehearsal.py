@@ -30,12 +30,11 @@ async def refuse_unkept_rate(machine: Machine, cycle_hz: float) -> None:
     late = await _late(machine, cycle_hz, cycles)
     if late <= MOST_LATE * cycles:
         return
-    remedies = ["lower acquire.sample_rate_hz", "close what else this computer does"]
-    if machine.sensors:
-        remedies.insert(1, "raise `every` of the sensors")
+    less_often = ", raise `every` of the sensors" if machine.sensors else ""
     raise DeviceError(
         f"{late} of {cycles} cycles in which every device was asked took longer than the {1e3 / cycle_hz:g} ms from "
-        f"one set-point to the next; {', '.join(remedies[:-1])}, or {remedies[-1]}; nothing was moved"
+        f"one set-point to the next; lower acquire.sample_rate_hz{less_often}, or close what else this computer does; "
+        "nothing was moved"
     )
 
 

@@ -234,11 +234,11 @@ class Streams:
 
 def sources_of(machine: Machine, cycle_hz: float) -> list[Recorded | Cycled]:
     """Return where each drive's samples come from, where they are not kept as the cycle brings them; else nothing."""
-    rig, period = machine.rig, 1.0 / (cycle_hz * machine.samples_per_cycle)
-    if rig.sampling == "recorder":
-        return [Recorded(drive) for drive in machine.drives]
-    if rig.clocks == "common":
+    if machine.latches:
         return []
+    if machine.rig.sampling == "recorder":
+        return [Recorded(drive) for drive in machine.drives]
+    period = 1.0 / (cycle_hz * machine.samples_per_cycle)
     return [Cycled(drive, period, looks_again=j > 0) for j, drive in enumerate(machine.drives)]
 
 
@@ -250,7 +250,7 @@ def sampling_of(machine: Machine, cycle_hz: float, judge: Judge) -> Sampling:
     DeviceError
         Where the lines are too slow to tell which samples belong together.
     """
-    if not sources_of(machine, cycle_hz):
+    if machine.latches:
         return Latched()
     if machine.rig.clocks == "common" and machine.leads_are_vague:
         raise DeviceError(

@@ -103,9 +103,10 @@ def proposals(baseline: Baseline, kinds: Sequence[str]) -> Iterator[Effect]:
         if effect.name in BASELINE or not set(effect.acts_in) & set(kinds):
             continue
         for joint in effect.possible(machine):
-            if effect(joint=joint, on=machine).label in known:
+            plain = effect(joint=joint, on=machine)
+            if plain.label in known:
                 continue
-            yield effect(joint=joint, on=machine)
+            yield plain
             if effect.may_differ and len(kinds) > 1:
                 yield effect(joint=joint, on=machine, each_run=True)
             if effect.name in WORN and "with_human" in kinds:

@@ -24,9 +24,9 @@ def known_effects(labels: Sequence[str], machine: Machine) -> tuple[Effect, ...]
 
 
 def _known(label: str, machine: Machine) -> Effect:
-    told, joint = type(effect_labelled(label)), label.partition("@")[2] or None
-    if _fits(told) and joint in told.possible(machine):
-        return told(joint=joint, on=machine)
+    told = effect_labelled(label)
+    if _fits(type(told)) and told.joint in told.possible(machine):
+        return type(told)(joint=told.joint, on=machine)
     can_be = [one(joint=place, on=machine).label for one in EFFECTS if _fits(one) for place in one.possible(machine)]
     raise InputError(
         f"diagnose.known: found {label}, expected {' or '.join(can_be) or 'nothing'}; correct it or leave it out"
