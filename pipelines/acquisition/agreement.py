@@ -9,6 +9,7 @@ from math import copysign, isfinite, sqrt
 
 from pipelines.acquisition.drive import Reading
 from pipelines.errors import DeviceError
+from pipelines.settings.rig import RigSettings
 
 MOST_HELD = 1000
 """Exchanges that wait for the record of their sample; a run that falls further behind is stopped."""
@@ -25,8 +26,10 @@ NEAR_RAD = 1e-3
 class Agreement:
     """Holds one drive's record against what exchanges brought of the same samples."""
 
-    def __init__(self, label: str, rate_hz: float) -> None:
-        self._label, self._rate_hz = label, rate_hz
+    def __init__(self, rig: RigSettings, joint: int, rate_hz: float) -> None:
+        """Judge the record of a joint's drive, which holds samples at a rate."""
+        drive = rig.drive[joint]
+        self._label, self._where, self._rate_hz = rig.label_of(drive), f"map.drive.{drive.map}", rate_hz
         self._exchanged: OrderedDict[int, Reading] = OrderedDict()
         self._compared, self._xx, self._xy, self._yy = 0, 0.0, 0.0, 0.0
 
@@ -60,5 +63,6 @@ class Agreement:
         name = "current" if what == "torque" else what
         return (
             f"{self._label}: tells {what} {exchanged:.4g} {unit} of sample {sequence}, while its own record holds "
-            f"{recorded:.4g} {unit}; correct scale, sign and offset of read.{name} or ring.record.{name} in map.drive"
+            f"{recorded:.4g} {unit}; correct scale, sign and offset of {self._where}.read.{name} or "
+            f"{self._where}.ring.record.{name}"
         )

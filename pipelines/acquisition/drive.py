@@ -5,6 +5,7 @@ import time
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 
@@ -33,6 +34,8 @@ WATCH_S = 0.5
 """How long a drive is watched that may be enabled before the run: whoever drives it tells it something meanwhile."""
 DRIVEN_RAD = 0.005
 """How far the angle of a drive goes in that time that somebody moves."""
+COUNTED_WITH = ("sequence", "time", "status", "velocity", "temperature", "reference")
+"""What a drive tells that must be a number."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -329,8 +332,8 @@ class Drive:
 
     def _numbers(self, told: Mapping[str, float]) -> Mapping[str, float]:
         """Refuse what is no number where that is counted with, or would mean that the drive does not tell it."""
-        for name in ("sequence", "time", "status", "velocity", "temperature", "reference"):
-            if not np.isfinite(told.get(name, 0.0)):
+        for name in COUNTED_WITH:
+            if not isfinite(told.get(name, 0.0)):
                 raise DeviceError(
                     f"{self.device.label}: its {name} is {told[name]}, expected a number; compare the register map in "
                     "the rig file with the device's manual"
@@ -348,7 +351,7 @@ class Drive:
 
     def _condition(self, status: float) -> Condition:
         """Return what a status word tells; of one that is no number nothing."""
-        if not np.isfinite(status):
+        if not isfinite(status):
             return Condition()
         enabled = self._is_enabled(int(status)) if self.map.enabled_mask else None
         return Condition(enabled=enabled, fault=self._fault(int(status)))

@@ -1,6 +1,7 @@
 """What may be measured, what may be sent, and how set-points slow down."""
 
 from collections.abc import Sequence
+from math import isnan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,7 +97,7 @@ def sample_violation(drive: DriveSettings, before: Reading, found: Reading, samp
     if not low <= found.angle <= high:
         return f"{drive.joint} angle {found.angle:.3f} rad is outside its limits {low:g} to {high:g} rad"
     speed = found.velocity
-    if np.isnan(speed):
+    if isnan(speed):
         # The drive tells no speed: what the angle did since the last sample.
         speed = (found.angle - before.angle) * samples_hz / max(found.sequence - before.sequence, 1)
     # Written so that a NaN breaks every limit.
@@ -124,6 +125,11 @@ def refuse_leap(drive: DriveSettings, last: float, reference: float, allowed_s: 
             f"{drive.joint}: a set-point of {reference:.3f} rad was due after {last:.3f} rad with {allowed_s:.3f} s to "
             f"get there, faster than its limit of {drive.speed_rad_s:g} rad/s; it was not sent"
         )
+
+
+def clamped(value: float, low: float, high: float) -> float:
+    """Return what is nearest to a value within bounds; NaN stays NaN."""
+    return min(max(value, low), high)  # in this order: what a NaN is compared with does not take its place
 
 
 def slowed(reference: float, speed: float, deceleration: float, time_s: float) -> tuple[float, float]:

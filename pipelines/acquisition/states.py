@@ -19,7 +19,7 @@ from pipelines.acquisition.drive import Condition, Reading
 from pipelines.acquisition.frozen import ANSWER_CYCLES, Told
 from pipelines.acquisition.plan import Plan
 from pipelines.acquisition.row import Answers, Row
-from pipelines.acquisition.safety import HOLD_SAMPLES, Limits, refuse_leap, slowed
+from pipelines.acquisition.safety import HOLD_SAMPLES, Limits, clamped, refuse_leap, slowed
 from pipelines.acquisition.stream import Stream
 from pipelines.errors import DeviceError, Unanswered
 from pipelines.mechanics.motion import CUFFS
@@ -104,7 +104,7 @@ class Supervisor:
         self._streams = [Stream(rig, j, sample_rate_hz, told) for j, told in enumerate(self._told)]
         self._records = [Stream(rig, j, sample_rate_hz, told) for j, told in enumerate(self._told)]
         recorded_hz = sample_rate_hz * self.samples_per_cycle
-        self._agreements = [Agreement(rig.label_of(drive), recorded_hz) for drive in rig.drive]
+        self._agreements = [Agreement(rig, j, recorded_hz) for j in range(len(rig.drive))]
         self._speed = np.zeros_like(self.sent)
         """(J,) rad/s at which set-points move: a stop slows down from there, the way back to the plan begins there."""
         self._pace = np.zeros_like(self.sent)
@@ -245,12 +245,12 @@ class Supervisor:
         drive, sent, silent_s = self.rig.drive[joint], self.sent[joint], now - self.sent_at[joint]
         if self.rig.map.drive[drive.map].read.reference is not None:
             reach = drive.speed_rad_s * silent_s
-            place = np.clip(reading.reference, sent - reach, sent + reach)
+            place = clamped(reading.reference, sent - reach, sent + reach)
         else:  # its leg lags behind one that holds, and is ahead with one that goes on
-            place = np.clip(reading.angle, *sorted((sent, sent + self._pace[joint] * silent_s)))
+            place = clamped(reading.angle, *sorted((sent, sent + self._pace[joint] * silent_s)))
         speed = (place - sent) / silent_s if np.isnan(reading.velocity) else reading.velocity
         self.base[joint] = self._in_force[joint] = place
-        self._speed[joint] = np.clip(speed, *sorted((0.0, self._speed[joint])))
+        self._speed[joint] = clamped(speed, *sorted((0.0, self._speed[joint])))
         goes_on = (place - sent) * self._pace[joint] > self._nearest[joint] * abs(self._pace[joint])
         cycle = float(reading.sequence - self._ahead[joint]) / self.samples_per_cycle
         self._goes_on_since[joint] = cycle if goes_on and self.rig.clock != "lockstep" else None
@@ -490,7 +490,7 @@ class Supervisor:
         """Let a drive's set-point (rad) pass, as near to ``path`` as its limits allow by now."""
         drive, sent = self.rig.drive[joint], self.sent[joint]
         reach = drive.speed_rad_s * self._allowed_s(joint, now)
-        reference = float(np.clip(np.clip(path, sent - reach, sent + reach), *drive.angle_rad))
+        reference = clamped(clamped(path, sent - reach, sent + reach), *drive.angle_rad)
         refuse_leap(drive, self.base[joint], reference, 1.0 / self.rate)
         return self._send(joint, reference, speed, now)
 
@@ -568,8 +568,8 @@ class Supervisor:
         softly = min(abs(lag) * self.rate, sqrt(deceleration * abs(lag)))
         change = max(deceleration, abs(along - was) * self.rate) * took_s
         fastest = max(abs(along), WALK * drive.speed_rad_s)
-        speed = float(np.clip(along + copysign(softly, lag), moves - change, moves + change))
-        speed = float(np.clip(speed, -fastest, fastest))
+        speed = clamped(along + copysign(softly, lag), moves - change, moves + change)
+        speed = clamped(speed, -fastest, fastest)
         on_plan = abs(lag) < NO_LAG_RAD and speed == along
         reference = base + (due - before if on_plan else speed * took_s)
         self._refuse_to_lag(joint, abs(due - reference))
@@ -641,7 +641,7 @@ class Supervisor:
         """Note the set-point (rad) that a drive is sent now, and how fast it moves, rad/s; return it."""
         taken = abs(reference - self.sent[joint]) / self.rig.drive[joint].speed_rad_s
         ahead = self._lead[joint] + taken - self._elapsed_s(joint, now)
-        self._lead[joint] = np.clip(ahead, 0.0, SLACK_SAMPLES / self.rate)
+        self._lead[joint] = clamped(ahead, 0.0, SLACK_SAMPLES / self.rate)
         self._pace[joint] = (reference - self.sent[joint]) / max(now - self.sent_at[joint], 1.0 / self.rate)
         self.sent[joint] = self.base[joint] = reference
         self.sent_at[joint], self._speed[joint] = now, speed

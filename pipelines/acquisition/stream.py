@@ -78,8 +78,8 @@ class Stream:
         if newest - last > self._most + MOST_REGISTERS["read"]:
             raise DeviceError(
                 f"watchdog: {self._label} is at sample {newest}, but its record brought none after {last}, allowed are "
-                f"{self._patience.longest_s:g} s; the record stands still, its answers are lost, or its registers are "
-                "not those in map.drive's ring"
+                f"{self._patience.longest_s:g} s; the record stands still, its answers are lost, its registers are not "
+                "those in map.drive's ring, or this computer is too busy"
             )
 
     def refuse_count(self, count: int) -> None:

@@ -6,8 +6,11 @@ import pytest
 from pipelines.acquisition.agreement import COMPARED, Agreement
 from pipelines.acquisition.drive import Reading
 from pipelines.errors import DeviceError
+from pipelines.settings import datasets
+from pipelines.settings.rig import load_rig
 
 RATE_HZ = 1000.0
+RIG = load_rig(datasets() / "rigs" / "recorder.toml")
 
 
 def reading(k, angle=0.0, torque=0.0, velocity=0.0):
@@ -15,7 +18,7 @@ def reading(k, angle=0.0, torque=0.0, velocity=0.0):
 
 
 def judged(recorded_torque, exchanged_torque=lambda k: 10.0 * np.sin(0.1 * k), count=3 * COMPARED):
-    agreement = Agreement("drive hip", RATE_HZ)
+    agreement = Agreement(RIG, 0, RATE_HZ)
     for k in range(count):
         agreement.tell(reading(k, torque=exchanged_torque(k)))
         agreement.judge(reading(k, torque=recorded_torque(k)))
@@ -24,7 +27,8 @@ def judged(recorded_torque, exchanged_torque=lambda k: 10.0 * np.sin(0.1 * k), c
 @pytest.mark.parametrize("factor", [-1.0, 0.5, 2.0, 0.0])
 def test_a_record_of_currents_of_another_sign_or_scale_ends_the_run(factor):
     with pytest.raises(
-        DeviceError, match=r"drive hip: tells torque .* N·m of sample 49, while its own record holds .*current"
+        DeviceError,
+        match=r"drive hip.*: tells torque .* N·m of sample 49, while its own record holds .*record\.current",
     ):
         judged(lambda k: factor * 10.0 * np.sin(0.1 * k))
 
@@ -41,7 +45,7 @@ def test_of_a_torque_that_is_hardly_there_or_is_not_recorded_nothing_is_said():
 
 
 def test_an_angle_of_another_zero_ends_the_run_and_one_that_was_latched_a_sample_later_does_not():
-    agreement = Agreement("drive hip", RATE_HZ)
+    agreement = Agreement(RIG, 0, RATE_HZ)
     agreement.tell(reading(1, angle=0.3, velocity=2.0))
     agreement.judge(reading(1, angle=0.302))
     agreement.tell(reading(2, angle=0.3))

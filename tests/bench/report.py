@@ -28,7 +28,9 @@ def show(title: str, rows: Iterable[Row]) -> None:
     for heading in ("", "measured", "ratio", "asked for"):
         table.add_column(heading, justify="right" if heading == "ratio" else "left")
     before = os.getloadavg()[0]
-    for row in rows:
-        table.add_row(row.name, row.value, f"{row.ratio:.1f}" if row.ratio else "", row.wanted)
-    CONSOLE.print(table)
+    try:
+        for row in rows:
+            table.add_row(row.name, row.value, f"{row.ratio:.1f}" if row.ratio else "", row.wanted)
+    finally:  # some of it took long
+        CONSOLE.print(table)
     CONSOLE.print(f"load {before:.1f} before, {os.getloadavg()[0]:.1f} after, of {os.cpu_count()} cores\n")

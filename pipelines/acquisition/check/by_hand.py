@@ -8,9 +8,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.acquisition.check.agreement import check_velocity
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.probe import Probe, Series
+from pipelines.acquisition.check.velocity import check_velocity
 from pipelines.acquisition.check.zeros import AXES
 from pipelines.acquisition.drive import Drive
 from pipelines.settings.rig import DIMENSION, UNITS, RigSettings

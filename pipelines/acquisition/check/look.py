@@ -6,7 +6,6 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
-from pipelines.acquisition.check.agreement import check_velocity
 from pipelines.acquisition.check.clock import Clock, check_clock, check_latch, measure_clock
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.guided import Answer
@@ -15,6 +14,7 @@ from pipelines.acquisition.check.plausible import check_registers
 from pipelines.acquisition.check.probe import Probe, Series
 from pipelines.acquisition.check.rate import Rate, check_rate, cycles
 from pipelines.acquisition.check.rings import check_rings
+from pipelines.acquisition.check.velocity import check_velocity
 from pipelines.acquisition.check.zeros import check_zeros
 from pipelines.acquisition.counter import RATE_TOLERANCE
 from pipelines.acquisition.drive import Drive

@@ -4,10 +4,10 @@ import asyncio
 import time
 from collections.abc import Sequence
 
+from pipelines.acquisition.agreement import Agreement
 from pipelines.acquisition.check.finding import Finding
-from pipelines.acquisition.check.plausible import STEP_RAD
 from pipelines.acquisition.check.probe import Probe
-from pipelines.acquisition.drive import Drive, Reading
+from pipelines.acquisition.drive import Drive
 from pipelines.acquisition.frozen import Told
 from pipelines.acquisition.machine import Machine
 from pipelines.acquisition.stream import Stream
@@ -44,32 +44,27 @@ async def check_rings(machine: Machine, probes: Sequence[Probe], rate_hz: float 
 
 async def _judged(machine: Machine, j: int, drive: Drive, drives: Sequence[Probe], cycle_hz: float) -> str | None:
     """Return what is wrong with one drive's record."""
-    told, told_by_block, records = Told(), dict[int, Reading](), list[Reading]()
+    told, begun = Told(), False
     stream = Stream(machine.rig, j, cycle_hz, told)
+    agreement = Agreement(machine.rig, j, cycle_hz * machine.samples_per_cycle)
     await drive.empty_record()
     for _ in range(DRAINS):
         await asyncio.gather(*(probe.step() for probe in drives))
         reading = await drive.look()
-        told_by_block[reading.sequence] = reading
+        agreement.tell(reading)
         try:
             found = await drive.drain(reading.sequence)
         except DeviceError as error:
             return f"its record cannot be drained ({error}); compare {_where(drive)} with the device's manual"
         for record in found:
             told.tell(record.sequence, record.reference)  # nobody sends any
-            records += [record] if stream.take(record, time.monotonic()) else []
+            agreement.judge(record)
+            begun |= stream.take(record, time.monotonic())
         await asyncio.sleep(0.0 if drive.in_lockstep else 1.0 / cycle_hz)
     for probe in drives:
         probe.taken()
-    if not records:
+    if not begun:
         return f"its record brought no sample in {DRAINS} cycles; compare {_where(drive)} with the device's manual"
-    for record in records:
-        block = told_by_block.get(record.sequence)
-        if block and abs(record.angle - block.angle) > STEP_RAD:
-            return (
-                f"its record tells angle {record.angle:.4g} rad of a sample of which read tells {block.angle:.4g} rad; "
-                f"compare {_where(drive)}.record with the device's manual"
-            )
     return None
 
 

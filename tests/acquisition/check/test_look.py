@@ -50,7 +50,7 @@ def test_nothing_is_said_of_a_rig_whose_drives_record_faster_than_they_are_told(
 @pytest.mark.parametrize(
     ("was", "believed", "words"),
     [
-        (RECORDED, RECORDED.replace("1e-6", "2e-6"), "its record tells angle"),
+        (RECORDED, RECORDED.replace("1e-6", "2e-6"), "while its own record holds"),
         ("address = 1000", "address = 1010", "its record brought no sample in 40 cycles"),
     ],
 )
