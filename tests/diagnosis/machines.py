@@ -75,3 +75,16 @@ def slide(purpose, seed, asymmetry=0.0, seconds=25.0):
     time, x, force = moved(reference, rate, 2e5, 6e3, acceleration, seconds)
     noise = np.random.default_rng(seed).normal(0, 0.5, len(time))
     return table(time, x, force + noise, {"name": "axis", "kind": "prismatic"}, purpose)
+
+
+def lift(purpose, seed, spring=0.0, seconds=25.0):
+    """A lift of 12 kg without a counterweight, with a spring of so many N/m about 0.02 m."""
+    reference, rate = excitation(seed, 0.03)
+
+    def acceleration(x, v, force):
+        friction = 9.0 * np.tanh(v / 0.005) + 30.0 * v
+        return (force - friction - 12.0 * 9.81 - spring * (x - 0.02)) / 12.0
+
+    time, x, force = moved(reference, rate, 9000.0, 400.0, acceleration, seconds)
+    noise = np.random.default_rng(seed).normal(0, 0.5, len(time))
+    return table(time, x, force + noise, {"name": "carriage", "kind": "prismatic"}, purpose, gravity_m_s2=9.81)

@@ -1,7 +1,11 @@
 """The published benchmark of a drive whose screw is worn: EMPS of Janot, Gautier and Brunot."""
 
+from dataclasses import replace
+
 import pytest
 
+from pipelines.diagnosis.faults import find_faults
+from pipelines.mechanics.scale import on_one_scale
 from tests.real.machines import LOGS, diagnosed, motions, of_purpose, recordings, symmetric
 from tests.real.published import EMPS, EMPS_ERRORS
 from tests.real.relative_error import decimated_error, fitted
@@ -42,3 +46,10 @@ def test_diagnose_names_the_worn_screw_and_reaches_the_published_error(diagnosis
 
 def test_the_few_reversals_of_the_screw_which_are_all_alike_show_no_travel(diagnosis):
     assert diagnosis.verdict["reversals"] == []
+
+
+def test_the_screws_force_is_told_to_be_reversed_where_it_is_and_only_there(runs):
+    assert find_faults(on_one_scale(runs)) == []
+    found = find_faults(on_one_scale([replace(run, torque=-run.torque) for run in runs]))
+    assert [fault.file for fault in found] == [run.file for run in runs]
+    assert all("the sign of axis_force_n is reversed" in fault.what for fault in found)

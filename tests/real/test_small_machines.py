@@ -2,9 +2,17 @@
 
 import pytest
 
-from tests.real.machines import LOGS, diagnosed
+from pipelines.diagnosis.faults import find_faults
+from pipelines.mechanics.scale import on_one_scale
+from tests.real.machines import LOGS, diagnosed, motions, recordings
 
 
 @pytest.mark.parametrize("machine", ["simple", "xl330", "modexo"])
 def test_reversals_of_small_or_dirty_logs_show_no_travel(real_data, tmp_path, machine):
     assert diagnosed(LOGS[machine], real_data, tmp_path).verdict["reversals"] == []
+
+
+@pytest.mark.parametrize("machine", ["simple", "xl330", "modexo"])
+def test_no_sign_of_a_machine_that_was_wired_rightly_is_told_to_be_reversed(real_data, tmp_path, machine):
+    runs = on_one_scale(motions(recordings(LOGS[machine], real_data, tmp_path)))
+    assert not [fault.what for fault in find_faults(runs) if "sign" in fault.what]

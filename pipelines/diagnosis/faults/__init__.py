@@ -14,6 +14,7 @@ from pipelines.diagnosis.faults.body import averages
 from pipelines.diagnosis.faults.channels import channel_faults
 from pipelines.diagnosis.faults.fault import Fault
 from pipelines.diagnosis.faults.sampling import sampling_faults
+from pipelines.diagnosis.faults.sign import sign_faults
 from pipelines.diagnosis.faults.timing import timing_faults
 from pipelines.diagnosis.faults.units import angle_unit_faults, torque_unit_faults
 from pipelines.diagnosis.faults.wiring import angle_faults, cuff_faults, wiring_faults
@@ -39,6 +40,7 @@ def find_faults(motions: Sequence[Motion]) -> list[Fault]:
     for motion in excluding(motions, found):
         found += sampling_faults(motion)
         wrong = [*angle_faults(motion), *angle_unit_faults(motion)]
+        wrong = wrong or [*sign_faults(motion)]
         run = averages(motion)
         if run is not None and not wrong:
             wrong = [*wiring_faults(run), *cuff_faults(run)]
