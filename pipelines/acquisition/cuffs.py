@@ -1,8 +1,8 @@
 """Whether what cuff sensors tell can be true: forces that a sensor can resolve, and that change while the leg moves."""
 
 from collections.abc import Sequence
+from math import isnan
 
-import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.acquisition.frozen import FROZEN_CYCLES, FROZEN_RAD, Held
@@ -21,16 +21,16 @@ class Cuffs:
 
     def doubt(self, forces: NDArray, cycle: int, travel: float) -> str | None:
         """Return why forces (4, 3) N cannot be true, None if they can; ``travel`` is how far joints were told to go."""
-        for force, name in zip(forces, CUFFS, strict=True):
-            if np.isnan(force).any():
+        for force, name in zip(forces.tolist(), CUFFS, strict=True):
+            if any(map(isnan, force)):
                 continue  # a sensor that was not read
-            if ((np.abs(force) < LEAST_FORCE_N) & (force != 0.0)).any():
+            if any(abs(axis) < LEAST_FORCE_N and axis != 0.0 for axis in force):
                 return (
                     f"sensor {name}: tells forces of {_three(force)} N, smaller than any sensor resolves; check the "
                     "word order in the rig file"
                 )
             held = self._held[name]
-            held.tell(tuple(force.tolist()), cycle, travel)
+            held.tell(tuple(force), cycle, travel)
             if cycle - held.since >= FROZEN_CYCLES and travel - held.travel > FROZEN_RAD:
                 return (
                     f"sensor {name}: counts on, but tells forces of {_three(force)} N for "
@@ -40,5 +40,5 @@ class Cuffs:
         return None
 
 
-def _three(force: Sequence[float] | NDArray) -> str:
+def _three(force: Sequence[float]) -> str:
     return ", ".join(f"{value:.3g}" for value in force)

@@ -1,9 +1,8 @@
 """What may be measured, what may be sent, and how set-points slow down."""
 
 from collections.abc import Sequence
-from math import isnan
+from math import copysign, isfinite, isnan
 
-import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.acquisition.drive import Reading
@@ -68,7 +67,7 @@ class Limits:
     def _silence(self, forces: NDArray, cycle: int) -> str | None:
         """Return which cuff sensor has told nothing for too long: its limit would be watched by nobody."""
         for cuff, sensor in self._sensors.items():
-            if np.isfinite(forces[cuff]).all():
+            if all(map(isfinite, forces[cuff].tolist())):
                 self._felt[cuff] = cycle
             silent_s = (cycle - self._felt.setdefault(cuff, cycle)) / self._rate
             if silent_s > self._rig.safety.watchdog_s + sensor.every / self._rate:
@@ -80,15 +79,14 @@ class Limits:
 
     def force_violation(self, forces: NDArray) -> str | None:
         """Return which force (4, 3) N is above the limit; rows all NaN are sensors without a new sample."""
-        told = ~np.isnan(forces).all(axis=1, keepdims=True)
-        high = told & ~(np.abs(forces) <= self._rig.safety.cuff_force_n)
-        if not high.any():
-            return None
-        cuff, axis = np.argwhere(high)[0]
-        return (
-            f"{CUFFS[cuff]} force {'xyz'[axis]} {forces[cuff, axis]:.0f} N is above the limit of "
-            f"{self._rig.safety.cuff_force_n:g} N"
-        )
+        most = self._rig.safety.cuff_force_n
+        for cuff, force in zip(CUFFS, forces.tolist(), strict=True):
+            if all(map(isnan, force)):
+                continue
+            for axis, value in zip("xyz", force, strict=True):
+                if not abs(value) <= most:
+                    return f"{cuff} force {axis} {value:.0f} N is above the limit of {most:g} N"
+        return None
 
 
 def sample_violation(drive: DriveSettings, before: Reading, found: Reading, samples_hz: float) -> str | None:
@@ -135,6 +133,6 @@ def clamped(value: float, low: float, high: float) -> float:
 def slowed(reference: float, speed: float, deceleration: float, time_s: float) -> tuple[float, float]:
     """Return set-point (rad) and speed (rad/s) a while later of one that slows down to rest."""
     moving_s = min(time_s, abs(speed) / deceleration)
-    path = speed * moving_s - np.copysign(0.5 * deceleration * moving_s**2, speed)
-    left = speed - np.copysign(deceleration * moving_s, speed) if moving_s == time_s else 0.0
+    path = speed * moving_s - copysign(0.5 * deceleration * moving_s**2, speed)
+    left = speed - copysign(deceleration * moving_s, speed) if moving_s == time_s else 0.0
     return float(reference + path), float(left)

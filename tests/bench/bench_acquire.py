@@ -16,7 +16,7 @@ from pipelines.settings.rig import load_rig
 from tests.bench import bare_loop
 from tests.bench.report import Row, show
 
-PAIRS = 5
+PAIRS = 9
 RECORDER = ((100.0, 600.0), (200.0, 60.0))
 """Set-points a second, the rig file's own advice first, and for how long (s)."""
 
@@ -29,7 +29,7 @@ def rows() -> Iterator[Row]:
     ):
         rate = cycles_a_second(run, duration_s)
         yield Row(f"lockstep, {what}", f"{rate:.0f} cycles/s", wanted=f"{wanted} cycles/s")
-    ours, bare = beside_a_bare_loop(10.0)
+    ours, bare = beside_a_bare_loop(5.0)
     share = 100 * median(a / b for a, b in zip(ours, bare, strict=True))
     yield Row(
         f"the latter beside a bare loop of the same calls, in turn on one rig, {PAIRS} times",
