@@ -87,6 +87,8 @@ class Loop:
         self._tending: list[asyncio.Future] = []
         self._moving = set[int]()
         """Drives that are being slowed down in the stop."""
+        self._stopped = False
+        """Whether all of them are disabled, or could not be."""
 
     async def run(self) -> None:
         """Follow the plan to its end, then disable the drives; the supervisor knows why that came early."""
@@ -303,6 +305,7 @@ class Loop:
         feeling = asyncio.ensure_future(self._feel())
         self._tell_stop()
         await _outlive(stops, self.supervisor.abort)
+        self._stopped = True
         feeling.cancel()
         await _outlive([feeling, *self._tending], self.supervisor.abort)
         # One that was cancelled before it began has told its drive nothing.
@@ -393,10 +396,9 @@ class Loop:
             while not self.supervisor.pressing:
                 self.supervisor.feel_cuffs(await self.machine.felt())
                 await asyncio.sleep(1.0 / self._rate)
-        except asyncio.CancelledError:  # the drives are disabled
-            pass
         except BaseException as error:
-            self.supervisor.abort(error)
+            if not (self._stopped and isinstance(error, asyncio.CancelledError)):  # so it was told to end
+                self.supervisor.abort(error)
 
 
 def run_to_its_end(run: Coroutine, note: Callable[[BaseException], None]) -> None:

@@ -405,6 +405,10 @@ relaxed = dict(deadline=None, suppress_health_check=list(HealthCheck))
     clock="real_time", reads_back=False, count_rad=FINE_RAD, line="tcp", goes_on=False, human=True,
     happens=[Event(at=330, kind="lost", what=None)], plan=None, own=None,
 )  # fmt: skip
+@example(
+    clock="real_time", reads_back=True, count_rad=FINE_RAD, line=None, goes_on=False, human=True,
+    happens=[Event(at=390, kind="raise", what=lambda: asyncio.CancelledError("made up"))], plan=None, own=None,
+)  # fmt: skip
 @sequences
 @settings(max_examples=60, derandomize=True, **relaxed)
 def test_whatever_happens_the_leg_is_stopped_within_its_limits_and_it_is_said_why(
