@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from pipelines.errors import SettingsError
-from pipelines.settings.rig import DriveMap, RigSettings
+from pipelines.settings.rig import DriveMap, Register, RigSettings
 
 SAME_SCALE = 1e-3
 """Up to which share two scales are one, written with more or fewer digits."""
@@ -36,16 +36,26 @@ def _contradiction(map_: DriveMap) -> str | None:
             "leaps to the other side of zero as it is enabled; find out by `exoid rig check --by-hand` which is wrong, "
             "and turn that"
         )
-    if map_.own_scale:
+    if map_.own_scale or not (apart := _apart(told, tells)):
         return None
-    remedy = (
-        "or the drive leaps by the difference as it is enabled; correct one, or set own_scale = true beside `enable` "
-        "where the drive's manual says that both are right"
+    key, one, other = apart
+    return (
+        f"{key}: found {one} with {other} of read.angle, expected the same, or the drive leaps by the difference as it "
+        "is enabled; correct one, or set own_scale = true beside `enable` where the drive's manual says that both are "
+        "right"
     )
+
+
+def _apart(told: Register, tells: Register) -> tuple[str, str, str] | None:
+    """Return in which key two registers differ by which one angle is another count, with both values, if in any."""
+    for key in ("type", "word_order", "byte_order"):
+        one, other = getattr(told, key), getattr(tells, key)
+        if one != other and not (key == "word_order" and told.registers == 1):
+            return key, one, other
+    if abs(told.si[0] / tells.si[0] - 1.0) > SAME_SCALE:
+        if told.scale == tells.scale:
+            return "unit", told.unit, tells.unit
+        return "scale", f"{told.scale:g} {told.unit}", f"{tells.scale:g} {tells.unit}"
     if abs(told.si[1] - tells.si[1]) > max(told.step, tells.step):
-        return f"offset: found {told.si[1]:g} rad with {tells.si[1]:g} rad of read.angle, expected the same, {remedy}"
-    # Counts of another width or unit are fine as they are, those of the same are mostly a slip.
-    alike = (told.type, told.unit) == (tells.type, tells.unit)
-    if alike and abs(told.scale / tells.scale - 1.0) > SAME_SCALE:
-        return f"scale: found {told.scale:g} with {tells.scale:g} of read.angle, expected the same, {remedy}"
+        return "offset", f"{told.si[1]:g} rad", f"{tells.si[1]:g} rad"
     return None

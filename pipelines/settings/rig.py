@@ -220,8 +220,8 @@ class DriveMap(Settings):
     write: DriveWrite = Field(description="Block that is written as a whole, without gaps.")
     own_scale: bool = Field(
         False,
-        description="Set-points mean the same place as angles though their scale or offset is another; else that is "
-        "taken for a slip, and refused.",
+        description="Set-points mean the same place as angles though their type, order, scale or offset is another; "
+        "else that is taken for a slip, and refused.",
     )
     enable: int = Field(1, description="Control word that makes the drive follow its set-point.")
     disable: int = Field(0, description="Control word that takes the torque away.")

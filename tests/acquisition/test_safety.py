@@ -450,15 +450,17 @@ def test_a_drive_that_would_be_sent_to_the_mirror_image_of_where_it_stands_is_re
 
 
 WRITTEN = 'reference = { address = 200, type = "int32", scale = 1e-6, unit = "rad" }'
-IN_FLOATS = 'reference = { address = 200, type = "float32", unit = "rad" }'
-IN_DEGREES = 'reference = { address = 200, type = "int32", scale = 1e-4, unit = "deg" }'
 
 
 @pytest.mark.parametrize(
     ("written", "found"),
-    [(WRITTEN.replace("1e-6", "4e-6"), "scale: found 4e-06 with 1e-06"),
+    [(WRITTEN.replace("1e-6", "4e-6"), "scale: found 4e-06 rad with 1e-06 rad"),
+     (WRITTEN.replace('"rad"', '"deg"'), "unit: found deg with rad"),
+     (WRITTEN.replace("1e-6", "1e-4").replace('"rad"', '"deg"'), "scale: found 0.0001 deg with 1e-06 rad"),
      (WRITTEN.replace("unit", "offset = 0.05, unit"), "offset: found 0.05 rad with 0 rad"),
-     (IN_DEGREES.replace("unit", "offset = 3.0, unit"), "offset: found 0.0523599 rad with 0 rad")],
+     (WRITTEN.replace("unit", 'word_order = "little", unit'), "word_order: found little with big"),
+     (WRITTEN.replace("unit", 'byte_order = "little", unit'), "byte_order: found little with big"),
+     (WRITTEN.replace('"int32", scale = 1e-6', '"float32"'), "type: found float32 with int32")],
 )  # fmt: skip
 def test_a_drive_that_would_be_sent_elsewhere_than_where_it_stands_is_refused_unless_that_is_meant(
     rig_file, written, found
@@ -471,6 +473,6 @@ def test_a_drive_that_would_be_sent_elsewhere_than_where_it_stands_is_refused_un
     refuse_misplaced_set_points(load_rig(rig_file(replace=meant)))
 
 
-@pytest.mark.parametrize("written", [WRITTEN, IN_FLOATS, IN_DEGREES])
-def test_set_points_may_be_counted_in_another_width_or_unit_than_angles(rig_file, written):
+def test_set_points_may_be_told_in_another_unit_than_angles_where_a_count_is_the_same_angle(rig_file):
+    written = WRITTEN.replace("1e-6", "5.72957795e-5").replace('"rad"', '"deg"')
     refuse_misplaced_set_points(load_rig(rig_file(replace={WRITTEN: written})))

@@ -127,7 +127,8 @@ def _tight(rig: RigSettings, start: Sequence[float]) -> dict[str, Any]:
     # The narrower file lies elsewhere, and what files it names would be looked for there.
     lines = {name: line.with_files_in(Path.cwd()) for name, line in rig.line.items()}
     tight = careful.model_copy(update={"drive": drives, "line": lines, "embedded": False})
-    return tight.model_dump(mode="json", exclude_none=True)
+    # What was not set must not be: a host that nobody named contradicts a line.
+    return tight.model_dump(mode="json", exclude_unset=True, exclude_none=True)
 
 
 def _motion(start: Sequence[float]) -> dict[str, Any]:

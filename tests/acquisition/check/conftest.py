@@ -12,10 +12,10 @@ def checked(rig_file, serve, monkeypatch):
     """Check a rig that swings out, against a rig file; returns the report.
 
     ``believed`` are changes of the file, not of the rig that is there; ``served`` are changes of both;
-    ``options`` are those of the check.
+    ``options`` are those of the check; ``on_a_line`` puts all devices on one.
     """
 
-    def run(shipped="plain", believed=None, served=None, fault=None, options=None, **changes):
+    def run(shipped="plain", believed=None, served=None, fault=None, options=None, on_a_line=False, **changes):
         replace = dict(served or {})
         if shipped == "real_time":  # slow, for a busy computer
             replace["[plant]\n"] = "[plant]\nsample_rate_hz = 40.0\n"
@@ -27,6 +27,9 @@ def checked(rig_file, serve, monkeypatch):
         changes = {"watchdog_s": 10.0, "rest_rad": "[0.4, -0.6]", **changes}
         rig = rig_file(shipped, port, replace, **changes)
         seen = rig_file(shipped, port, replace | (believed or {}), **changes)
+        if on_a_line:
+            line = f'\n[line.leg]\ntransport = "tcp"\nhost = "127.0.0.1"\nport = {port}\n'
+            seen.write_text(seen.read_text().replace(f"port = {port}\n", 'line = "leg"\n') + line)
         options = options or {}
         with serve(rig, port, options.get("run", "exo_alone"), fault=fault):
             return check_rig(seen, **options)

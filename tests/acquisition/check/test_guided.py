@@ -72,8 +72,15 @@ def test_a_velocity_of_the_wrong_sign_or_scale_stops_the_movement(checked, scale
 
 
 def test_a_set_point_in_the_wrong_unit_is_stopped_before_the_leg_goes_far(checked):
-    report = checked(options=MOVE, believed={WRITE: WRITE.replace('"rad"', '"deg"')}, rest_rad="[0.0, 0.0]")
+    believed = {WRITE: WRITE.replace('"rad"', '"deg"'), ENABLE: f"own_scale = true\n{ENABLE}"}
+    report = checked(options=MOVE, believed=believed, rest_rad="[0.0, 0.0]")
     assert "rig: the guided movement was stopped: " in told(report)
+
+
+def test_devices_on_one_line_are_moved_like_others(checked):
+    report = checked(options=MOVE, on_a_line=True, rest_rad="[0.0, 0.0]")
+    assert told(report) == ""
+    assert [answer.joint for answer in report.answers] == ["hip", "knee"]
 
 
 def test_a_leg_away_from_zero_is_not_moved_before_its_signs_are_known(checked):
