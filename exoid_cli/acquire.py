@@ -94,9 +94,12 @@ def _record(
     from pipelines.workflow.imported import refuse_imported
     from pipelines.workflow.kept import refuse_recorded
 
+    def claim() -> None:
+        if not overwrite:
+            refuse_recorded(output)
+
     refuse_imported(output)
-    if not overwrite:
-        refuse_recorded(output)
+    claim()  # before anybody is asked anything; and once more when no other run can record there any more
     experiment.mechanism.refuse_all_but_the_leg("`exoid acquire`")
     settings, rate = experiment.run_named(run), experiment.acquire.sample_rate_hz
     watched: list[RigSettings] = []
@@ -123,7 +126,7 @@ def _record(
 
         outcome = record(
             experiment.file(experiment.acquire.rig), settings, trajectory, output, rate, experiment.mechanism,
-            report, reset_faults=reset_faults, begin=begin,
+            report, reset_faults=reset_faults, begin=begin, claim=claim,
         )  # fmt: skip
     if outcome.missed:
         console.warn(f"{outcome.path}: {outcome.missed} samples were missed; `exoid show` lists the gaps")

@@ -70,6 +70,7 @@ def acquire(
     *,
     reset_faults: bool = False,
     begin: Begin = lambda rig, trajectory: None,
+    claim: Callable[[], None] = lambda: None,
 ) -> Outcome:
     """Record one run.
 
@@ -93,6 +94,9 @@ def acquire(
     begin : callable
         Told the rig with the limits in force and the motion, both found fit, before anything is connected; what it
         raises refuses the run.
+    claim : callable
+        Called once no other run can record to ``output`` any more, before anything moves; what it raises refuses the
+        run.
     """
     described = load_rig(rig_path)
     if run.run == "with_human":
@@ -132,7 +136,7 @@ def acquire(
     ):
         sensors = present.sensor if run.run == "with_human" else ()
         supervisor = Supervisor(present, sample_rate_hz, sensors)
-        recording = _record(supervisor, run, trajectory, journal, metadata, report, stopped_by, reset_faults)
+        recording = _record(supervisor, run, trajectory, journal, metadata, report, stopped_by, reset_faults, claim)
         run_to_its_end(recording, supervisor.abort)
         return _finish(output, journal, supervisor)
 
@@ -146,6 +150,7 @@ async def _record(
     report: Report,
     stopped_by: Sequence[str],
     reset_faults: bool,
+    claim: Callable[[], None] = lambda: None,
 ) -> None:
     """Move the leg and write the journal, which says at its end why the run was stopped early, if it was."""
     rig = supervisor.rig
@@ -162,7 +167,8 @@ async def _record(
         sampling = sampling_of(machine, supervisor.rate, supervisor.judge_records)
         await _heeding(machine.empty_records(), stopped_by)
         try:
-            with Journal(path, ["time_s", *columns_of(machine)], metadata) as journal:
+            with _opened(path, ["time_s", *columns_of(machine)], metadata) as journal:
+                claim()
                 loop = Loop(machine, supervisor, sampling, plan, journal, report, stopped_by)
                 await loop.run()
                 journal.end(supervisor.why, loop.found())
@@ -173,6 +179,15 @@ async def _record(
             ) from error
     finally:
         machine.close()
+
+
+def _opened(path: Path, columns: Sequence[str], metadata: dict[str, Any]) -> Journal:
+    """Open the journal of a run; refuse where another run has opened it since it was looked for."""
+    try:
+        return Journal(path, columns, metadata)
+    except FileExistsError:
+        refuse_leftover(path)
+        raise
 
 
 async def _ready(machine: Machine, rate_hz: float, reset_faults: bool, stopped_by: Sequence[str]) -> NDArray:

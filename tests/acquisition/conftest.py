@@ -133,9 +133,13 @@ def record(tmp_path, excitation, rig_file, serve):
     """Record a run on a rig served in this process; returns the recording."""
 
     def run(
-        duration_s=1.0, run="exo_alone", seed=0, fault=None, served_as=None, believed=None, rate_hz=200.0, **changes
-    ):
-        """``believed`` are changes of the rig file that acquisition reads, not of the rig that is there."""
+        duration_s=1.0, run="exo_alone", seed=0, fault=None, served_as=None, believed=None, rate_hz=200.0, hooks=None,
+        **changes,
+    ):  # fmt: skip
+        """``believed`` are changes of the rig file that acquisition reads, not of the rig that is there.
+
+        ``hooks`` are called by acquisition: ``begin``, ``claim``.
+        """
         port, replace = free_port(), changes.pop("replace", None) or {}
         rig = rig_file(port=port, replace=replace, **changes)
         seen = rig_file(port=port, replace=replace | believed, **changes) if believed else rig
@@ -144,7 +148,7 @@ def record(tmp_path, excitation, rig_file, serve):
         with serve(rig, port, run, seed, fault) as served:
             if served_as is not None:
                 served_as.append(served)
-            acquire(seen, settings, excitation, output, rate_hz)
+            acquire(seen, settings, excitation, output, rate_hz, **(hooks or {}))
         return RECORDING.read(output)
 
     return run

@@ -8,8 +8,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pipelines.acquisition.acquire import acquire
+from pipelines.acquisition.journal import Journal, refuse_leftover
 from pipelines.acquisition.recorded import write_recording
 from pipelines.contracts import RECORDING
+from pipelines.contracts.beside import journal_of
+from pipelines.errors import InputError
 from pipelines.mechanics.mechanisms.leg import cuff_torque
 from pipelines.mechanics.motion import CUFFS, geometry_of
 from pipelines.mechanics.trajectory import read_trajectory
@@ -43,6 +46,35 @@ def test_a_signal_that_comes_too_late_to_stop_a_run_lets_no_other_begin(record, 
     with pytest.raises(KeyboardInterrupt):
         record()
     assert [len(RECORDING.read(path).frame) for path in tmp_path.rglob("*.parquet")] == [200]
+
+
+def test_a_recording_that_came_while_somebody_was_asked_is_not_replaced(record, tmp_path):
+    output, served = tmp_path / "test.parquet", []
+
+    def claim():
+        with pytest.raises(InputError, match="another run is recording there now"):
+            refuse_leftover(journal_of(output))
+        output.write_text("of another run")
+        raise InputError("not overwritten")
+
+    with pytest.raises(InputError, match="not overwritten"):
+        record(hooks={"claim": claim}, served_as=served)
+    assert output.read_text() == "of another run"
+    assert not journal_of(output).exists()
+    assert not any(drive.servo.enabled for drive in served[0].rig.drives)
+
+
+def test_a_run_that_another_one_was_faster_than_says_so(record, tmp_path):
+    path = journal_of(tmp_path / "test.parquet")
+    others = []
+
+    def begin(rig, trajectory):
+        others.append(Journal(path, ["time_s"], {"run": "exo_alone"}))
+
+    with pytest.raises(InputError, match=r"test\.parquet\.journal: another run is recording there now"):
+        record(hooks={"begin": begin})
+    others[0].close()
+    assert path.exists()
 
 
 def test_the_recorded_set_points_are_the_trajectory_at_each_samples_end(record, excitation):

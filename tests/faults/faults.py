@@ -268,6 +268,8 @@ def cases(frames: type[Frame]) -> list[Case]:
         Case("the current's register is frozen", From(Freeze(CURRENT), times=ALWAYS), "its register is frozen"),
         Case("a cuff sensor's forces are frozen", From(Freeze(FORCES), unit=CUFF, times=ALWAYS), "are frozen",
              run="with_human"),
+        Case("a cuff sensor begins to count anew", From(add(SEQUENCE, -100), unit=CUFF, times=ALWAYS),
+             "its sample counter went back", run="with_human"),
         Case("the angle's words are swapped half way", From(swap(ANGLE), times=ALWAYS), "angle"),
         Case("the current's words are swapped half way", From(swap(CURRENT), times=ALWAYS), "torque"),
         Case("another master writes a set-point 0.4 rad away", From(another_master(0.4), replies=False),
