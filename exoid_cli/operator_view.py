@@ -150,9 +150,11 @@ class OperatorView:
     def _lines(self, width: int, height: int) -> Iterator[Line]:
         if self._progress is None:
             return
-        yield self._head(width)
-        yield []
         rows = max(height - 1 - ABOVE - BELOW, 0)  # the last row stays free, or a terminal scrolls
+        word = self.word()
+        is_small = rows < HEIGHT or width < len(big(word)[0])
+        yield self._head(width, word if is_small else "")
+        yield []
         columns = width - PANEL - 2
         leg = self._leg(columns, rows) if columns >= SMALLEST_LEG else [""] * rows
         for drawn, line in zip(leg, [*self._panel(), *[[]] * rows], strict=False):
@@ -161,10 +163,11 @@ class OperatorView:
         for text in wrap(self._progress.abort or "", max(width - 1, 4), max_lines=BELOW - 1, placeholder="..."):
             yield [(text, URGENT)]
 
-    def _head(self, width: int) -> Line:
+    def _head(self, width: int, word: str) -> Line:
+        """Return the first line, beginning with the state, or with a word for which there is no room elsewhere."""
         progress = self._progress
         assert progress is not None
-        state = f" {progress.state.upper()} "
+        state = f" {word or progress.state.upper()} "
         when = f"{max(progress.time_s, 0.0):.1f} of {progress.duration_s:.1f} s"
         room = max(width - len(state) - len(when) - 3, 0)
         return [

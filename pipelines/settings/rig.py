@@ -513,7 +513,7 @@ class SafetySettings(Settings):
     )
     connect_s: float = Field(5.0, gt=0.0, description="Longest wait, before anything moves, for a line or a reply.")
     control_s: float = Field(1.0, gt=0.0, description="Longest a drive may take to do what a control word tells it.")
-    deceleration_rad_s2: float = Field(8.0, gt=0.0, description="How a stop slows the set-points down.")
+    deceleration_rad_s2: float = Field(8.0, gt=0.0, le=100.0, description="How a stop slows the set-points down.")
     ramp_s: float = Field(3.0, gt=0.0, le=LONGEST_RAMP_S, description="Shortest way into the motion, and back.")
     settle_s: float = Field(1.0, ge=0.0, description="Motion before the recording begins, for transients to fade.")
     with_human: HumanSafetySettings = Field(HumanSafetySettings(), description="Tighter limits of runs with_human.")

@@ -132,6 +132,12 @@ def test_a_drive_that_could_not_be_disabled_is_more_than_an_abort():
     assert not has_word(lines, "ABORT")
 
 
+@pytest.mark.parametrize(("width", "height"), [(80, 7), (40, 5), (30, 24), (14, 3)])
+def test_on_a_screen_without_room_for_the_big_word_it_is_the_first_that_is_read(width, height):
+    made = view(progress(State.ABORT, abort="knee torque", still_enabled=True))
+    assert picture(made, width, height)[0].startswith(" PRESS E-STOP"[:width])
+
+
 @pytest.mark.parametrize("close", [{"hip": 1.72}, {"knee": -2.05}, {"torque": 145.0}, {"force": -390.0}])
 def test_a_limit_that_is_near_is_said_and_stays_said_for_a_while(close):
     assert view(progress()).word() == ""
