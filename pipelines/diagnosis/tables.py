@@ -41,8 +41,9 @@ def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.Data
     for effect in baseline.beside_bodies:
         step = "extension" if effect in baseline.known else "friction"
         places = np.arange(at, at + len(effect.linear))
-        slopes = effect.jacobian(values[places]) @ np.eye(size)[places]
-        for p, value, slope in zip(effect.parameters, effect.physical(values[places]), slopes, strict=True):
+        held = effect.completed(values[places])
+        slopes = effect.jacobian(held)[:, : len(places)] @ np.eye(size)[places]
+        for p, value, slope in zip(effect.parameters, effect.physical(held), slopes, strict=True):
             add(effect.name, p.name, p.symbol, p.unit, effect.joint, None, step, slope, float(value))
         at += len(effect.linear)
     one_way = [False] * len(rows) + [p.typical[0] >= 0 for cause in fit.causes for p in cause.effect.parameters]

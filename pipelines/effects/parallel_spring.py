@@ -1,10 +1,19 @@
 """A spring beside the drive."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.effects.effect import Effect, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
+from pipelines.effects.torque_offset import TorqueOffset
+from pipelines.mechanics.machine import THE_LEG
+
+CONFIRM_A_SLIDES = (
+    "take the drive off, or switch it off, and hold the joint at several positions with a spring balance: the force "
+    "grows evenly along the way, where a weight's is the same everywhere"
+)
 
 
 class ParallelSpring(Effect):
@@ -28,16 +37,45 @@ class ParallelSpring(Effect):
     parity = Parity.EVEN
 
     @reaction
+    def about_rest(at, state, values, geometry, joint, out):
+        """Add k (q - q0) at the joint, where the rest angle is no amplitude."""
+        out[joint] += values[0] * (at.q[joint] - values[1])
+
+    @reaction
     def reaction(at, state, values, geometry, joint, out):
         """Add k q - b at the joint."""
         out[joint] += values[0] * at.q[joint] - values[1]
 
+    def __post_init__(self) -> None:
+        """Take the rest angle as nought where the mechanism's own parameters take up a constant torque.
+
+        What the spring pulls with at angle zero is then part of them, and no motion tells its share.
+        """
+        super().__post_init__()
+        if self.joint is None or self.on == THE_LEG:
+            return
+        if self.on.joint(self.joint).kind == "prismatic":
+            object.__setattr__(self, "confirm", CONFIRM_A_SLIDES)
+        if TorqueOffset.name in self.on.mechanism.absorbs:
+            assert self.reported is not None
+            stiffness, rest = self.reported
+            of_this = {
+                "linear": (stiffness,), "shape": (replace(rest, default=0.0, forms=(0.0,)),), "reported": None,
+                "reaction": self.about_rest,
+            }  # fmt: skip
+            for name, value in of_this.items():
+                object.__setattr__(self, name, value)
+
     def physical(self, values: NDArray) -> NDArray:
         """Return stiffness and rest angle; without stiffness there is no rest angle."""
+        if self.reported is None:
+            return super().physical(values)
         stiffness, preload = values
         return np.array([stiffness, preload / stiffness if stiffness != 0.0 else np.nan])
 
     def values_from(self, physical: NDArray) -> NDArray:
         """Return stiffness and preload."""
+        if self.reported is None:
+            return super().values_from(physical)
         stiffness, rest_angle = physical
         return np.array([stiffness, stiffness * rest_angle])

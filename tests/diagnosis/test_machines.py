@@ -15,6 +15,7 @@ from pipelines.diagnosis.observations import Baseline
 from pipelines.diagnosis.verdict import verdict
 from pipelines.dynamics.assembly import assemble
 from pipelines.effects.backlash import Backlash
+from pipelines.effects.parallel_spring import ParallelSpring
 from pipelines.errors import InputError
 from pipelines.identification import identify
 from pipelines.mechanics.geometry import Geometry
@@ -25,7 +26,7 @@ from pipelines.mechanics.motion import motion_from_table
 from pipelines.mechanics.scale import on_one_scale
 from pipelines.model import Model, Term, baseline
 from pipelines.settings.filter import FilterSettings
-from tests.diagnosis.machines import pendulum, slide
+from tests.diagnosis.machines import lift, pendulum, slide
 
 
 @cache
@@ -87,6 +88,34 @@ def test_what_adds_too_little_is_told_with_how_little_and_how_much_it_must(screw
         assert float(told) < 6 and "where one more cause must gain 6" in row["reason"]
         if row["gain_nm"] == row["gain_nm"]:
             assert float(told) == pytest.approx(row["train_score"] - named, abs=0.051)
+
+
+def test_a_springs_load_at_position_zero_is_part_of_the_force_that_holds_a_lift():
+    found = diagnose(motions(lift, spring=220.0))
+    (cause,) = verdict(found)["causes"]
+    stiffness, rest = cause["parameters"]
+    assert (cause["effect"], rest["name"]) == ("parallel_spring", "rest_angle")
+    assert stiffness["ci95"][0] < 220.0 < stiffness["ci95"][1]
+    assert (rest["value"], rest["ci95"]) == (0.0, [0.0, 0.0])
+    (held,) = found.parameters[found.parameters["name"] == "X2"].to_dict("records")
+    assert held["ci95_low"] < 12.0 * 9.81 - 220.0 * 0.02 < held["ci95_high"]
+    assert any("spring balance" in said for said in cause["evidence"])
+    assert not any("on its side" in said for said in cause["evidence"])
+
+
+def test_a_spring_that_a_lifts_drawings_show_has_its_stiffness_fitted_and_its_rest_taken():
+    found = diagnose(motions(lift, spring=220.0), known=["parallel_spring@carriage"])
+    stiffness, rest = verdict(found)["known"][0]["parameters"]
+    assert stiffness["ci95"][0] < 220.0 < stiffness["ci95"][1] and rest["ci95"] == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("machine", [lift, slide, pendulum])
+def test_a_spring_that_is_told_its_rest_pulls_neither_way_there(machine):
+    run, *_ = motions(machine)
+    (joint,) = run.joints
+    spring = ParallelSpring(joint, on=run.machine)
+    torque = spring.torque(run, spring.values_from(np.array([50.0, 0.02])))
+    np.testing.assert_allclose(torque, 50.0 * (run.q - 0.02), atol=1e-9)
 
 
 def test_nobody_is_asked_for_runs_with_a_person_in_a_ball_screw(screw):
