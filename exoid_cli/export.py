@@ -48,6 +48,9 @@ def export(
     settings = settings_in_force(config)
     made = exported(PARAMETERS.read(model), run, geometry_from(settings))
     path = _path(model, output, chosen.suffix)
+    meant = next((format.name for format in FORMATS if format.suffix == path.suffix != chosen.suffix), None)
+    if meant:
+        raise SettingsError(f"-o {path}: ends as --to {meant} writes it, expected {chosen.suffix} with --to {to}")
     with console.working("writing the model"):
         files = {path.with_suffix(suffix): text for suffix, text in chosen.write(made, path.stem).items()}
     if path.suffix not in {file.suffix for file in files}:

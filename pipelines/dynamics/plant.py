@@ -14,6 +14,7 @@ from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import Machine, machine_of
+from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.mechanics.motion import geometry_of
 from pipelines.model import Model, model_from_parameters
 
@@ -51,18 +52,22 @@ class Plant:
 
 
 def make_plant(model: Model, geometry: Geometry, joints: tuple[Joint, ...], run: str) -> Plant:
-    """Return the plant of a kind of run, or refuse a leg that cannot exist."""
+    """Return the plant of a kind of run, or refuse a machine that cannot exist."""
     model = model.for_run(run)
     assembly = assemble(model, geometry, [joint.name for joint in joints])
     lightest = np.linalg.eigvalsh(masses(assembly)[0]).min()
     if lightest <= 0:
         X = sum(term.values for term in model if isinstance(term.effect, RigidBody))
-        reasons = machine_of(joints, geometry).mechanism.unrealizable(X, geometry) or [
-            f"the mass matrix has the eigenvalue {lightest:.3g} kg·m²"
-        ]
+        mechanism = machine_of(joints, geometry).mechanism
+        reasons = mechanism.unrealizable(X, geometry) or [f"the mass matrix has the eigenvalue {lightest:.3g} kg·m²"]
+        whose, mend = (
+            ("leg", "from motions that separate X1, X2 and X3 better")
+            if mechanism is LEG
+            else ("machine", "from richer motions, with the signs of torque and angle as they should be")
+        )
         raise InputError(
-            f"the {run} parameters are no real leg: {'; '.join(reasons)}. A simulation of it would run away; "
-            "identify again from motions that separate X1, X2 and X3 better, or choose another --run"
+            f"the {run} parameters are no real {whose}: {'; '.join(reasons)}. A simulation of it would run away; "
+            f"identify again {mend}, or choose another --run"
         )
     return Plant(model, geometry, joints, run, assembly)
 

@@ -64,6 +64,8 @@ def test_show_knows_the_json_document(exoid, model, tmp_path):
         (("--to", "mjfc"), "--to mjfc: there is no such format; did you mean mjcf?"),
         (("--to", "urdf", "--run", "human"), "holds no rigid body for run 'human', only for with_human; set --run"),
         (("--to", "c", "-o", "my leg.c"), "my leg.c: its functions are called as the file is"),
+        (("--to", "c", "-o", "x.xml"), "-o x.xml: ends as --to mjcf writes it, expected .c with --to c"),
+        (("--to", "urdf", "-o", "leg.xml"), "-o leg.xml: ends as --to mjcf writes it, expected .urdf with --to urdf"),
         (("--to", "json", "-o", "parameters.parquet"), "parameters.parquet: is the model itself; choose another file"),
     ],
 )

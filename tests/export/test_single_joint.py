@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from pipelines.contracts.table import Table
+from pipelines.errors import InputError
 from pipelines.export import FORMATS, JSON, MJCF, URDF, exported
 from pipelines.mechanics.machine import MECHANISMS
 from pipelines.mechanics.mechanisms.single import LIFT, PENDULUM, SLIDE, TURNTABLE
@@ -31,10 +32,11 @@ NAME = "my axis"
 each = pytest.mark.parametrize("kind", SINGLES)
 
 
-def single(kind, *, causes=CAUSES):
-    """Return a machine as its file tells of it, every cause in it that MJCF holds."""
+def single(kind, *, causes=CAUSES, times=1.0):
+    """Return a machine as its file tells of it, every cause in it that MJCF holds, its X so many times as large."""
     mechanism = SINGLES[kind]
-    given = {"rigid_body": dict(zip([p.name for p in mechanism.parameters], X[kind], strict=True))}
+    body = [times * value for value in X[kind]]
+    given = {"rigid_body": dict(zip([p.name for p in mechanism.parameters], body, strict=True))}
     given |= causes | (ONLY_OF.get(kind, {}) if causes is CAUSES else {})
     rows = [
         {"name": name, "symbol": name, "joint": None if effect == "rigid_body" else NAME, "value": value, "unit": "1",
@@ -128,3 +130,9 @@ def test_a_cause_that_such_a_machine_cannot_have_is_said_to_be_left_out():
     for format in FORMATS:
         ((_, holding),) = [(t, h) for t, h in made.holdings(format) if t.effect.name == "mass_off_axis"]
         assert holding.degree == "left out" and holding.how == "a machine of this kind cannot have it"
+
+
+@each
+def test_a_body_of_negative_inertia_is_refused_as_no_machine_of_its_kind(kind):
+    with pytest.raises(InputError, match=r"are no real machine: X1 = -.* with the signs of torque and angle as they"):
+        single(kind, times=-1.0)
