@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.bank import Bank
 from pipelines.diagnosis.candidates import Candidate
 from pipelines.diagnosis.fit import Fit, fit, refined, residuals_on
-from pipelines.diagnosis.floor import Floor, independent_share
+from pipelines.diagnosis.floor import MOST_INDEPENDENT, Floor, independent_share
+from pipelines.diagnosis.perceived import heard_in
 from pipelines.diagnosis.search import Scored, Scorer, cost, known_besides, log_likelihood, search
 from pipelines.effects import Effect
 from pipelines.label import effect_labelled
 from pipelines.model import effect_named
 
-MOST_INDEPENDENT = 1 / 6
-"""Of 25 ms blocks: what a model leaves of a leg is never white (DESIGN section 5)."""
 NEEDED = 6.0
 """Log likelihood that one more cause must gain."""
 MATERIAL, MATERIAL_IN_CUFFS = 0.02, 0.1
@@ -36,6 +35,8 @@ class Ranked:
 
     fit: Fit
     score: float
+    besides: float = 0.0
+    """Of that, what is known of the causes besides what they do to the mean torque."""
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -197,15 +198,32 @@ def _ranked(scorer: Scorer, causes: Sequence[Candidate], empty: Fit) -> Ranked:
     # One that bends the motion has no amplitude of its own, but its shape is as free as one.
     bends = sum(c.bends if c.own_bend is None else len(best.acting(c)) for c in best.causes)
     columns = len(best.values) - len(empty.values) + bends
-    besides = known_besides(best.causes, scorer.evidence)
-    return Ranked(best, gain + besides - cost(best.causes, columns, independent))
+    besides = sum(_heard_beside(best, label, scorer) for label in {c.label for c in best.causes})
+    return Ranked(best, gain + besides - cost(best.causes, columns, independent), besides)
+
+
+def without(made: Fit, label: str, bank: Bank) -> Fit:
+    """Return a fit of all causes but one, their shapes as they were."""
+    rest = [cause for cause in made.causes if cause.label != label]
+    return fit(rest, bank.runs, bank.baseline, bank.weights)
+
+
+def _heard_beside(made: Fit, label: str, scorer: Scorer) -> float:
+    """Return what is known of a fit's cause besides the mean torque where its others are in: what they explain is not.
+
+    A misfit can be loudest where the load changes sign, too. That others make a cause louder is no evidence for them.
+    """
+    alone, bank = scorer.evidence.get(label, 0.0), scorer.bank
+    if alone <= 0.0 or all(cause.label == label for cause in made.causes):
+        return alone
+    left = residuals_on(without(made, label, bank), bank.runs, bank.baseline)
+    return min(alone, heard_in(bank.runs, left)[label])
 
 
 def _worth_it(best: Ranked, before: Ranked, scorer: Scorer) -> bool:
     """Tell whether one more cause is likely, shows, and is more than what is always a little off on a good rig."""
     shows = np.any(_material(best.fit.rms, before.fit.rms, scorer.imperfect))
-    seen_otherwise = known_besides(best.fit.causes, scorer.evidence) - known_besides(before.fit.causes, scorer.evidence)
-    return best.score - before.score > NEEDED and bool(shows or seen_otherwise > NEEDED)
+    return best.score - before.score > NEEDED and bool(shows or best.besides - before.besides > NEEDED)
 
 
 def _material(after: NDArray, before: NDArray, imperfect: NDArray) -> NDArray:

@@ -31,10 +31,10 @@ from pipelines.diagnosis.candidates import (
     proposals,
     torque_columns,
 )
-from pipelines.diagnosis.choice import MATERIAL, MOST_INDEPENDENT, NEEDED
+from pipelines.diagnosis.choice import MATERIAL, NEEDED
 from pipelines.diagnosis.evaluate import evaluate
 from pipelines.diagnosis.fit import fit
-from pipelines.diagnosis.floor import Floor, noise_floor
+from pipelines.diagnosis.floor import MOST_INDEPENDENT, Floor, noise_floor
 from pipelines.diagnosis.gram import solve
 from pipelines.diagnosis.known import known_effects
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, observe, with_load

@@ -14,14 +14,13 @@ from pipelines.diagnosis import tables
 from pipelines.diagnosis.bank import Bank, fill, silent
 from pipelines.diagnosis.choice import (
     Choice,
-    Ranked,
     choose,
     dilution,
     nothing_chosen,
     probabilities,
     rivals,
 )
-from pipelines.diagnosis.examined import Examined, Extended, heard_in
+from pipelines.diagnosis.examined import Examined, Extended
 from pipelines.diagnosis.faults import Fault, excluding, find_faults
 from pipelines.diagnosis.fit import Fit, fit, residuals_on
 from pipelines.diagnosis.fitted_model import model_of_run, values_of_each_run
@@ -29,6 +28,7 @@ from pipelines.diagnosis.floor import Floor, noise_floor
 from pipelines.diagnosis.gain import Gain, errors_of, gain
 from pipelines.diagnosis.known import known_effects
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, like_trained, observe, with_load
+from pipelines.diagnosis.perceived import heard_in
 from pipelines.diagnosis.reversals import BuildUp, built_up
 from pipelines.diagnosis.search import imperfection
 from pipelines.diagnosis.second_look import slower
@@ -212,7 +212,7 @@ def _look(
     evidence = heard_in(bank.runs, left)
     choice = nothing_chosen(empty) if spoilt else choose(bank, noise_floor(bank.runs, left), evidence)
     before = Extended.of(empty, validate, baseline)
-    examine = partial(Examined.of, before=before, validate=validate, baseline=baseline)
+    examine = partial(Examined.of, before=before, validate=validate, bank=bank)
     examined = examine(choice)
     if bool(np.any(examined.standing.systematic(examined.standing.slow_before))) and (faint := choice.faint()):
         choice, examined = faint, examine(faint)
@@ -221,6 +221,8 @@ def _look(
         # else what was heard or felt needs no other beside it.
         choice = choice.next_best() or choice.just(examined.sure) or choice.none_left(empty)
         examined = examine(choice)
+    while (fewer := choice.just(examined.helpful)) and (of_fewer := examine(fewer)).holds_up:
+        choice, examined = fewer, of_fewer
     after, floor, standing = examined.after, examined.floor, examined.standing
     report(0.95, "intervals")
     named = choice.named.labels
@@ -230,7 +232,7 @@ def _look(
     frame, covariance = tables.parameters(choice.named.fit, baseline, sure)
     return Diagnosis(
         baseline=baseline, bank=bank, choice=choice, status=status, before=before, after=after,
-        without={label: _less(choice.named, label, bank, validate) for label in named},
+        without=examined.without,
         likely={label: probabilities(rivals(choice, bank, label), diluted) for label in named},
         standing=standing, floor=floor, unsteady=examined.unsteady,
         perceived=examined.sure, sure=sure, parameters=frame, covariance=covariance,
@@ -274,11 +276,6 @@ def _refuse_without_floor(validate: Sequence[Run]) -> None:
                 f"{', '.join(run.motion.file for run in validate)}: {usable} blocks away from {the(joint)}'s "
                 "reversals, too few in a row to tell noise from error; validate on longer runs"
             )
-
-
-def _less(named: Ranked, label: str, bank: Bank, validate: Sequence[Run]) -> Extended:
-    rest = [c for c in named.fit.causes if c.label != label]
-    return Extended.of(fit(rest, bank.runs, bank.baseline, bank.weights), validate, bank.baseline)
 
 
 def _strayed(made: Fit, validate: Sequence[Run], baseline: Baseline) -> NDArray | None:

@@ -7,26 +7,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.choice import MOST_INDEPENDENT, NEEDED, Choice
+from pipelines.diagnosis.bank import Bank
+from pipelines.diagnosis.choice import NEEDED, Choice, without
 from pipelines.diagnosis.evaluate import evaluate
 from pipelines.diagnosis.fit import Fit
 from pipelines.diagnosis.floor import Floor, noise_floor, slow_scatter
-from pipelines.diagnosis.gain import Errors, errors_of
-from pipelines.diagnosis.impacts import evidence_of_play
+from pipelines.diagnosis.gain import Errors, errors_of, gain
 from pipelines.diagnosis.observations import Baseline, Run
+from pipelines.diagnosis.perceived import felt_in, heard_in
 from pipelines.diagnosis.slow import SlowError, slow_error
 from pipelines.diagnosis.status import WANDERING, Standing
 from pipelines.diagnosis.tone import strongest_tone
-from pipelines.diagnosis.volition import evidence_of_will
-from pipelines.effects import Backlash, Effect, VoluntaryTorque
-
-PERCEIVED = {
-    Backlash.name: "bursts are heard where the load changes sign, as of teeth that cross their play; hardly any of it "
-    "shows in the mean of the torque",
-    VoluntaryTorque.name: "what differs from period to period is felt in cuffs and drive alike: it comes through the "
-    "cuffs, and no model foretells it",
-}
-"""How causes are known besides what they do to the mean of the torque."""
 
 
 @dataclass(frozen=True)
@@ -79,12 +70,21 @@ class Examined:
     holds_up: bool
     """Whether its causes may stay named."""
     sure: tuple[str, ...]
-    """Labels of those that were heard or felt in the validation runs themselves."""
+    """Labels of those that were heard or felt in the validation runs themselves, whatever the others explain."""
+    without: dict[str, Extended]
+    """The set less one cause, by that cause's label."""
+
+    @property
+    def helpful(self) -> tuple[str, ...]:
+        """Labels of the causes without which the validation runs are not plainly explained better, unless heard."""
+        gains = {label: gain(less.errors, self.after.errors) for label, less in self.without.items()}
+        return tuple(label for label, its in gains.items() if label in self.sure or its.high >= 0.0)
 
     @classmethod
-    def of(cls, choice: Choice, before: Extended, validate: Sequence[Run], baseline: Baseline) -> "Examined":
+    def of(cls, choice: Choice, before: Extended, validate: Sequence[Run], bank: Bank) -> "Examined":
         """Examine what is chosen beside the baseline."""
-        made, J = choice.named.fit, len(baseline.joints)
+        made, baseline, labels = choice.named.fit, bank.baseline, choice.named.labels
+        J = len(baseline.joints)
         after = Extended.of(made, validate, baseline)
         floor = noise_floor(validate, after.residuals)
         standing = _standing(before, after, floor)
@@ -95,29 +95,20 @@ class Examined:
         foreign = (doubtful or (wanders and not any(e.goes_with_time for e in effects))) and not standing.rings(effects)
         # Play rings on as it likes, and a wearer pushes at will: what no model follows there is no reason to doubt
         # what was heard and felt in these runs too.
-        sure = tuple(cause.label for cause in made.causes if before.perceived.get(cause.label, 0.0) > NEEDED)
-        all_sure = bool(sure) and len(sure) == len(made.causes)
+        less = {
+            label: before if labels == (label,) else Extended.of(without(made, label, bank), validate, baseline)
+            for label in labels
+        }
+        sure = tuple(
+            label for label in labels if all(e.perceived.get(label, 0.0) > NEEDED for e in (before, less[label]))
+        )
+        all_sure = bool(sure) and len(sure) == len(labels)
         holds_up = all_sure or ((bool(sure) or not foreign) and standing.held_up(effects))
         if not holds_up and not foreign and choice.freer is not None:
             # What is left may be the cause's own, in a form that takes two of ours.
             freer = Extended.of(choice.freer, validate, baseline)
             holds_up = standing.takes_enough and _standing(before, freer, floor).held_up(effects)
-        return cls(after, floor, standing, wanders or hums, holds_up, sure)
-
-
-def heard_in(runs: Sequence[Run], residuals: Sequence[NDArray]) -> dict[str, float]:
-    """Return the log likelihood of play that residuals (m, O) tell besides their mean over periods, by label."""
-    return _by_label(Backlash, runs, evidence_of_play(runs, residuals, MOST_INDEPENDENT))
-
-
-def felt_in(runs: Sequence[Run], residuals: Sequence[NDArray]) -> dict[str, float]:
-    """Return that of a wearer's pushes, of residuals (m, O). A rhythm fitted to them explains some of it too."""
-    return _by_label(VoluntaryTorque, runs, evidence_of_will(runs, residuals))
-
-
-def _by_label(effect: type[Effect], runs: Sequence[Run], gains: NDArray) -> dict[str, float]:
-    joints = runs[0].motion.joints
-    return {effect(joint=joint).label: float(gain) for joint, gain in zip(joints, gains, strict=True)}
+        return cls(after, floor, standing, wanders or hums, holds_up, sure, less)
 
 
 def _standing(before: Extended, after: Extended, floor: Floor) -> Standing:

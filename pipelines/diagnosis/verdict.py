@@ -11,8 +11,8 @@ from pipelines.diagnosis.control import control
 from pipelines.diagnosis.dependence import Dependence, dependences
 from pipelines.diagnosis.diagnose import Diagnosis, summary_numbers
 from pipelines.diagnosis.error_budget import error_budget
-from pipelines.diagnosis.examined import PERCEIVED
 from pipelines.diagnosis.faults import Fault
+from pipelines.diagnosis.perceived import PERCEIVED
 from pipelines.diagnosis.reversals import NEAR_S, BuildUp
 from pipelines.diagnosis.status import AT_FLOOR, EXPLAINED
 from pipelines.diagnosis.ties import tie_between
@@ -174,8 +174,8 @@ def _evidence(d: Diagnosis, label: str, effect: Effect, worth: float, joint: str
         f"it takes {number(machine, worth)} of {amount(machine, joint, before)} of {machine.joint(joint).effort} error "
         f"at {the(joint)}{others_leave} on runs no fit has seen"
     ]
-    if _may_be_chance(d, label):
-        sentences.append("that gain may be chance: its 95 % interval includes nought")
+    if doubt := _doubt(d, label):
+        sentences.append(doubt[1])
     if effect.each_run:
         sentences.append(_set_anew(d, label, effect))
     if label in d.perceived:
@@ -199,9 +199,14 @@ def _set_anew(d: Diagnosis, label: str, effect: Effect) -> str:
     return f"each run has its own {parameter.name}, as of {effect.may_differ}: {', '.join(told)} ({parameter.unit})"
 
 
-def _may_be_chance(d: Diagnosis, label: str) -> bool:
-    """Tell whether what a cause gains on the validation runs cannot be told from nought, nor was it heard or felt."""
-    return label not in d.perceived and label in d.gains and d.gains[label].low <= 0.0
+def _doubt(d: Diagnosis, label: str) -> tuple[str, str] | None:
+    """Say, in the summary and by itself, that a cause neither heard nor felt gains no more than chance may; or None."""
+    its = d.gains.get(label)
+    if its is None or label in d.perceived or its.low > 0.0:
+        return None
+    if its.high < 0.0:
+        return "which gains nothing on runs no fit has seen", "that is no gain: its 95 % interval lies below nought"
+    return "whose gain may be chance", "that gain may be chance: its 95 % interval includes nought"
 
 
 def _times(likely: float, other: float) -> str:
@@ -334,7 +339,7 @@ def _finding(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -
             "Something is missing, and no cause that exoid knows explains it well enough to be named: "
             f"{the(joint)}'s {exerted} error is {size}.{described}"
         )
-    doubts = [", whose gain may be chance" * _may_be_chance(d, cause_label(cause)) for cause in causes]
+    doubts = [f", {doubt[0]}" if (doubt := _doubt(d, cause_label(cause))) else "" for cause in causes]
     named = "; and ".join(_in_words(cause) + doubt for cause, doubt in zip(causes, doubts, strict=True))
     most = int(((before**2 - after**2) / floor**2).argmax())
     joint = d.baseline.joints[most]

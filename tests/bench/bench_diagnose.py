@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.bank import Bank, fill
 from pipelines.diagnosis.candidates import BASELINE, expanded, gram_of_runs, signatures
-from pipelines.diagnosis.choice import MOST_INDEPENDENT
 from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.floor import MOST_INDEPENDENT
 from pipelines.diagnosis.observations import baseline_of, observe
 from pipelines.diagnosis.search import MOST, Scored, Scorer, search
 from pipelines.effects import EFFECTS

@@ -51,12 +51,15 @@ def table(time, position, torque, joint, purpose, **geometry):
     return Table(frame, metadata, None)
 
 
-def pendulum(purpose, seed, spring=0.0, seconds=25.0):
-    """A small servo: 0.5 kg at 0.25 m, 30 g·m², with a spring of so many N·m/rad about 0.3 rad."""
+def pendulum(purpose, seed, spring=0.0, asymmetry=0.0, seconds=25.0):
+    """A small servo: 0.5 kg at 0.25 m, 30 g·m², with a spring of so many N·m/rad about 0.3 rad.
+
+    Forwards it has so many N·m·s/rad more of viscous friction than backwards.
+    """
     reference, rate = excitation(seed, 0.8)
 
     def acceleration(q, v, torque):
-        friction = 0.04 * np.tanh(v / 0.005) + 0.05 * v
+        friction = 0.04 * np.tanh(v / 0.005) + 0.05 * v + 0.5 * asymmetry * abs(v)
         return (torque - friction - 0.5 * 9.81 * 0.25 * np.sin(q) - spring * (q - 0.3)) / 0.03
 
     time, q, torque = moved(reference, rate, 20.0, 0.6, acceleration, seconds)

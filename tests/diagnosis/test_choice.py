@@ -11,9 +11,15 @@ from pipelines.diagnosis.choice import NEEDED, Choice, Ranked, choose
 from pipelines.diagnosis.evaluate import evaluate
 from pipelines.diagnosis.fit import Fit, fit, residuals_on
 from pipelines.diagnosis.floor import noise_floor
-from pipelines.diagnosis.observations import baseline_of, observe
+from pipelines.diagnosis.observations import baseline_of, observe, with_load
+from pipelines.diagnosis.perceived import heard_in
 from pipelines.diagnosis.search import Scorer
 from pipelines.effects import PayloadChange, QuadraticDrag, StribeckFriction
+from pipelines.mechanics.kinematics import motion_table
+from pipelines.mechanics.motion import motion_from_table
+from pipelines.mechanics.scale import on_one_scale
+from pipelines.settings.filter import FilterSettings
+from tests.diagnosis.machines import pendulum
 from tests.diagnosis.sessions import session
 
 
@@ -82,6 +88,41 @@ def test_an_amplitude_whose_sign_is_forbidden_stands_at_nought(offset):
     negative = replace(offset, gram=replace(offset.gram, measured=-offset.gram.measured))
     scores = [Scorer(bank, np.full(4, 500.0), {})((drag[0],)).score for bank in (offset, negative)]
     assert not all(np.isfinite(scores)), "of a cause with one amplitude nothing is left"
+
+
+@pytest.fixture(scope="module")
+def uneven():
+    """A run of a pendulum whose viscous friction differs with direction."""
+    table = pendulum("train", 1, asymmetry=0.1)
+    (motion,) = on_one_scale([motion_from_table(motion_table(table, FilterSettings()))])
+    return observe(motion)
+
+
+def chosen(run, heard=None):
+    """Return the causes chosen of one run, and what was heard in it if nothing else is told."""
+    bank = fill([run], baseline_of([run]))
+    left = residuals_on(fit((), bank.runs, bank.baseline, bank.weights), bank.runs, bank.baseline)
+    heard = heard or heard_in(bank.runs, left)
+    return choose(bank, noise_floor(bank.runs, left), heard).named.labels, heard
+
+
+def test_bursts_that_go_with_another_cause_name_no_play(uneven):
+    labels, _ = chosen(uneven, {"backlash@arm": 30.0})
+    assert labels == ("viscous_asymmetry@arm",)
+
+
+def test_bursts_that_stay_beside_another_cause_name_play(uneven):
+    baseline = baseline_of([uneven])
+    plain = fit((), [uneven], baseline, np.ones(2))
+    positive = uneven.average(with_load(uneven, baseline, plain.values).motion.load)[:, 0] > 0
+    loud = uneven.measured.copy()
+    noise = np.random.default_rng(1)
+    for at in np.flatnonzero(np.diff(positive)):
+        after = loud[at : at + 8, 0]
+        after += 0.15 * noise.normal(size=len(after))
+    labels, heard = chosen(replace(uneven, measured=loud))
+    assert heard["backlash@arm"] > NEEDED
+    assert labels == ("backlash@arm", "viscous_asymmetry@arm")
 
 
 @pytest.mark.parametrize("instant", [7.3, 18.6, 33.1])

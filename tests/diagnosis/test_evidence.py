@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.candidates import Candidate, lowest
+from pipelines.diagnosis.examined import Examined, Extended
 from pipelines.diagnosis.fit import _scale, fit, refined
+from pipelines.diagnosis.gain import Errors
 from pipelines.diagnosis.impacts import evidence_of_play
 from pipelines.diagnosis.observations import FOLDS, baseline_of, observe, with_load
 from pipelines.diagnosis.slow import SlowError, slow_error
@@ -145,6 +147,20 @@ def test_what_takes_nothing_away_is_no_cause_however_little_there_was():
 
 def test_an_error_that_grows_on_other_runs_is_no_cause():
     assert not standing(1.5, 1.6).held_up([Backlash(joint="hip")])
+
+
+def test_a_cause_without_which_other_runs_are_plainly_explained_better_is_no_help_unless_it_was_heard():
+    def leaving(squares):
+        errors = Errors(np.array(squares)[:, np.newaxis], np.full(len(squares), 100), np.ones(1))
+        return Extended(fit=None, runs=(), residuals=(), errors=errors)
+
+    made = Examined(
+        after=leaving([1.0, 1.1, 0.9, 1.0]), floor=None, standing=None, unsteady=False, holds_up=True, sure=(),
+        without={"helps": leaving([2.0, 2.1, 1.9, 2.0]), "harms": leaving([0.9, 1.0, 0.8, 0.9]),
+                 "may": leaving([1.2, 0.9, 1.1, 0.9])},
+    )  # fmt: skip
+    assert made.helpful == ("helps", "may")
+    assert replace(made, sure=("harms",)).helpful == ("helps", "harms", "may")
 
 
 def test_trust_falls_with_what_is_plainly_left():

@@ -10,6 +10,7 @@ import pytest
 from pipelines.contracts.joints import Joint
 from pipelines.diagnosis.candidate_table import candidates
 from pipelines.diagnosis.candidates import proposals
+from pipelines.diagnosis.choice import choose
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.observations import Baseline
 from pipelines.diagnosis.verdict import verdict
@@ -75,6 +76,25 @@ def test_friction_that_differs_with_direction_is_named_at_a_ball_screw_in_newton
     assert {"rmse_before_axis_n", "rmse_after_axis_n"} <= set(tried.columns)
     taken_up = tried[tried["verdict"] == "absorbed"]["causes"].map(lambda causes: causes[0])
     assert set(taken_up) == {"rotor_inertia@axis", "torque_gain@axis"}
+
+
+def test_a_cause_that_harms_other_runs_is_dropped_and_the_other_stays_named(monkeypatch):
+    asymmetry = "viscous_asymmetry@axis"
+
+    def misled(*given):
+        """Choose a second cause beside the right one, with more of it than there is."""
+        choice = choose(*given)
+        both = next(r for labels, r in choice.refined[2].items() if asymmetry in labels)
+        number = next(i for i, cause in enumerate(both.fit.causes) if cause.label != asymmetry)
+        values, (at, *_) = both.fit.values.copy(), both.fit.places(number, 0)
+        values[at] *= 1.0 + 0.002 / both.fit.shares[0, at]
+        return replace(choice, named=replace(both, fit=replace(both.fit, values=values)), standby=(), freer=None)
+
+    monkeypatch.setattr("pipelines.diagnosis.diagnose.choose", misled)
+    found = diagnose(motions(slide, asymmetry=-80.0))
+    assert found.causes == (asymmetry,)
+    (dropped,) = found.choice.refuted
+    assert asymmetry in dropped and len(dropped) == 2
 
 
 def test_what_adds_too_little_is_told_with_how_little_and_how_much_it_must(screw):

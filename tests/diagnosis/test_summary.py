@@ -142,6 +142,16 @@ def test_a_gain_that_may_be_chance_is_told_as_that_unless_the_cause_was_heard(st
     assert "may be chance" not in _finding(replace(idle, perceived=(label,)), verdict(idle)["causes"], None)
 
 
+def test_a_gain_that_is_plainly_negative_is_not_called_chance(stuck):
+    label = "parallel_spring@knee"
+    better = replace(stuck.after, errors=replace(stuck.after.errors, squares=0.9 * stuck.after.errors.squares))
+    told = verdict(replace(stuck, without={label: better}))
+    assert told["causes"][0]["gain"]["ci95"][1] < 0.0
+    assert "which gains nothing on runs no fit has seen. With it" in told["summary"]
+    assert "that is no gain: its 95 % interval lies below nought" in told["causes"][0]["evidence"]
+    assert not any("chance" in said for said in (told["summary"], *told["causes"][0]["evidence"]))
+
+
 def test_ties_are_one_answer_with_one_probability():
     tied = SPRING | {"indistinguishable_from": [{"effect": "base_tilt", "joint": None}]}
     assert _in_words(tied) == (
