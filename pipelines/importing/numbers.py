@@ -8,6 +8,8 @@ from pipelines.importing.finding import Finding, counted
 
 LONGEST = 20
 """Letters of a text that a finding shows."""
+TAKEN_FOR_MISSING = "taken for missing"
+"""What is made of a text where a number should be."""
 
 
 def numbers(values: NDArray, where: str, findings: list[Finding]) -> NDArray:
@@ -20,7 +22,7 @@ def numbers(values: NDArray, where: str, findings: list[Finding]) -> NDArray:
     if words.any():
         row = int(np.argmax(words))
         seen = f"{counted(int(words.sum()), 'row')} with text, the first {str(values[row])[:LONGEST]!r} in row {row}"
-        findings.append(Finding(where, seen, "taken for missing"))
+        findings.append(Finding(where, seen, TAKEN_FOR_MISSING))
     return found
 
 

@@ -17,6 +17,7 @@ from pipelines.errors import ContractError, InputError, SettingsError, about
 from pipelines.importing.clock import FASTEST_HZ, SLOWEST_HZ, Run, Sampling
 from pipelines.importing.finding import Finding, counted
 from pipelines.importing.log import Log, read_log
+from pipelines.importing.numbers import TAKEN_FOR_MISSING
 from pipelines.importing.plausible import look_at
 from pipelines.importing.sources.open import open_source
 from pipelines.importing.turns import Beginnings
@@ -167,7 +168,9 @@ def _whole_rows(columns: Mapping[str, NDArray], required: Sequence[str], finding
     known = {name: np.isfinite(values) for name, values in columns.items()}
     for name in required:
         if not known[name].any():
-            raise InputError(f"{name} has no value in any row; correct its column, range or time in the map")
+            texts = [str(finding) for finding in findings if finding.done == TAKEN_FOR_MISSING]
+            seen = f" ({'; '.join(texts)})" if texts else ""
+            raise InputError(f"{name} has no value in any row{seen}; correct its column, range or time in the map")
     whole = np.all([known[name] for name in required], axis=0)
     if np.count_nonzero(whole) < FEWEST:
         shares = ", ".join(f"{name} in {np.mean(known[name]):.0%}" for name in required)
@@ -208,11 +211,14 @@ def _sampling_findings(sampling: Sampling) -> list[Finding]:
 def _refuse_absurd_angles(columns: Mapping[str, NDArray], settings: ImportMap) -> None:
     for i, joint in enumerate(settings.joint):
         angle = columns[joint.joint.column("angle")]
-        largest = float(np.max(np.abs(angle)))
-        if joint.kind == "revolute" and largest > LARGEST_ANGLE_RAD:
+        absurd = np.flatnonzero(np.abs(angle) > LARGEST_ANGLE_RAD)
+        if joint.kind == "revolute" and len(absurd):
+            first = f"{angle[absurd[0]]:.4g} at {columns['time_s'][absurd[0]]:.6g} s"
             raise SettingsError(
                 f"joint[{i}].angle: would be {np.min(angle):.4g} to {np.max(angle):.4g} rad, expected at most "
-                f"{LARGEST_ANGLE_RAD:.3g} to both sides; correct its unit, zero, counts_per_turn or wraps_at in the map"
+                f"{LARGEST_ANGLE_RAD:.3g} to both sides; beyond it in {counted(len(absurd), 'row')} of {len(angle)}, "
+                f"the first {first}; leave slips out with range, or correct its unit, zero, counts_per_turn or "
+                "wraps_at in the map"
             )
 
 

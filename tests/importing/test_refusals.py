@@ -332,3 +332,20 @@ def test_a_sliding_joints_voltage_asks_for_its_own_gain_and_not_for_a_screw_alon
         gain("voltage", "force", {"gain_nm_v": 2.0}, 1.0)
     with pytest.raises(ValueError, match=r"^needs gain_n_v; add it"):
         gain("voltage", "force", {}, 1.0)
+
+
+def test_one_wild_angle_is_refused_with_its_instant_and_what_leaves_it_out(imported, pendulum, write_csv):
+    columns = {name: np.array(values, dtype=float) for name, values in pendulum.columns().items()}
+    columns["angle"][100] = 99.0
+    outcome = imported(write_csv(columns))
+    assert outcome.code == 2 and len(outcome.err.splitlines()) == 1
+    assert f"beyond it in 1 row of {len(columns['angle'])}, the first 99 at {columns['time'][100]:.6g} s" in outcome.err
+    assert "leave slips out with range" in outcome.err
+
+
+def test_a_column_of_text_is_refused_with_the_text(imported, pendulum, write_csv):
+    columns = dict(pendulum.columns())
+    columns["torque"] = ["ERR"] * len(columns["angle"])
+    outcome = imported(write_csv(columns))
+    assert outcome.code == 2 and "has no value in any row (torque: " in outcome.err
+    assert "rows with text, the first 'ERR' in row 0" in outcome.err
