@@ -157,7 +157,7 @@ class OperatorView:
         yield []
         columns = width - PANEL - 2
         leg = self._leg(columns, rows) if columns >= SMALLEST_LEG else [""] * rows
-        for drawn, line in zip(leg, [*self._panel(), *[[]] * rows], strict=False):
+        for drawn, line in zip(leg, [*self._panel(word), *[[]] * rows], strict=False):
             yield [(f"{drawn}  " if drawn else "", PLAIN), *line]
         yield []
         for text in wrap(self._progress.abort or "", max(width - 1, 4), max_lines=BELOW - 1, placeholder="..."):
@@ -175,8 +175,8 @@ class OperatorView:
             (f" {self._run:<{room}.{room}} {when}", PLAIN),
         ]
 
-    def _panel(self) -> list[Line]:
-        progress, word = self._progress, self.word()
+    def _panel(self, word: str) -> list[Line]:
+        progress = self._progress
         assert progress is not None
         lines: list[Line] = [[(text, URGENT)] for text in big(word)]
         gauges = [gauge.line() for gauge in self.gauges()]

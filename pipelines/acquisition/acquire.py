@@ -150,7 +150,7 @@ async def _record(
     report: Report,
     stopped_by: Sequence[str],
     reset_faults: bool,
-    claim: Callable[[], None] = lambda: None,
+    claim: Callable[[], None],
 ) -> None:
     """Move the leg and write the journal, which says at its end why the run was stopped early, if it was."""
     rig = supervisor.rig

@@ -68,10 +68,11 @@ class Sensor:
         if self._first is None or self._last is None:
             self._first = self._last = count, now
             return True
-        (last, told_at), samples = self._last, count - self._last[0]
+        last = self._last[0]
+        samples = count - last
         if samples == 0:
             return False
-        if samples < 0 or samples > self._most(now - told_at):
+        if samples < 0 or samples > self._most(now):
             how = "went back" if samples < 0 else "leapt"
             raise DeviceError(
                 f"{self.device.label}: its sample counter {how} from {last:.0f} to {count:.0f}; was it restarted? Its "
@@ -80,7 +81,7 @@ class Sensor:
         self._last = count, now
         return True
 
-    def _most(self, waited_s: float) -> float:
+    def _most(self, now: float) -> float:
         """Return how many samples it may have taken since its last new one, by how fast it counted until then.
 
         In lockstep no time passes, and until it has counted for a while, nobody knows.
@@ -89,4 +90,4 @@ class Sensor:
         (first, since), (last, until) = self._first, self._last
         if self._in_lockstep or until - since < SETTLED_S:
             return inf
-        return LEAP * (1.0 + (last - first) / (until - since) * (waited_s + self._reply_s))
+        return LEAP * (1.0 + (last - first) / (until - since) * (now - until + self._reply_s))

@@ -20,12 +20,12 @@ from pipelines.diagnosis.choice import (
     probabilities,
     rivals,
 )
-from pipelines.diagnosis.examined import Examined, Extended
+from pipelines.diagnosis.examined import Examined, Extended, gains_beside
 from pipelines.diagnosis.faults import Fault, excluding, find_faults
 from pipelines.diagnosis.fit import Fit, fit, residuals_on
 from pipelines.diagnosis.fitted_model import model_of_run, values_of_each_run
 from pipelines.diagnosis.floor import Floor, noise_floor
-from pipelines.diagnosis.gain import Gain, errors_of, gain
+from pipelines.diagnosis.gain import Gain, errors_of
 from pipelines.diagnosis.known import known_effects
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, like_trained, observe, with_load
 from pipelines.diagnosis.perceived import heard_in
@@ -127,7 +127,7 @@ class Diagnosis:
     @cached_property
     def gains(self) -> dict[str, Gain]:
         """What each named cause gains on the validation runs beside the others, by its label."""
-        return {label: gain(without.errors, self.after.errors) for label, without in self.without.items()}
+        return gains_beside(self.without, self.after)
 
     @cached_property
     def torque_rms(self) -> NDArray:

@@ -1,6 +1,6 @@
 """What a set of causes leaves of the validation runs, and whether that lets them stay named."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,7 +12,7 @@ from pipelines.diagnosis.choice import NEEDED, Choice, without
 from pipelines.diagnosis.evaluate import evaluate
 from pipelines.diagnosis.fit import Fit
 from pipelines.diagnosis.floor import Floor, noise_floor, slow_scatter
-from pipelines.diagnosis.gain import Errors, errors_of, gain
+from pipelines.diagnosis.gain import Errors, Gain, errors_of, gain
 from pipelines.diagnosis.observations import Baseline, Run
 from pipelines.diagnosis.perceived import felt_in, heard_in
 from pipelines.diagnosis.slow import SlowError, slow_error
@@ -58,6 +58,11 @@ class Extended:
         return heard_in(self.runs, self.residuals) | felt_in(self.runs, self.residuals)
 
 
+def gains_beside(without: Mapping[str, Extended], after: Extended) -> dict[str, Gain]:
+    """Return what each cause of a set gains on the validation runs beside the others, by its label."""
+    return {label: gain(less.errors, after.errors) for label, less in without.items()}
+
+
 @dataclass(frozen=True)
 class Examined:
     """What a fit leaves of the validation runs, and what that says of its causes."""
@@ -77,7 +82,7 @@ class Examined:
     @property
     def helpful(self) -> tuple[str, ...]:
         """Labels of the causes without which the validation runs are not plainly explained better, unless heard."""
-        gains = {label: gain(less.errors, self.after.errors) for label, less in self.without.items()}
+        gains = gains_beside(self.without, self.after)
         return tuple(label for label, its in gains.items() if label in self.sure or its.high >= 0.0)
 
     @classmethod

@@ -112,7 +112,7 @@ def _scores(problem: Problem, rows: Sequence[_Rows], values: NDArray, weights: N
         for (number, _), r in zip(problem.runs, rows, strict=True):
             pull = np.where(r.usable, residual_of(r.measured, every), 0.0) * weights
             scores = np.einsum("mj,mjk->mk", pull, r.instruments[:, :, problem.fitted])
-            for segment, part in by_segment(r.measured, scores):
+            for segment, part in by_segment(r.measured.segment, scores):
                 yield (number, segment), part
 
     return go_through

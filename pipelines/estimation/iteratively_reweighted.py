@@ -140,7 +140,8 @@ def _scores(problem: Problem, values: NDArray, scale: NDArray) -> Scores:
         for number, r in problem.regressions():
             residual = residual_of(r, every)
             pull = np.where(r.usable, Bisquare.weight(residual / scale) * residual, 0.0) / scale**2
-            for segment, rows in by_segment(r, np.einsum("mj,mjk->mk", pull, r.regressor[:, :, problem.fitted])):
+            scores = np.einsum("mj,mjk->mk", pull, r.regressor[:, :, problem.fitted])
+            for segment, rows in by_segment(r.segment, scores):
                 yield (number, segment), rows
 
     return go_through

@@ -70,7 +70,7 @@ def scores_of(problem: Problem, values: NDArray, weights: NDArray) -> Scores:
         for number, r in problem.regressions():
             residual = np.where(r.usable, residual_of(r, every), 0.0)
             scores = np.einsum("mj,mjk,j->mk", residual, r.regressor[:, :, problem.fitted], weights)
-            for segment, rows in by_segment(r, scores):
+            for segment, rows in by_segment(r.segment, scores):
                 yield (number, segment), rows
 
     return go_through

@@ -50,12 +50,12 @@ def residual_of(r: Regression, values: NDArray) -> NDArray:
     return r.torque - r.regressor @ values
 
 
-def by_segment(r: Regression, scores: NDArray) -> Iterator[tuple[int, NDArray]]:
-    """Yield each segment's number and its part of the blocks' ``scores`` (m, k)."""
-    begins = np.flatnonzero(np.diff(r.segment)) + 1
+def by_segment(segment: NDArray, scores: NDArray) -> Iterator[tuple[int, NDArray]]:
+    """Yield each segment's number and its part of the blocks' ``scores`` (m, k), whose segments (m,) follow in turn."""
+    begins = np.flatnonzero(np.diff(segment)) + 1
     for rows in np.split(np.arange(len(scores)), begins):
         if len(rows):
-            yield int(r.segment[rows[0]]), scores[rows]
+            yield int(segment[rows[0]]), scores[rows]
 
 
 def block_average(motion: Run) -> BlockAverage:

@@ -343,7 +343,15 @@ def simulate(rig, settings, trajectory, path, events, rest, *, plan=None, own=No
         try:
             run_to_its_end(
                 _record(
-                    supervisor, settings, trajectory, path.with_suffix(".journal"), metadata, report, stopped_by, False
+                    supervisor,
+                    settings,
+                    trajectory,
+                    path.with_suffix(".journal"),
+                    metadata,
+                    report,
+                    stopped_by,
+                    False,
+                    lambda: None,
                 ),
                 supervisor.abort,
             )

@@ -13,7 +13,8 @@ from pipelines.contracts.joints import the
 from pipelines.diagnosis.faults.fault import Fault, column
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, observe
 from pipelines.estimation.long_run import long_run_covariance
-from pipelines.mechanics.mechanisms.single import SINGLE
+from pipelines.estimation.regression import by_segment
+from pipelines.mechanics.mechanisms.single import PENDULUM
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.origin import settings_of
 
@@ -23,7 +24,7 @@ LEAST_BLOCKS = 50
 
 def sign_faults(motion: Motion) -> Iterator[Fault]:
     """Yield a torque of a machine of one joint whose sign is reversed; with a person in it, who may drive it, none."""
-    if motion.machine.mechanism not in SINGLE or motion.run == "with_human":
+    if motion.machine.mechanism.name != PENDULUM.name or motion.run == "with_human":
         return
     run = observe(motion)
     if run.usable[:, 0].sum() < LEAST_BLOCKS:
@@ -64,7 +65,6 @@ def _inertia_and_loss(run: Run, model: Baseline) -> tuple[NDArray, NDArray]:
     values = inverse @ (columns.T @ torque[:, 0])
     scores = (torque - (columns @ values)[:, np.newaxis]) * columns
     segment = motion.segment[run.starts]
-    stretches = [(number, scores[segment == number]) for number in np.unique(segment)]
-    covariance, critical, _ = long_run_covariance(lambda: stretches, len(values))
+    covariance, critical, _ = long_run_covariance(lambda: by_segment(segment, scores), len(values))
     spread = told @ inverse @ covariance @ inverse @ told.T
     return told @ values, critical * np.sqrt(np.diag(spread))

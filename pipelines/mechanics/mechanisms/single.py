@@ -143,5 +143,3 @@ LIFT = replace(
     inertia_forms=_inertia_forms_under_gravity,
     absorbs=_ABSORBED | dict.fromkeys(("torque_offset", "coulomb_asymmetry"), "X2"),
 )
-
-SINGLE = (PENDULUM, TURNTABLE, SLIDE, LIFT)
