@@ -7,6 +7,7 @@ from scipy.stats import qmc
 
 from pipelines.dynamics.assembly import Assembly
 from pipelines.dynamics.forward import DTHETA, Q, accelerations, memory_size, resting_state, workspace
+from pipelines.errors import InputError
 
 KNEE_ANGLES = np.linspace(0.0, np.pi, 61)
 """Where a leg's mass matrix is looked at, rad: it is even in the knee angle and depends on no other."""
@@ -16,6 +17,9 @@ MORE_POSES = 500
 
 STABLE_REACH = 1.5
 """Step times fastest rate up to which the Runge-Kutta method is stable (2.78) and still accurate."""
+
+MOST_STEPS = 200
+"""Integration steps a sample: at the default gain and rate the motors then feel 1e-3 kg·m², less than rotors have."""
 
 
 @njit(cache=True)
@@ -54,6 +58,19 @@ def masses(a: Assembly) -> tuple[NDArray, NDArray]:
 
 
 def substeps_for(a: Assembly, feedback_gain: float, period: float) -> int:
-    """Return how many integration steps a sample needs so that a speed feedback (N·m·s/rad) stays stable."""
-    fastest = feedback_gain * np.abs(np.linalg.eigvals(masses(a)[1])).max()
-    return max(1, int(np.ceil(fastest * period / STABLE_REACH)))
+    """Return how many integration steps a sample needs so that a speed feedback (N·m·s/rad) stays stable.
+
+    Raises
+    ------
+    InputError
+        Where the loop is faster than any that is built: a model can be so light at some pose that it hardly has mass.
+    """
+    mobility = float(np.abs(np.linalg.eigvals(masses(a)[1])).max())
+    needed = max(1, int(np.ceil(feedback_gain * mobility * period / STABLE_REACH)))
+    if needed > MOST_STEPS:
+        raise InputError(
+            f"the motors feel as little as {1.0 / mobility:.2g} kg·m² at some pose of this model, too little for a "
+            f"feedback of {feedback_gain:g} N·m·s/rad at {1.0 / period:g} Hz to be simulated. Identify it again from "
+            "richer motions, or give a smaller feedback_gain_nm_s_rad"
+        )
+    return needed

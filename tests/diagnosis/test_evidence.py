@@ -85,6 +85,23 @@ def test_play_is_heard_where_scatter_follows_the_load_through_zero_and_only_at_i
     assert np.all(evidence_of_play([run], [noise(run)], 1 / 6) < 2.0)
 
 
+def test_what_goes_smoothly_with_a_motion_that_is_fast_where_the_load_changes_sign_is_no_play(run):
+    at = 2 * np.pi * 0.25 * run.time
+    slow = 2 * np.pi * 0.25 * np.arange(len(run.motion.q)) / run.motion.sample_rate_hz
+    loaded = replace(run.motion, load=10.0 * np.sin(slow)[:, np.newaxis] * [1.0, 1.0])
+    # Faster and faster towards each change of the load's sign, as what swings is where it hangs.
+    swing = np.exp(-((np.sin(at) / 0.3) ** 2)) * np.sin(2 * np.pi * 5.0 * run.time)
+    q, dq, ddq = (x.copy() for x in run.state)
+    ddq[:, 1] += 6.0 * swing
+    fast = replace(run, motion=loaded, state=(q, dq, ddq))
+    eccentric = noise(run)
+    eccentric[:, 1] += 0.3 * ddq[:, 1] * (1.0 + 0.5 * np.sin(q[:, 1] + 1.0))
+    assert evidence_of_play([fast], [eccentric], 1 / 6)[1] < 2.0
+    loud = noise(run)
+    loud[np.abs(np.sin(at)) < 0.3, 1] *= 3.0
+    assert evidence_of_play([fast], [loud], 1 / 6)[1] > 6.0, "bursts are heard in the same motion"
+
+
 def bursts(run, seed=3):
     """A push of half a second every three seconds or so, at instants of its own."""
     starts = np.cumsum(np.random.default_rng(seed).exponential(3.0, 40))

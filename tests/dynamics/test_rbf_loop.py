@@ -12,6 +12,7 @@ from pipelines.effects.encoder_offset import EncoderOffset
 from pipelines.effects.friction import Friction
 from pipelines.effects.joint_elasticity import JointElasticity
 from pipelines.effects.rigid_body import RigidBody
+from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.model import Model, Term
@@ -112,6 +113,15 @@ def test_an_elastic_knee_is_followed_where_the_step_is_as_short_as_its_motor_nee
     run = follow(model, controller(), substeps=needed)
     wanted = np.array([wave(k * PERIOD)[0] for k in range(len(run.angle))])
     assert np.abs(run.angle - wanted)[-1000:].max() < 0.05
+
+
+def test_a_leg_that_hardly_has_mass_at_some_pose_is_refused_before_the_memory_is_full():
+    # With the knee folded the mass matrix has the determinant X1 X2 - X2² - (X3 L1)².
+    X3 = np.sqrt(X[1] * (X[0] - X[1])) / GEOMETRY.thigh_length_m * (1.0 - 1e-7)
+    light = Model((Term(RigidBody(), np.array([X[0], X[1], X3, X[3]])), *body().terms[1:]))
+    assert np.all(np.linalg.eigvalsh(masses(assemble(light, GEOMETRY))[0]) > 0.0)
+    with pytest.raises(InputError, match="the motors feel as little as"):
+        substeps_for(assemble(light, GEOMETRY), 300.0, PERIOD)
 
 
 def test_mobility_is_the_inverse_of_the_mass_where_joints_are_rigid():
