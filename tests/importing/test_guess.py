@@ -249,6 +249,8 @@ def test_a_log_in_which_nothing_moves_gets_no_guess(pendulum, write_csv, capsys)
         ("n / (1/min)", "velocity", "", "rpm"),
         ("Strom Hüfte [mA]", "current", "hip", "mA"),
         ("Motorstrom in A", "current", "", "A"),
+        ("motor_A", "current", "", "A"),
+        ("joint_A", "", "a", None),
         ("Kniewinkel (°)", "angle", "knee", "deg"),
         ("Drehzahlistwert_U/min", "velocity", "", "rpm"),
         ("Sollwinkel [Grad]", "reference", "", "deg"),
@@ -407,6 +409,34 @@ def test_a_drives_log_of_a_motor_before_its_gear_leads_to_the_joint(imported, gu
     assert_allclose(frame["joint_torque_nm"], columns["torque"][: len(frame)], atol=1e-9)
     assert_allclose(frame["joint_angle_rad"], columns["angle"][: len(frame)], atol=1e-4)
     assert "integrates to" not in outcome.told
+
+
+def test_a_motors_speed_beside_a_joints_angle_tells_the_gear(imported, guessed, pendulum, write_csv):
+    columns = swinging(pendulum)
+    path = write_csv(
+        {
+            "t_s": pendulum.time,
+            "knee_angle_deg": np.degrees(columns["angle"]),
+            "knee_motor_speed_rpm": columns["velocity"] * 50 * 30.0 / np.pi * 1.004,
+            "knee_motor_A": columns["torque"] / (0.08 * 50),
+        }
+    )
+    text, doubts = guessed(path)
+    assert text.count("gear_ratio = 50.0") == 2
+    assert "as of a motor that turns 50 times for one turn of the joint" in doubts["joint[0].velocity.unit"]
+    assert {"joint[0].velocity.gear_ratio", "joint[0].torque.gear_ratio"} <= doubts.keys()
+    outcome = imported(path, map_text=text.replace("# torque_constant_nm_a =", "torque_constant_nm_a = 0.08 #"))
+    assert (outcome.code, outcome.err) == (0, "")
+    frame = outcome.recording("log_train").frame
+    assert_allclose(frame["knee_torque_nm"], columns["torque"][: len(frame)], atol=1e-9)
+    assert_allclose(frame["knee_velocity_rad_s"], 1.004 * columns["velocity"][: len(frame)], atol=1e-9)
+
+
+@pytest.mark.parametrize("delimiter", ["^", "~", "&", "\x01"])
+def test_a_guess_reads_what_is_written_with_any_delimiter(guessed, pendulum, write_csv, delimiter):
+    text, doubts = guessed(write_csv(pendulum.columns(), delimiter=delimiter))
+    assert 'column = "angle"' in text
+    assert "joint[0].angle.column" not in doubts
 
 
 def test_a_current_without_a_unit_is_doubtful_for_the_reason_that_is_given(guessed, pendulum, write_csv):

@@ -81,7 +81,9 @@ def write_joint(
         proposal.key("wraps_at", full, "steps by so much from one row to the next: its counter was full")
     if velocity is not None:
         used.append(_write_velocity(proposal, where, joint, units, of_a_motor))
-    used.append(_write_torque(proposal, where, joint, kind, bits, logged, fit if alone else None, constants))
+    used.append(
+        _write_torque(proposal, where, joint, kind, bits, logged, fit if alone else None, constants, units.gear)
+    )
     used += _write_others(proposal, where, joint, units)
     return [*used, joint.enabled] if joint.enabled else used
 
@@ -134,8 +136,9 @@ def _write_angle(
     return of_a_motor
 
 
-def _write_gear(proposal: Proposal, where: str = "from its data sheet") -> None:
-    proposal.key("gear_ratio", 1.0, f"turns of the motor for one of the joint, {where}", sure=False)
+def _write_gear(proposal: Proposal, where: str = "from its data sheet", ratio: float = 1.0) -> None:
+    why = f"turns of the motor for one of the joint, {where}"
+    proposal.key("gear_ratio", ratio, why if ratio == 1.0 else f"{why}; {ratio:g} is what the velocity tells", False)
 
 
 def _write_zero(proposal: Proposal, fit: TorqueFit | None, units: Units) -> None:
@@ -159,8 +162,8 @@ def _write_velocity(proposal: Proposal, where: str, joint: JointColumns, units: 
     proposal.key("unit", units.velocity, units.velocity_why, units.velocity_sure)
     if units.velocity_sign < 0:
         proposal.key("sign", -1, "it counts the other way than the angle", sure=False)
-    if of_a_motor:
-        _write_gear(proposal, "where it is the motor's")
+    if of_a_motor or units.gear != 1.0:
+        _write_gear(proposal, "where it is the motor's", units.gear)
     return column
 
 
@@ -173,6 +176,7 @@ def _write_torque(
     logged: Mapping[str, NDArray],
     fit: TorqueFit | None,
     constants: Mapping[str, float],
+    gear: float,
 ) -> str:
     drive = joint.drive
     proposal.table("[joint.torque]", f"{where}.torque")
@@ -188,7 +192,7 @@ def _write_torque(
     if bits[drive]:
         proposal.key("signed_bits", bits[drive], f"whole numbers up to 2^{bits[drive]}: its sign was lost")
     whole = are_whole(logged[drive]) if drive == "current" else bits[drive] is not None
-    _write_torque_unit(proposal, drive, found.unit, kind, logged[drive], whole, constants)
+    _write_torque_unit(proposal, drive, found.unit, kind, logged[drive], whole, constants, gear)
     _write_torque_sign(proposal, fit)
     return found.column
 
@@ -207,6 +211,7 @@ def _write_torque_unit(
     values: NDArray,
     whole: bool,
     constants: Mapping[str, float],
+    gear: float,
 ) -> None:
     dimension = UNITS[named].dimension if named else ""
     if named and dimension == "share":
@@ -215,14 +220,14 @@ def _write_torque_unit(
             "rated_force_n" if kind == "prismatic" else "rated_torque_nm",
             f"what {1.0 / UNITS[named].factor:g} {named} are, from the drive's settings",
         )
-        _write_gear(proposal)
+        _write_gear(proposal, ratio=gear)
     elif drive == "voltage":
         proposal.key("unit", named or "V", "a voltage, by its name", named is not None)
         proposal.unknown("gain_n_v" if kind == "prismatic" else "gain_nm_v", _what_a_volt_does(kind, constants))
     elif dimension == "current" or (not named and (drive == "current" or whole)):
         proposal.key("unit", *((named, "its name says so") if named else _unit_of_current(whole)))
         proposal.unknown("torque_constant_nm_a", "of the motor, from its data sheet")
-        _write_gear(proposal)
+        _write_gear(proposal, ratio=gear)
     elif dimension == "force" and kind == "revolute":
         proposal.unknown("unit", f"{named} are of a force, and what turns a joint is a torque: is it another column?")
     else:

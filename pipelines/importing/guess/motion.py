@@ -16,6 +16,10 @@ MANY = 100.0
 """So many counts are no degrees."""
 CLEAR = 0.7
 """Share of the variance that has to be in common for a slope to count."""
+LEAST_GEAR, MOST_GEAR = 1.5, 1000.0
+"""Ratios that a gear has between a motor and a joint."""
+WHOLE = 0.01
+"""So near to a whole number, as its share, a ratio is taken for it: drives filter their velocities."""
 VELOCITY_OF = {
     "rad": "rad/s", "mrad": "mrad/s", "deg": "deg/s", "rev": "rev/s", "m": "m/s", "cm": "cm/s", "mm": "mm/s",
     "um": "mm/s", "in": "in/s", "counts": "counts/s",
@@ -37,6 +41,8 @@ class Units:
     velocity_why: str = ""
     velocity_sure: bool = True
     velocity_sign: int = 1
+    gear: float = 1.0
+    """Turns of what the velocity is of for one of what the angle is of."""
 
 
 def guess_units(
@@ -83,7 +89,19 @@ def _from_slope(agreement: Agreement, unit: str, why: str, sure: bool, velocity_
     if fitting and not sure:
         other, velocity = fitting[0]
         return Units(other, f"fits the velocity, which {said}", False, velocity, said, False, sign)
+    if sure and velocity_named and (ratio := _gear(slope, unit, velocity_named)):
+        geared = f"{said}, as of a motor that turns {ratio:g} times for one turn of the joint"
+        return Units(unit, why, sure, velocity_named, geared, False, sign, ratio)
     return Units(unit, why, sure, velocity_named or VELOCITY_OF[unit], f"{said}, which no units explain", False, sign)
+
+
+def _gear(slope: float, unit: str, velocity: str) -> float | None:
+    """Return the gear that a slope tells where both units are known, in few digits; None where it would be none."""
+    if UNITS[unit].dimension != "angle" or UNITS[velocity].dimension != "angular velocity":
+        return None
+    ratio = slope * UNITS[velocity].factor / UNITS[unit].factor
+    near = round(ratio) if abs(ratio - round(ratio)) < WHOLE * ratio else float(f"{ratio:.3g}")
+    return float(near) if LEAST_GEAR < ratio < MOST_GEAR else None
 
 
 def counts_in_a_turn(time_s: NDArray, angle: NDArray, velocity: NDArray, velocity_unit: str) -> float | None:

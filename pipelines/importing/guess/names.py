@@ -39,6 +39,8 @@ MEASURED = _words("meas measured act actual msr fb feedback ist istwert mesure m
 ENABLED = _words("enable enabled servoon")
 """Words of a switch of the drive; ``servo_on`` and the like are two."""
 SWITCHED = _words("servo drive motor torque power")
+DRIVES = _words("motor drive servo mot moteur antrieb actuator aktor")
+"""What is fed by a current: ``motor_A`` is one, ``joint_A`` is a joint."""
 SOMETHING_ELSE = _words(
     "cell fric friction error err count number status state mode id isd ia ib ic iu iv iw flag limit bus supply "
     "battery imu gyro grenze fehler schleppfehler schleppabstand abweichung nummer zustand modus zwischenkreis "
@@ -143,6 +145,8 @@ def _confirms(told: UnitInName, quantity: str, words: set[str]) -> bool:
         return quantity in ("torque", "current")
     if told.quantity == "force" and "f" in words:
         return True
+    if told.unit == "A" and not quantity:
+        return bool(words & DRIVES)
     return told.quantity == ("angle" if words & COMMANDED and not quantity else quantity)
 
 

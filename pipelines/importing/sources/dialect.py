@@ -14,6 +14,8 @@ from pipelines.settings.units import unit_named
 LOOKED_AT = 2**16
 """Bytes at the beginning of a file that tell how it is written."""
 DELIMITERS = (",", ";", "\t", "|", " ")
+RARE = re.compile(r"[^\w\s.+\-:/\"'#%,;|]|[\x01-\x08]")
+"""What else may stand between numbers, looked at where none of these makes a table."""
 COMMENTS = ("#", "%")
 BYTE_ORDER_MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 NOT_A_NUMBER = {"", "nan", "null", "none", "na", "n/a", "inf", "-inf", "-nan", "true", "false"}
@@ -69,11 +71,9 @@ def find_dialect(path: Path, settings: SourceSettings) -> Dialect:
         raise InputError(f"source.encoding: found {encoding!r}, expected one such as utf-8") from error
     lines = lines if whole else lines[:-1]
     skipped = settings.skip_rows or 0
-    guesses = [
-        guess
-        for delimiter in ([settings.delimiter] if settings.delimiter else DELIMITERS)
-        if (guess := _Table.of(lines[skipped:], delimiter, settings))
-    ]
+    guesses = _tables(lines[skipped:], [settings.delimiter] if settings.delimiter else DELIMITERS, settings)
+    if not guesses and not settings.delimiter:
+        guesses = _tables(lines[skipped:], sorted(set(RARE.findall("".join(lines[skipped:])))), settings)
     if not guesses:
         raise InputError(_why_there_is_none(lines, settings))
     table = max(guesses, key=lambda guess: guess.fields_of_numbers)
@@ -89,6 +89,10 @@ def find_dialect(path: Path, settings: SourceSettings) -> Dialect:
     return Dialect(
         encoding, table.delimiter, table.decimal, comment, skipped + table.first, _told_apart(names), tuple(notes)
     )
+
+
+def _tables(lines: Sequence[str], delimiters: Sequence[str], settings: SourceSettings) -> list["_Table"]:
+    return [table for delimiter in delimiters if (table := _Table.of(lines, delimiter, settings))]
 
 
 def _encoding(start: bytes) -> str:
