@@ -12,6 +12,7 @@ from pipelines.diagnosis.candidates import Candidate
 from pipelines.diagnosis.fit import Fit, fit, refined, residuals_on
 from pipelines.diagnosis.floor import MOST_INDEPENDENT, Floor, independent_share
 from pipelines.diagnosis.perceived import heard_in
+from pipelines.diagnosis.rhythm import shadows_motion
 from pipelines.diagnosis.search import Scored, Scorer, cost, known_besides, log_likelihood, search
 from pipelines.effects import Effect
 from pipelines.label import effect_labelled
@@ -62,6 +63,8 @@ class Choice:
     """The named set with one of its causes in two shapes at once, where that was tried."""
     refuted: frozenset[tuple[str, ...]] = frozenset()
     """Sets that explain the training runs and fail on others."""
+    shadows: frozenset[tuple[str, ...]] = frozenset()
+    """Sets in which a rhythm of the motion's own mends the form of other causes."""
 
     def next_best(self) -> "Choice | None":
         """Return the choice with the named set refuted and the next of those as good; None where there is none.
@@ -124,9 +127,11 @@ def choose(bank: Bank, floor: Floor, evidence: Mapping[str, float]) -> Choice:
     ranked = [{named.labels: named}]
     freer: list[Ranked] = []
     standby: list[Ranked] = []
+    shadows: set[tuple[str, ...]] = set()
     for level in levels:
         finalists = [_rank(scorer, s, empty) for s in _finalists(level, named, scorer)]
-        finalists = [r for r in finalists if not r.fit.is_absurd(bank.baseline)]
+        shadows |= {r.labels for r in finalists if shadows_motion(r.fit.causes, bank.runs)}
+        finalists = [r for r in finalists if r.labels not in shadows and not r.fit.is_absurd(bank.baseline)]
         ranked.append({r.labels: r for r in finalists})
         if not finalists:
             break
@@ -137,7 +142,9 @@ def choose(bank: Bank, floor: Floor, evidence: Mapping[str, float]) -> Choice:
         named, *others = sorted(worthy, key=lambda r: -r.score)
         freer, standby = [], [r for r in others if r.score > named.score - NEEDED]
     _, *others = itertools.chain.from_iterable(_and_anew(r, scorer, empty) for r in (named, *standby))
-    return Choice(named, levels, ranked, independent, tuple(others), freer[0].fit if freer else None)
+    return Choice(
+        named, levels, ranked, independent, tuple(others), freer[0].fit if freer else None, shadows=frozenset(shadows)
+    )
 
 
 def _and_anew(ranked: Ranked, scorer: Scorer, empty: Fit) -> Iterator[Ranked]:
@@ -256,7 +263,7 @@ def rivals(choice: Choice, bank: Bank, cause: str) -> dict[str, float]:
     fine = choice.refined[size]
     best_coarse = choice.levels[size - 1][choice.named.labels].score
     for labels, scored in choice.levels[size - 1].items():
-        if labels in choice.refuted:
+        if labels in choice.refuted | choice.shadows:
             continue
         if set(others) <= set(labels) and len(set(labels)) == len(labels) == size:
             rival = next(iter(set(labels) - set(others)))
