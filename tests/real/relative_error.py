@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import decimate
 
+from pipelines.estimation.regression import away_from_reversals
 from pipelines.mechanics.motion import Motion
 from pipelines.model import Model
 from pipelines.signals.low_pass import ORDER, low_pass
@@ -83,6 +84,16 @@ def fitted(model: Model, motion: Motion) -> Model:
     A, b = decimated(model.regressor(motion)), decimated(motion.torque)
     values = np.linalg.lstsq(A.reshape(-1, A.shape[-1]), b.ravel(), rcond=None)[0]
     return model.with_linear(values)
+
+
+def error_by_place(model: Model, motion: Motion) -> tuple[float, float]:
+    """Return the first joint's error, rms in N·m or N, behind that filter: near its reversals, and away from them.
+
+    Near is what no fit of ``exoid diagnose`` takes.
+    """
+    left = decimated(motion.torque - model.torque(motion))[:, 0]
+    away = away_from_reversals(motion)[::10][EDGE:-EDGE, 0]
+    return float(np.sqrt(np.mean(left[~away] ** 2))), float(np.sqrt(np.mean(left[away] ** 2)))
 
 
 def decimated_error(model: Model, motion: Motion) -> TorqueError:

@@ -12,10 +12,12 @@ from pipelines.label import cause_label, effect_told
 from pipelines.mechanics.motion import Motion
 from tests.real.machines import LOGS, Diagnosed, of_purpose, symmetric, with_rotor
 from tests.real.published import EMPS, EMPS_ERRORS, double_pendulum, their_torque
-from tests.real.relative_error import TorqueError, decimated_error, fitted, slow_error, slow_fit
+from tests.real.relative_error import TorqueError, decimated_error, error_by_place, fitted, slow_error, slow_fit
 
 SHIFTS_S = np.linspace(-0.012, 0.012, 13)
 """By which a prediction is moved along the stamps; positive where the angles are older than their stamps."""
+
+RUNS = ("without pulses", "with pulses")
 
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -63,6 +65,10 @@ def emps(found: Mapping[str, Diagnosed]) -> str:
         ("what diagnose names, its own values", d.model, "asymmetric"),
         ("what diagnose names, refitted behind this filter", named, "asymmetric"),
     ]
+    where = [
+        (title, *(f"{error:.2f}" for run in (train, pulses) for error in error_by_place(model, run)))
+        for title, model, _ in said
+    ]
     errors = [
         (
             title,
@@ -75,6 +81,7 @@ def emps(found: Mapping[str, Diagnosed]) -> str:
         [
             table(("parameter", "published", "found", "difference"), rows),
             table(("model", "relative error (asked for)", "cross-validation, pulses (asked for)"), errors),
+            table(("error, N rms", *(f"{run}, {at}" for run in RUNS for at in ("at reversals", "away"))), where),
         ]
     )
 
@@ -190,7 +197,7 @@ def flexibility(d: Diagnosed) -> str:
     """Return where on the pulses run the force error is in frequency, and how large the acceleration's is."""
     (train,), (pulses,) = of_purpose(d.motions, "train"), of_purpose(d.motions, "validate")
     rows = []
-    for title, motion in (("without pulses", train), ("with pulses", pulses)):
+    for title, motion in zip(RUNS, (train, pulses), strict=True):
         left = (motion.torque - d.model.torque(motion))[motion.valid, 0]
         mass = dict(zip((p.symbol for _, p in d.model.linear_parameters), d.model.linear_values, strict=True))["X1"]
         acceleration = motion.ddq[motion.valid, 0]
