@@ -300,7 +300,7 @@ def describe(found: Sequence[Dependence], above: Sequence[Excess], together: Seq
     if own[0].share < LITTLE:
         return (
             f"What is left at {the(joint)}{where}{',' * bool(where)} depends on nothing that was measured: neither "
-            f"motion, load and time nor a steady tone foretells {100 * LITTLE:.0f} % of it."
+            f"motion, load and time nor a steady tone above {LOWEST_HZ:g} Hz foretells {100 * LITTLE:.0f} % of it."
         )
     second = next((d for d in own[1:] if d.variable != "phase" and d.share > max(0.5 * own[0].share, LITTLE)), None)
     return own[0].sentence + where + "." + (f" Nearly as much: {second.sentence}." if second else "")
