@@ -64,7 +64,7 @@ class Choice:
     refuted: frozenset[tuple[str, ...]] = frozenset()
     """Sets that explain the training runs and fail on others."""
     shadows: frozenset[tuple[str, ...]] = frozenset()
-    """Sets in which a rhythm of the motion's own mends the form of other causes."""
+    """Sets in which a rhythm of the motion's own takes what other causes leave, or little of all."""
 
     def next_best(self) -> "Choice | None":
         """Return the choice with the named set refuted and the next of those as good; None where there is none.
@@ -130,7 +130,7 @@ def choose(bank: Bank, floor: Floor, evidence: Mapping[str, float]) -> Choice:
     shadows: set[tuple[str, ...]] = set()
     for level in levels:
         finalists = [_rank(scorer, s, empty) for s in _finalists(level, named, scorer)]
-        shadows |= {r.labels for r in finalists if shadows_motion(r.fit.causes, bank.runs)}
+        shadows |= {r.labels for r in finalists if shadows_motion(r.fit, empty.rms, floor.rms, bank.runs)}
         finalists = [r for r in finalists if r.labels not in shadows and not r.fit.is_absurd(bank.baseline)]
         ranked.append({r.labels: r for r in finalists})
         if not finalists:
