@@ -12,6 +12,7 @@ from pipelines.estimation.regression import away_from_reversals, reversal_speeds
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.one_machine import refuse_several_machines
 from pipelines.mechanics.origin import settings_of
+from pipelines.mechanics.silence import refuse_silent_torque
 
 MOST_NM = 10_000.0
 COPIED = 1e-12
@@ -81,7 +82,7 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
     machine = motions[0].machine
     least = machine.lasting(LEAST_S)
     for j, joint in enumerate(machine.joints):
-        _refuse_dead_angle(motions, j)
+        _refuse_dead_channel(motions, j)
         if (lasts := _seconds(motions, [m[:, j] for m in moving])) < least:
             raise InputError(
                 f"{files}: {the(joint.name)} moves for {lasts:.1f} s (faster than {reversal_speeds(machine)[j]:.2g} "
@@ -97,8 +98,11 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
         )
 
 
-def _refuse_dead_angle(motions: Sequence[Motion], joint: int) -> None:
-    """Refuse an angle that is one number all along: what a filter leaves of it only seems to move."""
+def _refuse_dead_channel(motions: Sequence[Motion], joint: int) -> None:
+    """Refuse an angle or torque that is one number all along: what a filter leaves of such an angle seems to move."""
+    torque = np.concatenate([m.torque[m.valid, joint] for m in motions])
+    if len(torque) and np.ptp(torque) == 0.0:
+        refuse_silent_torque(motions, motions[0].machine.joints[joint], float(torque[0]))
     measured = [m.measured_angle[m.valid, joint] for m in motions if m.measured_angle is not None]
     values = np.concatenate(measured) if measured else np.zeros(0)
     if len(values) and np.ptp(values) == 0.0:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pipelines.estimation.compressed import Compressed, compress, together
 from pipelines.estimation.regression import Regression, regressions
 from pipelines.mechanics.run import Run
+from pipelines.mechanics.silence import refuse_silent_torque
 from pipelines.model import Model
 
 
@@ -23,8 +24,18 @@ class Training:
 
     @cached_property
     def compressed(self) -> tuple[Compressed, ...]:
-        """Each run's rows on all columns; they are gone through once, whatever is fitted to them."""
-        return tuple(compress(regressions(run, self.model)) for run in self.runs)
+        """Each run's rows on all columns; they are gone through once, whatever is fitted to them.
+
+        Raises
+        ------
+        InputError
+            Where the torque of a joint is nought in all of them.
+        """
+        parts = tuple(compress(regressions(run, self.model)) for run in self.runs)
+        for j, joint in enumerate(self.runs[0].machine.joints if self.runs else ()):
+            if all(part.count[j] > 0 and not part.torque[j].any() for part in parts):
+                refuse_silent_torque(self.runs, joint, 0.0)
+        return parts
 
     @cached_property
     def whole(self) -> "Training":

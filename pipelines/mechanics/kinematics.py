@@ -24,6 +24,8 @@ EDGE_PERIODS = 1.5
 """Periods of the cut-off frequency at each end of a segment where the filter lacks one side."""
 SPLINE_REACH = 40
 """Samples away from which a cubic spline no longer feels a cut: its influence falls by 3.7 with each."""
+SLOWEST_HZ, FASTEST_HZ = 12.0, 1e6
+"""Rates at which a machine's motion can be looked at: what moves below 5 Hz is seen, and no clock was misread."""
 WINDOW = 2**16
 """Rows that are filtered at a time; fewer than the filter reaches would cost more than they save."""
 
@@ -90,6 +92,7 @@ def filtered(recording: Rows, settings: FilterSettings) -> FilteredRecording:
     """
     rate_hz = float(recording.metadata["sample_rate_hz"])
     with about(recording.path):
+        _refuse_strange_rate(rate_hz, "imported" in recording.metadata)
         stretches = find_stretches((piece["time_s"].to_numpy() for piece in recording.pieces(["time_s"])), rate_hz)
         cutoff = _cutoff(recording, stretches, rate_hz, settings)
         _refuse_stretches_that_are_all_edge(stretches, rate_hz, cutoff)
@@ -99,6 +102,15 @@ def filtered(recording: Rows, settings: FilterSettings) -> FilteredRecording:
     block = BlockAverage.lasting(settings.block_s, rate_hz)
     metadata = {**recording.metadata, "filter": how, "regression_filter": block.as_metadata(rate_hz)}
     return FilteredRecording(recording, metadata, cutoff, stretches)
+
+
+def _refuse_strange_rate(rate_hz: float, imported: bool) -> None:
+    if not SLOWEST_HZ <= rate_hz <= FASTEST_HZ:
+        where = "time.unit in the map, and import again" if imported else "sample_rate_hz in the rig file"
+        raise InputError(
+            f"is sampled at {rate_hz:.4g} Hz, expected {SLOWEST_HZ:g} Hz to {FASTEST_HZ / 1e6:g} MHz, for a "
+            f"joint's motion to be seen; correct {where}, or record it anew"
+        )
 
 
 def motion_table(recording: Table, settings: FilterSettings) -> Table:

@@ -52,6 +52,16 @@ def test_an_angle_that_is_one_number_all_along_is_told_as_that(motions):
     )
 
 
+@pytest.mark.parametrize("value", [0.0, -3.2])
+def test_a_torque_that_is_one_number_all_along_is_told_as_that(motions, value):
+    with pytest.raises(InputError) as refused:
+        diagnose([imported(replace(m, torque=m.torque * [1.0, 0.0] + [0.0, value])) for m in motions])
+    assert f": the torque of the knee is {value:.4g} N·m in every row, expected what a drive exerts" in str(
+        refused.value
+    )
+    assert str(refused.value).endswith("check that it was on, and which channel the map reads")
+
+
 @pytest.mark.parametrize("times", [1.0, -1.0, 57.3])
 def test_joints_that_hold_one_angle_between_them_are_refused(motions, times):
     def copied(motion):

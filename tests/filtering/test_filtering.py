@@ -93,6 +93,14 @@ def test_the_cutoff_and_why_stand_in_the_metadata():
             grid(0.2), {"cutoff_hz": 5.0}, {},
             "no stretch without a gap lasts the 0.60 s that a 5.0 Hz filter needs; the longest has 40 samples",
         ),
+        (
+            grid(20) * 1e4, {}, {"sample_rate_hz": 0.02, "imported": {"source": "log.csv"}},
+            r"is sampled at 0.02 Hz, expected 12 Hz to 1 MHz, .*; correct time.unit in the map",
+        ),
+        (
+            grid(20) * 1e-9, {}, {"sample_rate_hz": 2e11},
+            r"is sampled at 2e\+11 Hz, expected 12 Hz to 1 MHz, .*; correct sample_rate_hz in the rig file",
+        ),
         (grid(20), {"cutoff_hz": 120.0}, {}, "filter.cutoff_hz is 120, expected less than half the sample rate of 200"),
         (
             grid(20), {}, {"sample_rate_hz": 1000.0},

@@ -156,6 +156,12 @@ def test_a_joint_that_never_moves_is_refused_with_the_reason(noiseless_motions):
         identify(frozen)
 
 
+def test_a_torque_that_is_nought_all_along_is_refused_and_fitted_by_none(noiseless_motions):
+    silent = [replace(m, torque=m.torque * [1.0, 0.0]) for m in noiseless_motions]
+    with pytest.raises(InputError, match=r"the torque of the knee is 0 N·m in every row, expected what a drive exerts"):
+        identify(silent)
+
+
 def test_unrealizable_results_are_said(noiseless_motions):
     lighter = [replace(m, torque=0.2 * m.torque) if m.run == "with_human" else m for m in noiseless_motions]
     assert any(s.startswith("human: X2") for s in identify(lighter).unrealizable)

@@ -1,0 +1,17 @@
+"""Torques that say nothing: one number in every row, as of a drive that was off or a channel that is another's."""
+
+from collections.abc import Sequence
+
+from pipelines.contracts.joints import Joint, the
+from pipelines.errors import InputError
+from pipelines.mechanics.origin import settings_of
+from pipelines.mechanics.run import Run
+
+
+def refuse_silent_torque(runs: Sequence[Run], joint: Joint, value: float) -> None:
+    """Refuse runs in which the torque of a joint is one ``value`` all along."""
+    raise InputError(
+        f"{', '.join(run.file for run in runs)}: the {'torque' if joint.kind == 'revolute' else 'force'} of "
+        f"{the(joint.name)} is {value:.4g} {joint.unit('torque')} in every row, expected what a drive exerts; check "
+        f"that it was on, and which channel {settings_of(runs[0])} reads"
+    )
