@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.bank import Bank
+from pipelines.diagnosis.bent_spring import bent
 from pipelines.diagnosis.candidates import Candidate
 from pipelines.diagnosis.fit import Fit, fit, refined, residuals_on
 from pipelines.diagnosis.floor import MOST_INDEPENDENT, Floor, independent_share
@@ -136,15 +137,15 @@ def choose(bank: Bank, floor: Floor, evidence: Mapping[str, float]) -> Choice:
         if not finalists:
             break
         freer = [_rank(scorer, s, empty) for s in _freer(level, named)]
+        freer += [_ranked(scorer, causes, empty) for causes in bent(named.fit.causes)]
         worthy = [r for r in finalists if all(_worth_it(r, before, scorer) for before in (named, *freer))]
         if not worthy:
             break
         named, *others = sorted(worthy, key=lambda r: -r.score)
         freer, standby = [], [r for r in others if r.score > named.score - NEEDED]
     _, *others = itertools.chain.from_iterable(_and_anew(r, scorer, empty) for r in (named, *standby))
-    return Choice(
-        named, levels, ranked, independent, tuple(others), freer[0].fit if freer else None, shadows=frozenset(shadows)
-    )
+    best = max(freer, key=lambda r: r.score).fit if freer else None
+    return Choice(named, levels, ranked, independent, tuple(others), best, shadows=frozenset(shadows))
 
 
 def _and_anew(ranked: Ranked, scorer: Scorer, empty: Fit) -> Iterator[Ranked]:
