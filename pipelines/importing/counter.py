@@ -50,7 +50,8 @@ def unwrapped(values: NDArray, modulus: float, where: str, findings: list[Findin
     if turns[0]:
         begins = first + modulus * turns[0]
         seen = f"begins at {first:.6g} of {modulus:g}"
-        findings.append(Finding(where, seen, f"taken for {begins:.6g}, in the turn nearest to {near:.6g}"))
+        told = f"taken for {begins:.6g}, in the turn nearest to {near:.6g}; begins_at in the map names another"
+        findings.append(Finding(where, seen, told))
     return found
 
 

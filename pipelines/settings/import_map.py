@@ -240,6 +240,8 @@ class RecordingSettings(Settings):
                 f"found {name!r}, expected a file's name without its folder, and without control characters and "
                 '/ \\ : * ? " < > |; -o names the folder'
             )
+        if strange := set(re.findall(r"\{(.*?)\}", name)) - {"file", "folder", "purpose"}:
+            raise ValueError(f"found {{{min(strange)}}} in {name!r}, expected {{file}}, {{folder}} or {{purpose}}")
         return name
 
     @model_validator(mode="after")

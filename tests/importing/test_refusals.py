@@ -39,6 +39,7 @@ BAD_MAPS = [
     ('unit = "N·m"', 'unit = "N·m", range = [90, 100]', "pivot_torque_nm has no value in any row"),
     *(('name = "whole"', f'name = "{name}"', "recording[0].name: found", "expected a file's name without its folder")
       for name in ("", "../../evil", "/tmp/evil", "a\\u0000b", "c:evil")),
+    ('name = "whole"', 'name = "{nosuch}"', "recording[0].name: found {nosuch} in '{nosuch}', expected {file}, "),
     ('name = "pivot"', 'name = "Pivot 1"', "joint[0].name: found 'Pivot 1', expected text matching"),
 ]  # fmt: skip
 
@@ -58,6 +59,11 @@ def test_a_wrong_map_is_refused_with_its_key(imported, pendulum, write_csv, righ
     ("content", "line"),
     [
         (b"", "log.csv: is empty (0 bytes), expected a log"),
+        (b"[1, 2, 3]", "log.csv: is a list of numbers without names, expected records with keys"),
+        (
+            b'time,angle,velocity,torque\n0,1,2,3\n1,"1,2,3\n' + b"2,3,4,5\n" * 90,
+            "log.csv: line 3 opens a quotation mark that nothing closes; close it",
+        ),
         (b"\n\n\n", "log.csv: is empty, expected a table of numbers"),
         (b"time,angle,velocity,torque\n", "log.csv: holds no rows of two numbers or more after 'time,angle,velocity"),
         (bytes(range(256)) * 50, "log.csv: is no text (it starts with"),

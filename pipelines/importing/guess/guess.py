@@ -41,8 +41,9 @@ def propose(paths: Sequence[Path]) -> Proposal:
             if back:
                 raise InputError(f"its clock, {back[0]!r}, runs backwards; turn the order of its rows round")
             raise InputError(
-                f"none of {', '.join(source.names)} goes forward as a clock does, over ten rows or more; write the map "
-                "by hand, with time.rate_hz where rows are uniform: docs/import.md tells how"
+                f"none of {', '.join(source.names)} goes forward as a clock does, over ten rows or more and at "
+                f"{clock.SLOWEST_HZ:g} to {clock.FASTEST_HZ:g} Hz; write the map by hand, with time.rate_hz where rows "
+                "are uniform: docs/import.md tells how"
             )
     for path in paths[1:]:
         _refuse_other_columns(path, source)

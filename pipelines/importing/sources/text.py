@@ -40,10 +40,17 @@ def _load(path: Path, dialect: Dialect, names: Sequence[str]) -> Columns:
                     raise InputError(_too_many_fields(f"row {part[BEYOND].notna().idxmax()}", dialect))
                 parts.append(part[wanted].copy())
     except (pd.errors.ParserError, ValueError) as error:
-        line = re.search(r"in line (\d+), saw", str(error))
-        why = _too_many_fields(f"line {line[1]}", dialect) if line else f"cannot be read as text ({error})"
-        raise InputError(why) from error
+        raise InputError(_why_not(str(error), dialect)) from error
     return {name: _joined([part.pop(name).to_numpy() for part in parts]) for name in wanted}
+
+
+def _why_not(error: str, dialect: Dialect) -> str:
+    """Say what pandas means."""
+    if line := re.search(r"in line (\d+), saw", error):
+        return _too_many_fields(f"line {line[1]}", dialect)
+    if row := re.search(r"EOF inside string starting at row (\d+)", error):
+        return f"line {int(row[1]) + 1} opens a quotation mark that nothing closes; close it, or drop the line"
+    return f"cannot be read as text ({error}); export it anew"
 
 
 def _too_many_fields(where: str, dialect: Dialect) -> str:
