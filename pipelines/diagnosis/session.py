@@ -82,7 +82,7 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
     machine = motions[0].machine
     least = machine.lasting(LEAST_S)
     for j, joint in enumerate(machine.joints):
-        _refuse_dead_channel(motions, j)
+        _refuse_dead_angle(motions, j)
         if (lasts := _seconds(motions, [m[:, j] for m in moving])) < least:
             raise InputError(
                 f"{files}: {the(joint.name)} moves for {lasts:.1f} s (faster than {reversal_speeds(machine)[j]:.2g} "
@@ -90,6 +90,7 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
                 f"excite {('it', 'both joints', 'all joints')[min(len(machine.joints), 3) - 1]}, or record longer; "
                 f"if it did move, check its encoder, and the units of angle and time in {settings_of(motions[0])}"
             )
+        _refuse_dead_torque(motions, j)
     if (lasts := _seconds(motions, [m.all(axis=1) for m in moving])) < least:
         raise InputError(
             f"{files}: {' and '.join(machine.names)} move at once for {lasts:.1f} s, "
@@ -98,11 +99,15 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
         )
 
 
-def _refuse_dead_channel(motions: Sequence[Motion], joint: int) -> None:
-    """Refuse an angle or torque that is one number all along: what a filter leaves of such an angle seems to move."""
-    torque = np.concatenate([m.torque[m.valid, joint] for m in motions])
-    if len(torque) and np.ptp(torque) == 0.0:
-        refuse_silent_torque(motions, motions[0].machine.joints[joint], float(torque[0]))
+def _refuse_dead_torque(motions: Sequence[Motion], joint: int) -> None:
+    """Refuse a torque that is one number all along while its joint moves."""
+    values = np.concatenate([m.torque[m.valid, joint] for m in motions])
+    if len(values) and np.ptp(values) == 0.0:
+        refuse_silent_torque(motions, motions[0].machine.joints[joint], float(values[0]))
+
+
+def _refuse_dead_angle(motions: Sequence[Motion], joint: int) -> None:
+    """Refuse an angle that is one number all along: what a filter leaves of it only seems to move."""
     measured = [m.measured_angle[m.valid, joint] for m in motions if m.measured_angle is not None]
     values = np.concatenate(measured) if measured else np.zeros(0)
     if len(values) and np.ptp(values) == 0.0:
