@@ -16,6 +16,7 @@ from pipelines.mechanics.motion import Motion
 DEGREES = (2, 3, 4)
 """Of the angle, beside the straight line and the preload that a spring has itself."""
 ANY = (-1e6, 1e6)
+"""Amplitudes of which none is absurd."""
 
 
 class BentSpring(Effect):
@@ -24,7 +25,7 @@ class BentSpring(Effect):
     name = "bent_spring"
     title = "Bent spring"
     side = Side.STRUCTURE
-    equation = "tau = k2 q^2 + k3 q^3 + k4 q^4"
+    equation = "tau = k2 (q / s)^2 + k3 (q / s)^3 + k4 (q / s)^4, s the joint's travel beside an exoskeleton's"
     linear = tuple(Parameter(f"bend_{n}", "N·m", f"torque per angle to the power {n}", f"k{n}", ANY) for n in DEGREES)
     parity = Parity.EVEN
 

@@ -61,7 +61,7 @@ class Choice:
     Behind each, the named one too, stands the same with other values in every run of what may differ from run to run.
     """
     freer: Fit | None = None
-    """The named set with one of its causes in two shapes at once, where that was tried."""
+    """The named set in the best of its freer forms, a cause in two shapes or a spring bent, where one was tried."""
     refuted: frozenset[tuple[str, ...]] = frozenset()
     """Sets that explain the training runs and fail on others."""
     shadows: frozenset[tuple[str, ...]] = frozenset()

@@ -110,7 +110,7 @@ class Examined:
         all_sure = bool(sure) and len(sure) == len(labels)
         holds_up = all_sure or ((bool(sure) or not foreign) and standing.held_up(effects))
         if not holds_up and not foreign and choice.freer is not None:
-            # What is left may be the cause's own, in a form that takes two of ours.
+            # What is left may be the cause's own, in a form that is freer than ours.
             freer = Extended.of(choice.freer, validate, baseline)
             holds_up = standing.takes_enough and _standing(before, freer, floor).held_up(effects)
         return cls(after, floor, standing, wanders or hums, holds_up, sure, less)

@@ -65,10 +65,12 @@ def _less_smooth_law(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) 
     usable = [run.usable[:, j] for run in runs]
     known = np.concatenate([run.state[0][u, j] for run, u in zip(runs, usable, strict=True)])
     low, high = known.min(), known.max()
+    if not high > low:
+        return list(residuals)
     designs = [_smooth_law(run, j, low, high) for run in runs]
     A = np.concatenate([design[u] for design, u in zip(designs, usable, strict=True)])
     b = np.concatenate([residual[u, j] for residual, u in zip(residuals, usable, strict=True)])
-    if len(b) < BLOCKS_EACH * A.shape[1] or not high > low:
+    if len(b) < BLOCKS_EACH * A.shape[1]:
         return list(residuals)
     size = np.linalg.norm(A, axis=0)
     size[size == 0.0] = 1.0
@@ -86,7 +88,7 @@ def _smooth_law(run: Run, j: int, low: float, high: float) -> NDArray:
     here = dq[:, j]
     others = [x for k in range(q.shape[1]) if k != j for x in (ddq[:, k], dq[:, k] ** 2)]
     terms = np.column_stack([np.ones(len(q)), here, here**2, np.sign(here), ddq[:, j], *others])
-    polynomials = legvander(2.0 * (q[:, j] - low) / max(high - low, np.finfo(float).tiny) - 1.0, DEGREE)
+    polynomials = legvander(2.0 * (q[:, j] - low) / (high - low) - 1.0, DEGREE)
     return np.asarray((terms[:, :, np.newaxis] * polynomials[:, np.newaxis, :]).reshape(len(q), -1))
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.candidates import Candidate
 from pipelines.diagnosis.fit import Fit
 from pipelines.diagnosis.observations import Run
+from pipelines.effects import VoluntaryTorque
 
 DRIFT = 0.1
 """Turns by which a rhythm may drift against a multiple of the motion's over a whole run and pass for it.
@@ -35,9 +36,11 @@ def shadows_motion(made: Fit, before: NDArray, floor: NDArray, runs: Sequence[Ru
 
 def _is_of_motion(cause: Candidate, runs: Sequence[Run]) -> bool:
     """Tell whether a cause is a rhythm that in every run in which it acts is a multiple of the motion's own."""
-    at = next((i for i, p in enumerate(cause.effect.shape) if p.unit == "Hz"), None)
-    acting = [r for r, run in enumerate(runs) if run.motion.run in cause.effect.acts_in]
-    return at is not None and all(_is_multiple(cause.shapes[r][at], runs[r]) for r in acting)
+    if not isinstance(cause.effect, VoluntaryTorque):
+        return False
+    at = [p.name for p in cause.effect.shape].index("frequency")
+    acting = [(shape, run) for shape, run in zip(cause.shapes, runs, strict=True) if cause.effect.explains(run.motion)]
+    return bool(acting) and all(_is_multiple(shape[at], run) for shape, run in acting)
 
 
 def _is_multiple(frequency_hz: float, run: Run) -> bool:

@@ -12,7 +12,7 @@ from pipelines.estimation.regression import away_from_reversals, reversal_speeds
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.one_machine import refuse_several_machines
 from pipelines.mechanics.origin import settings_of
-from pipelines.mechanics.silence import refuse_silent_torque
+from pipelines.mechanics.silence import silent_torque
 
 MOST_NM = 10_000.0
 COPIED = 1e-12
@@ -103,7 +103,7 @@ def _refuse_dead_torque(motions: Sequence[Motion], joint: int) -> None:
     """Refuse a torque that is one number all along while its joint moves."""
     values = np.concatenate([m.torque[m.valid, joint] for m in motions])
     if len(values) and np.ptp(values) == 0.0:
-        refuse_silent_torque(motions, motions[0].machine.joints[joint], float(values[0]))
+        raise silent_torque(motions, motions[0].machine.joints[joint], float(values[0]) + 0.0)
 
 
 def _refuse_dead_angle(motions: Sequence[Motion], joint: int) -> None:

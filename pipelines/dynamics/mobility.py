@@ -63,14 +63,14 @@ def substeps_for(a: Assembly, feedback_gain: float, period: float) -> int:
     Raises
     ------
     InputError
-        Where the loop is faster than any that is built: a model can be so light at some pose that it hardly has mass.
+        Where that is more than ``MOST_STEPS``: a model can be so light at some pose that it hardly has mass.
     """
     mobility = float(np.abs(np.linalg.eigvals(masses(a)[1])).max())
-    needed = max(1, int(np.ceil(feedback_gain * mobility * period / STABLE_REACH)))
-    if needed > MOST_STEPS:
+    needed = feedback_gain * mobility * period / STABLE_REACH
+    if not needed <= MOST_STEPS:
         raise InputError(
             f"the motors feel as little as {1.0 / mobility:.2g} kg·m² at some pose of this model, too little for a "
             f"feedback of {feedback_gain:g} N·m·s/rad at {1.0 / period:g} Hz to be simulated. Identify it again from "
-            "richer motions, or give a smaller feedback_gain_nm_s_rad"
+            "richer motions, or give smaller gains of feedback"
         )
-    return needed
+    return max(1, int(np.ceil(needed)))

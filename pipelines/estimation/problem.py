@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipelines.estimation.compressed import Compressed, compress, together
 from pipelines.estimation.regression import Regression, regressions
 from pipelines.mechanics.run import Run
-from pipelines.mechanics.silence import refuse_silent_torque
+from pipelines.mechanics.silence import silent_torque
 from pipelines.model import Model
 
 
@@ -32,9 +32,10 @@ class Training:
             Where the torque of a joint is nought in all of them.
         """
         parts = tuple(compress(regressions(run, self.model)) for run in self.runs)
+        # Of triangles only nought is told from a constant; the diagnosis sees the samples.
         for j, joint in enumerate(self.runs[0].machine.joints if self.runs else ()):
             if all(part.count[j] > 0 and not part.torque[j].any() for part in parts):
-                refuse_silent_torque(self.runs, joint, 0.0)
+                raise silent_torque(self.runs, joint, 0.0)
         return parts
 
     @cached_property

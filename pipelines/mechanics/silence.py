@@ -8,9 +8,9 @@ from pipelines.mechanics.origin import settings_of
 from pipelines.mechanics.run import Run
 
 
-def refuse_silent_torque(runs: Sequence[Run], joint: Joint, value: float) -> None:
-    """Refuse runs in which the torque of a joint is one ``value`` all along."""
-    raise InputError(
+def silent_torque(runs: Sequence[Run], joint: Joint, value: float) -> InputError:
+    """Return what is wrong with runs in which the torque (N·m or N) of a joint is one ``value`` all along."""
+    return InputError(
         f"{', '.join(run.file for run in runs)}: the {'torque' if joint.kind == 'revolute' else 'force'} of "
         f"{the(joint.name)} is {value:.4g} {joint.unit('torque')} in every row, expected what a drive exerts; check "
         f"that it was on, and which channel {settings_of(runs[0])} reads"

@@ -432,6 +432,24 @@ def test_a_motors_speed_beside_a_joints_angle_tells_the_gear(imported, guessed, 
     assert_allclose(frame["knee_velocity_rad_s"], 1.004 * columns["velocity"][: len(frame)], atol=1e-9)
 
 
+def test_a_speed_in_another_unit_than_its_name_says_may_be_that_and_no_gear(guessed, pendulum, write_csv):
+    columns = swinging(pendulum)
+    speed = np.degrees(columns["velocity"])
+    _, doubts = guessed(
+        write_csv({"t_s": pendulum.time, "q_rad": columns["angle"], "speed_rad_s": speed, "tau_Nm": columns["torque"]})
+    )
+    assert doubts["joint[0].velocity.unit"].endswith("or it is in deg/s, whatever its name says")
+
+
+def test_json_records_with_an_index_that_has_no_name_are_read(guessed, pendulum, tmp_path):
+    path = tmp_path / "log.json"
+    columns = {"": np.arange(len(pendulum.time))} | pendulum.columns()
+    rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+    path.write_text(json.dumps([dict(zip(columns, row, strict=True)) for row in rows]), encoding="utf-8")
+    text, _ = guessed(path)
+    assert 'column = "angle"' in text
+
+
 @pytest.mark.parametrize("delimiter", ["^", "~", "&", "\x01"])
 def test_a_guess_reads_what_is_written_with_any_delimiter(guessed, pendulum, write_csv, delimiter):
     text, doubts = guessed(write_csv(pendulum.columns(), delimiter=delimiter))

@@ -91,6 +91,8 @@ def _from_slope(agreement: Agreement, unit: str, why: str, sure: bool, velocity_
         return Units(other, f"fits the velocity, which {said}", False, velocity, said, False, sign)
     if sure and velocity_named and (ratio := _gear(slope, unit, velocity_named)):
         geared = f"{said}, as of a motor that turns {ratio:g} times for one turn of the joint"
+        if misnamed := _misnamed(slope, unit, velocity_named):
+            geared += f"; or it is in {misnamed}, whatever its name says"
         return Units(unit, why, sure, velocity_named, geared, False, sign, ratio)
     return Units(unit, why, sure, velocity_named or VELOCITY_OF[unit], f"{said}, which no units explain", False, sign)
 
@@ -102,6 +104,16 @@ def _gear(slope: float, unit: str, velocity: str) -> float | None:
     ratio = slope * UNITS[velocity].factor / UNITS[unit].factor
     near = round(ratio) if abs(ratio - round(ratio)) < WHOLE * ratio else float(f"{ratio:.3g}")
     return float(near) if LEAST_GEAR < ratio < MOST_GEAR else None
+
+
+def _misnamed(slope: float, unit: str, velocity: str) -> str | None:
+    """Return the unit that a speed would be in were it no motor's; None where none makes such a slope."""
+    fitting = (
+        other for other in VELOCITIES
+        if other != velocity and UNITS[other].dimension == "angular velocity"
+        and abs(slope * UNITS[other].factor / UNITS[unit].factor - 1.0) < NEAR
+    )  # fmt: skip
+    return next(fitting, None)
 
 
 def counts_in_a_turn(time_s: NDArray, angle: NDArray, velocity: NDArray, velocity_unit: str) -> float | None:

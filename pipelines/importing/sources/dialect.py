@@ -14,8 +14,8 @@ from pipelines.settings.units import unit_named
 LOOKED_AT = 2**16
 """Bytes at the beginning of a file that tell how it is written."""
 DELIMITERS = (",", ";", "\t", "|", " ")
-RARE = re.compile(r"[^\w\s.+\-:/\"'#%,;|]|[\x01-\x08]")
-"""What else may stand between numbers, looked at where none of these makes a table."""
+RARE = re.compile(r"[^\w\s.+\-:/\"'#%,;|\0]")
+"""What else may stand between numbers, looked at where none of ``DELIMITERS`` makes a table."""
 COMMENTS = ("#", "%")
 BYTE_ORDER_MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
 NOT_A_NUMBER = {"", "nan", "null", "none", "na", "n/a", "inf", "-inf", "-nan", "true", "false"}

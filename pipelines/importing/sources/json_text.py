@@ -24,7 +24,7 @@ def open_json(path: Path, settings: SourceSettings) -> Source:
         columns = _flattened(_content(path), settings.table)
     except RecursionError as error:
         raise InputError("nests lists or tables deeper than any log does; write it again, flatter") from error
-    if "" in columns:
+    if set(columns) == {""}:
         raise InputError("is a list of numbers without names, expected records with keys, or lists under names")
     notes = (f"records under {settings.table}",) if settings.table else ()
     return Source(path, "JSON", tuple(columns), lambda names: {name: columns[name] for name in names}, notes)
