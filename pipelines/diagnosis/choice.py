@@ -136,8 +136,7 @@ def choose(bank: Bank, floor: Floor, evidence: Mapping[str, float]) -> Choice:
         ranked.append({r.labels: r for r in finalists})
         if not finalists:
             break
-        freer = [_rank(scorer, s, empty) for s in _freer(level, named)]
-        freer += [_ranked(scorer, causes, empty) for causes in bent(named.fit.causes)]
+        freer = _freer(level, named, scorer, empty)
         worthy = [r for r in finalists if all(_worth_it(r, before, scorer) for before in (named, *freer))]
         if not worthy:
             break
@@ -162,11 +161,12 @@ def _and_anew(ranked: Ranked, scorer: Scorer, empty: Fit) -> Iterator[Ranked]:
         yield made
 
 
-def _freer(level: dict[tuple[str, ...], Scored], named: Ranked) -> list[Scored]:
-    """Return the named set with one of its causes in two shapes at once, the best of such sets, if there is any."""
+def _freer(level: dict[tuple[str, ...], Scored], named: Ranked, scorer: Scorer, empty: Fit) -> list[Ranked]:
+    """Return the named set in freer forms: the best with a cause in two shapes at once, each with a spring bent."""
     made = [tuple(sorted((*named.labels, label))) for label in named.labels]
     found = [level[labels] for labels in made if labels in level and level[labels].admissible]
-    return sorted(found, key=lambda s: -s.score)[:1]
+    twice = [_rank(scorer, s, empty) for s in sorted(found, key=lambda s: -s.score)[:1]]
+    return twice + [_ranked(scorer, causes, empty) for causes in bent(named.fit.causes)]
 
 
 def _finalists(level: dict[tuple[str, ...], Scored], named: Ranked, scorer: Scorer) -> list[Scored]:

@@ -43,11 +43,13 @@ def evidence_of_play(runs: Sequence[Run], residuals: Sequence[NDArray], independ
     residuals : (m, O) of each run under the baseline
     independent_share : of samples
     """
-    joints = range(len(runs[0].motion.joints))
-    as_it_is = np.array([_louder(runs, residuals, j) for j in joints])
-    rough = [_less_smooth_law(runs, residuals, j) if as_it_is[j] > 0 else residuals for j in joints]
-    beyond = np.array([_louder(runs, left, j) for j, left in zip(joints, rough, strict=True)])
-    return np.asarray(independent_share * np.minimum(as_it_is, beyond))
+    return np.array([independent_share * _bursts(runs, residuals, j) for j in range(len(runs[0].motion.joints))])
+
+
+def _bursts(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> float:
+    """Return the log likelihood of bursts at one joint, with and without a smooth law of the motion: the smaller."""
+    as_it_is = _louder(runs, residuals, j)
+    return min(as_it_is, _louder(runs, _less_smooth_law(runs, residuals, j), j)) if as_it_is > 0.0 else 0.0
 
 
 def _louder(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> float:

@@ -20,6 +20,9 @@ from pipelines.validation import closest, similar_file
 LARGEST = 1e12
 """The most that a number of a map may be; what is more is a slip of the pen."""
 
+NAMED_AFTER = {"file", "folder", "purpose"}
+"""What may stand in braces in a recording's name."""
+
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
@@ -240,7 +243,7 @@ class RecordingSettings(Settings):
                 f"found {name!r}, expected a file's name without its folder, and without control characters and "
                 '/ \\ : * ? " < > |; -o names the folder'
             )
-        if strange := set(re.findall(r"\{(.*?)\}", name)) - {"file", "folder", "purpose"}:
+        if strange := set(re.findall(r"\{(.*?)\}", name)) - NAMED_AFTER:
             raise ValueError(f"found {{{min(strange)}}} in {name!r}, expected {{file}}, {{folder}} or {{purpose}}")
         return name
 
@@ -261,7 +264,7 @@ class RecordingSettings(Settings):
     def name_of(self, file: Path) -> str:
         """Return the name of the recording that is made of a file."""
         known = {"file": file.stem, "folder": file.absolute().parent.name, "purpose": self.purpose}
-        return re.sub(r"\{(file|folder|purpose)\}", lambda found: known[found[1]], self.name)
+        return re.sub(r"\{(.*?)\}", lambda found: known[found[1]], self.name)
 
 
 def _two_parts() -> tuple[RecordingSettings, ...]:

@@ -81,7 +81,7 @@ def _from_slope(agreement: Agreement, unit: str, why: str, sure: bool, velocity_
         for one in dict.fromkeys((*ANGLES, unit))
         for other in ([velocity_named] if velocity_named else VELOCITIES)
         if (UNITS[one].dimension == "angle") == (UNITS[other].dimension == "angular velocity")
-        and abs(slope * UNITS[other].factor / UNITS[one].factor - 1.0) < NEAR
+        and abs(_turns(slope, one, other) - 1.0) < NEAR
     ]
     same = [pair for pair in fitting if pair[0] == unit]
     if same:
@@ -97,11 +97,16 @@ def _from_slope(agreement: Agreement, unit: str, why: str, sure: bool, velocity_
     return Units(unit, why, sure, velocity_named or VELOCITY_OF[unit], f"{said}, which no units explain", False, sign)
 
 
+def _turns(slope: float, unit: str, velocity: str) -> float:
+    """Return how far what a velocity is of goes while what an angle is of goes one, in those units."""
+    return slope * UNITS[velocity].factor / UNITS[unit].factor
+
+
 def _gear(slope: float, unit: str, velocity: str) -> float | None:
     """Return the gear that a slope tells where both units are known, in few digits; None where it would be none."""
     if UNITS[unit].dimension != "angle" or UNITS[velocity].dimension != "angular velocity":
         return None
-    ratio = slope * UNITS[velocity].factor / UNITS[unit].factor
+    ratio = _turns(slope, unit, velocity)
     near = round(ratio) if abs(ratio - round(ratio)) < WHOLE * ratio else float(f"{ratio:.3g}")
     return float(near) if LEAST_GEAR < ratio < MOST_GEAR else None
 
@@ -111,7 +116,7 @@ def _misnamed(slope: float, unit: str, velocity: str) -> str | None:
     fitting = (
         other for other in VELOCITIES
         if other != velocity and UNITS[other].dimension == "angular velocity"
-        and abs(slope * UNITS[other].factor / UNITS[unit].factor - 1.0) < NEAR
+        and abs(_turns(slope, unit, other) - 1.0) < NEAR
     )  # fmt: skip
     return next(fitting, None)
 
