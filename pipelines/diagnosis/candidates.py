@@ -78,6 +78,12 @@ class Candidate:
         own = (i for i, p in enumerate(self.effect.shape) if p.per_run and self.bends)
         return next(own, None)
 
+    @property
+    def onset(self) -> int | None:
+        """Which shape parameter is the instant at which the effect begins in each run, None where it has none."""
+        own = (i for i, p in enumerate(self.effect.shape) if p.per_run and not self.bends)
+        return next(own, None)
+
 
 def bends_motion(effect: Effect) -> bool:
     """Tell whether an effect changes kinematics or readings rather than adding torque of its own."""

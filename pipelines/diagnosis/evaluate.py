@@ -4,7 +4,7 @@ Shared parameters come from training. What is tied to wall time, an onset or a p
 validation run fits for itself: on one half of its seconds to be scored on the other, and the other way round.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,15 +13,13 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.candidates import Candidate, columns_under
 from pipelines.diagnosis.fit import NEWTON_STEPS, Fit, laden, step_of, within_reach
 from pipelines.diagnosis.observations import Baseline, Run
-from pipelines.diagnosis.scan import ALWAYS, NEVER
+from pipelines.diagnosis.onset import ALWAYS, NEVER, Onset
 from pipelines.model import Term
 
 STRETCH_S = 1.0
 """Of every second stretch a run's own onsets and phases are learnt, to be scored on the others."""
-COARSE, CLOSER_LOOKS = 20, 2
-"""Instants tried along a run, and how often six more are tried about the best, four times as closely."""
-ALIKE = 4.0
-"""Weighted squared error within which two onsets explain a run alike."""
+ROUNDS = 2
+"""How often onsets are sought and all else fitted anew, for each is found with the others held."""
 
 
 def evaluate(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> list[NDArray]:
@@ -35,11 +33,10 @@ def _residual(fit: Fit, run: Run, baseline: Baseline) -> NDArray:
         columns, measured = columns_under([_shared_term(c) for c in fit.causes], run, baseline)
         return measured - columns @ _shared_values(fit, baseline)[0]
     half = _halves(run)
-    sides = [half == side for side in (0, 1)]
-    learnt = _learn(fit, run, baseline, [run.usable & ~side[:, np.newaxis] for side in sides])
     left = np.zeros_like(run.measured)
-    for side, (_, own, _) in zip(sides, learnt, strict=True):
-        left[side] = own[side]
+    for side in (0, 1):
+        scored = half == side
+        left[scored] = _learn(fit, run, baseline, run.usable & ~scored[:, np.newaxis])[1][scored]
     return left
 
 
@@ -71,7 +68,7 @@ def _shared_values(fit: Fit, baseline: Baseline) -> tuple[NDArray, NDArray]:
 
 def settled(fit: Fit, run: Run, baseline: Baseline) -> tuple[list[Term], NDArray]:
     """Return the causes as terms of a run's model with its own onsets and phases, and the baseline's values (b,)."""
-    values, _, terms = _learn(fit, laden([run], fit, baseline)[0], baseline, [run.usable])[0]
+    values, _, terms = _learn(fit, laden([run], fit, baseline)[0], baseline, run.usable)
     at = baseline.size
     filled = []
     for term in terms:
@@ -85,58 +82,35 @@ Learnt = tuple[NDArray, NDArray, list[Term]]
 """Values, residual (m, O), and the terms with a run's own onsets."""
 
 
-def _learn(fit: Fit, run: Run, baseline: Baseline, masks: Sequence[NDArray]) -> list[Learnt]:
-    """Fit the run's own onsets and phases to those samples of each mask (m, O).
-
-    Onsets that explain the learnt samples alike are as likely as one another, and the middle one is taken; but what
-    was there all along, or never, needs no coincidence.
-    """
+def _learn(fit: Fit, run: Run, baseline: Baseline, learnt: NDArray) -> Learnt:
+    """Fit the run's own onsets, phases and bends to those samples that are to be learnt from, (m, O)."""
+    begins = [(number, i) for number, cause in enumerate(fit.causes) if (i := cause.onset) is not None]
     terms = [_shared_term(cause) for cause in fit.causes]
-    dated = _onset(fit)
-    if dated is None:
-        return [entry[1:] for entry in _learn_amplitudes(fit, terms, run, baseline, masks)]
-    tried: dict[float, list[tuple[float, NDArray, NDArray, list[Term]]]] = {}
-
-    def look_at(instants: Iterable[float]) -> None:
-        for instant in set(instants) - set(tried):
-            begun = _with_shape(terms, *dated, instant)
-            tried[instant] = _learn_amplitudes(fit, begun, run, baseline, masks)
-
-    instants = np.linspace(run.time[0], run.time[-1], COARSE + 2)[1:-1]
-    look_at([NEVER, ALWAYS, *instants])
-    for side in range(len(masks)):
-        apart = instants[1] - instants[0]
-        for _ in range(CLOSER_LOOKS):
-            apart /= 4.0
-            best = min(set(tried) - {NEVER, ALWAYS}, key=lambda instant: tried[instant][side][0])
-            look_at(best + apart * np.arange(-3, 4))
-    return [_likeliest({instant: entries[side] for instant, entries in tried.items()}) for side in range(len(masks))]
-
-
-def _likeliest(tried: dict[float, tuple[float, NDArray, NDArray, list[Term]]]) -> Learnt:
-    alike = min(entry[0] for entry in tried.values()) + ALIKE
-    for simple in (NEVER, ALWAYS):
-        if tried[simple][0] < alike:
-            return tried[simple][1:]
-    likely = [instant for instant in sorted(tried) if tried[instant][0] < alike]
-    return tried[likely[len(likely) // 2]][1:]
-
-
-def _learn_amplitudes(
-    fit: Fit, terms: list[Term], run: Run, baseline: Baseline, masks: Sequence[NDArray]
-) -> list[tuple[float, NDArray, NDArray, list[Term]]]:
-    """Fit the run's own amplitudes and bends to each mask: squared error, values, residual (m, O), terms."""
-    shared, own = _shared_values(fit, baseline)
-    plain = columns_under(terms, run, baseline)
-    made = []
-    for learnt in masks:
-        bent, (columns, measured) = _bent(fit, terms, run, baseline, plain, learnt)
-        values = shared.copy()
-        values[own] = _solved(columns[:, :, own], measured - columns @ shared, learnt, fit.weights)
-        left = measured - columns @ values
-        squares = float(np.sum(fit.weights * np.sum(np.where(learnt, left, 0.0) ** 2, axis=0)))
-        made.append((squares, values, left, bent))
+    for place in begins:
+        terms = _with_shape(terms, *place, NEVER)
+    made = _learn_amplitudes(fit, terms, run, baseline, learnt)
+    for _ in range(ROUNDS if begins else 0):
+        for place in begins:
+            instant = _begun(fit, made, place, run, baseline, learnt)
+            made = _learn_amplitudes(fit, _with_shape(made[2], *place, instant), run, baseline, learnt)
     return made
+
+
+def _begun(fit: Fit, made: Learnt, place: tuple[int, int], run: Run, baseline: Baseline, learnt: NDArray) -> float:
+    """Return the instant (s) at which a cause begins, all else held."""
+    values, _, terms = made
+    ends = [columns_under(_with_shape(terms, *place, end), run, baseline) for end in (NEVER, ALWAYS)]
+    without, throughout = (measured - columns @ values for columns, measured in ends)
+    return Onset.of(run, without, throughout, learnt, fit.weights).likeliest
+
+
+def _learn_amplitudes(fit: Fit, terms: list[Term], run: Run, baseline: Baseline, learnt: NDArray) -> Learnt:
+    """Fit the run's own amplitudes and bends to samples (m, O)."""
+    shared, own = _shared_values(fit, baseline)
+    bent, (columns, measured) = _bent(fit, terms, run, baseline, columns_under(terms, run, baseline), learnt)
+    values = shared.copy()
+    values[own] = _solved(columns[:, :, own], measured - columns @ shared, learnt, fit.weights)
+    return values, measured - columns @ values, bent
 
 
 def _bent(
@@ -184,12 +158,3 @@ def _with_shape(terms: list[Term], number: int, i: int, value: float) -> list[Te
     values = terms[number].values.copy()
     values[len(terms[number].effect.linear) + i] = value
     return [replace(t, values=values) if k == number else t for k, t in enumerate(terms)]
-
-
-def _onset(fit: Fit) -> tuple[int, int] | None:
-    """Return which cause has an onset of its own in each run, and which of its shapes that is, if any has."""
-    for number, cause in enumerate(fit.causes):
-        for i, parameter in enumerate(cause.effect.shape):
-            if parameter.per_run and not cause.bends:
-                return number, i
-    return None

@@ -11,6 +11,7 @@ from scipy.optimize import minimize_scalar
 from pipelines.diagnosis.candidates import Candidate, columns_under, expanded, gram_of_runs, lowest
 from pipelines.diagnosis.gram import Gram, error, solve
 from pipelines.diagnosis.observations import Baseline, Run, with_load
+from pipelines.diagnosis.onset import ALWAYS, NEVER, Onset
 from pipelines.effects import Effect, Parameter, Side
 
 SWEEPS = 2
@@ -23,8 +24,6 @@ CLOSER = 0.25
 MAXIMA_APART = {"Hz": 0.01, "1/turn": 1.0, "rad/m": 1.0}
 """How far apart the maxima of an oscillating effect are, in its parameter's grain, by its unit: the scan has found
 the right one."""
-ONSETS_APART_S = 2.0
-"""How far apart the onsets are that the scan has tried."""
 BEYOND = 5.0
 """Times what is typical, from which an amplitude is doubted."""
 MOST_OF_ALL = 0.5
@@ -76,6 +75,10 @@ class Fit:
             dealt = list(zip(cause.effect.linear, cause.apart, strict=True))
             yield from ((cause.effect, p) for p, apart in dealt if not apart)
             yield from [(cause.effect, p) for p, apart in dealt if apart] * len(self.acting(cause))
+
+    def instead(self, number: int, cause: Candidate) -> list[Candidate]:
+        """Return the causes with another in the place of one."""
+        return [cause if k == number else c for k, c in enumerate(self.causes)]
 
     def acting(self, cause: Candidate) -> list[int]:
         """Return the runs in which a cause acts."""
@@ -167,14 +170,32 @@ def refined(causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline
                     best = _best_form(best, number, i, runs, baseline, weights)
                 if parameter.forms or parameter.default is not None or i == cause.own_bend:
                     continue
-                for which in _together(parameter, len(runs)):
-                    best = _along(best, number, i, which, runs, baseline, weights, sweep)
+                if i == cause.onset:
+                    best = _begun(best, number, i, runs, baseline, weights)
+                else:
+                    best = _along(best, number, i, runs, baseline, weights, sweep)
     return best
 
 
-def _together(parameter: Parameter, runs: int) -> list[list[int]]:
-    """Return the runs that share a value of the parameter."""
-    return [[r] for r in range(runs)] if parameter.per_run else [list(range(runs))]
+def _begun(best: Fit, number: int, i: int, runs: Sequence[Run], baseline: Baseline, weights: NDArray) -> Fit:
+    """Move the instant at which a cause begins in each run to where it explains most, all else held."""
+    acting, found = best.acting(best.causes[number]), onsets_of(best, number, i, runs, baseline)
+    instants = [found[r].likeliest if r in acting else shape[i] for r, shape in enumerate(best.causes[number].shapes)]
+    causes = best.instead(number, best.causes[number].with_own(i, instants))
+    return min((best, fit(causes, runs, baseline, weights, best.loads)), key=lambda f: f.cost)
+
+
+def onsets_of(made: Fit, number: int, i: int, runs: Sequence[Run], baseline: Baseline) -> list[Onset]:
+    """Return for each run when a cause may begin in it by its shape parameter ``i``, all else as it was fitted."""
+    ends = [made.instead(number, made.causes[number].reshaped(i, end)) for end in (NEVER, ALWAYS)]
+    without, throughout = (
+        [measured - columns @ made.values for columns, measured in stacked_columns(causes, runs, baseline)]
+        for causes in ends
+    )
+    return [
+        Onset.of(run, never, always, run.usable, made.weights)
+        for run, never, always in zip(runs, without, throughout, strict=True)
+    ]
 
 
 def _bent_each_run(best: Fit, runs: Sequence[Run], baseline: Baseline, weights: NDArray) -> Fit:
@@ -227,8 +248,7 @@ def slope(
     cause = made.causes[number]
     step = step_of(cause, i, max(run, 0))
     moved = cause.moved(i, step, None if run < 0 else [run])
-    causes = [moved if k == number else c for k, c in enumerate(made.causes)]
-    ahead = stacked_columns(causes, runs, baseline)
+    ahead = stacked_columns(made.instead(number, moved), runs, baseline)
     return [((c @ made.values - y) - (d @ made.values - z)) / step for (c, y), (d, z) in zip(ahead, plain, strict=True)]
 
 
@@ -257,25 +277,23 @@ def _best_form(best: Fit, number: int, i: int, runs: Sequence[Run], baseline: Ba
     for form in cause.effect.shape[i].forms:
         if form == cause.shapes[0][i]:
             continue
-        causes = [c.reshaped(i, form) if k == number else c for k, c in enumerate(best.causes)]
-        tried.append(fit(causes, runs, baseline, weights, best.loads))
+        tried.append(fit(best.instead(number, cause.reshaped(i, form)), runs, baseline, weights, best.loads))
     return min(tried, key=lambda f: f.cost)
 
 
 def _along(
-    best: Fit, number: int, i: int, which: list[int], runs: Sequence[Run], baseline: Baseline, weights: NDArray,
-    sweep: int,
-) -> Fit:  # fmt: skip
-    """Improve one shape parameter of one cause in some runs; where the best lies at an end, look on from there."""
+    best: Fit, number: int, i: int, runs: Sequence[Run], baseline: Baseline, weights: NDArray, sweep: int
+) -> Fit:
+    """Improve one shape parameter of one cause; where the best lies at an end, look on from there."""
     effect = best.causes[number].effect
     parameter, least = effect.shape[i], lowest(effect, effect.shape[i], runs)
     for _ in range(STEPS_ON):
-        now = best.causes[number].shapes[which[0]][i]
+        now = best.causes[number].shapes[0][i]
         to_value, low, high = _scale(parameter, now, 1.0 if sweep == 0 else CLOSER, least)
         if not low < high:
             break
-        best = _between(best, number, i, which, runs, baseline, weights, (to_value, low, high))
-        found = best.causes[number].shapes[which[0]][i]
+        best = _between(best, number, i, runs, baseline, weights, (to_value, low, high))
+        found = best.causes[number].shapes[0][i]
         at_an_end = any(
             abs(found - to_value(end)) < AT_AN_END * abs(to_value(high) - to_value(low)) for end in (low, high)
         )
@@ -285,7 +303,7 @@ def _along(
 
 
 def _between(
-    best: Fit, number: int, i: int, which: list[int], runs: Sequence[Run], baseline: Baseline, weights: NDArray,
+    best: Fit, number: int, i: int, runs: Sequence[Run], baseline: Baseline, weights: NDArray,
     scale: tuple[Callable[[float], float], float, float],
 ) -> Fit:  # fmt: skip
     """Return the best of the fits that a bounded search along one shape parameter tries."""
@@ -293,7 +311,7 @@ def _between(
     tried: list[Fit] = [best]
 
     def cost(x: float) -> float:
-        causes = [c.reshaped(i, to_value(x), which) if k == number else c for k, c in enumerate(best.causes)]
+        causes = best.instead(number, best.causes[number].reshaped(i, to_value(x)))
         tried.append(fit(causes, runs, baseline, weights, best.loads))
         return tried[-1].cost
 
@@ -311,8 +329,8 @@ def _scale(
     ``share`` of the usual reach; of what oscillates, no lower than ``least``.
     """
     low, high = parameter.typical
-    if parameter.unit in MAXIMA_APART or parameter.per_run:
-        reach = share * parameter.grain * MAXIMA_APART.get(parameter.unit, ONSETS_APART_S)
+    if parameter.unit in MAXIMA_APART:
+        reach = share * parameter.grain * MAXIMA_APART[parameter.unit]
         return float, max(now - reach, least), now + reach
     if low > 0 and high / low > 4:
         reach = share * 2 * float(np.log(REACH))

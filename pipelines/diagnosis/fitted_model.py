@@ -11,7 +11,7 @@ from pipelines.diagnosis import tables
 from pipelines.diagnosis.evaluate import settled
 from pipelines.diagnosis.fit import Fit
 from pipelines.diagnosis.observations import Baseline, Run
-from pipelines.diagnosis.scan import ALWAYS, NEVER
+from pipelines.diagnosis.onset import ALWAYS, NEVER
 from pipelines.diagnosis.uncertainty import Uncertainty
 from pipelines.effects import Effect
 from pipelines.model import Model, model_from_parameters

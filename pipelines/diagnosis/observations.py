@@ -68,6 +68,10 @@ class Run:
         """Return what is left (m, O) with what is faster than the cut-off: no column foretells it, and it may hum."""
         return residual if self.fast is None else residual + self.fast
 
+    def blocks_in(self, seconds: float) -> float:
+        """Return how many blocks last so long."""
+        return seconds * self.motion.sample_rate_hz / self.block.decimation
+
     @property
     def bandwidth_hz(self) -> float:
         """Frequency at which the regression filter has lost half the power."""

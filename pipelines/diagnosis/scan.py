@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates import TURNS, Candidate, bends_motion, expanded_columns, lowest
 from pipelines.diagnosis.observations import Run
+from pipelines.diagnosis.onset import NEVER
 from pipelines.effects import Effect, Parameter
 from pipelines.mechanics.motion import Motion
 
@@ -27,8 +28,6 @@ ONSETS = 40
 """Instants tried for what begins at a time of its own in each run."""
 OSCILLATING = {"Hz", *TURNS}
 """Units of parameters whose effect has many maxima along them."""
-NEVER, ALWAYS = 1e6, -1e6
-"""s: onsets after every run's end and before every run's begin."""
 
 
 @dataclass(frozen=True)

@@ -47,15 +47,18 @@ def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.Data
             add(effect.name, p.name, p.symbol, p.unit, effect.joint, None, step, slope, float(value))
         at += len(effect.linear)
     one_way = [False] * len(rows) + [p.typical[0] >= 0 for cause in fit.causes for p in cause.effect.parameters]
+    onsets: dict[int, tuple[float, float]] = {}
     for number, cause in enumerate(fit.causes):
         effect = cause.effect
-        for p, value, slope in zip(effect.parameters, *_in_run(fit, sure, number, fit.acting(cause)[0]), strict=True):
+        first = fit.acting(cause)[0]
+        onsets |= {len(rows) + at: ends for at, ends in _onsets(fit, sure, number, first).items()}
+        for p, value, slope in zip(effect.parameters, *_in_run(fit, sure, number, first), strict=True):
             add(effect.name, p.name, p.symbol, p.unit, effect.joint, effect.run, "extension", slope, float(value))
     frame = pd.DataFrame(rows)
     T = np.array(maps)
     covariance = T @ sure.covariance @ T.T
     frame["std_error"] = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    ends = _ends(frame["value"].to_numpy(), frame["std_error"].to_numpy(), sure, np.array(one_way))
+    ends = _ends(frame["value"].to_numpy(), frame["std_error"].to_numpy(), sure, np.array(one_way), onsets)
     frame["ci95_low"], frame["ci95_high"] = ends.T
     own = {(c.effect.name, c.effect.joint, p.name) for c in fit.causes for p in c.effect.parameters if p.per_run}
     if own:
@@ -63,14 +66,27 @@ def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.Data
     return frame, covariance
 
 
-def _ends(value: NDArray, error: NDArray, sure: Uncertainty, one_way: NDArray) -> NDArray:
+def _ends(
+    value: NDArray, error: NDArray, sure: Uncertainty, one_way: NDArray, onsets: Mapping[int, tuple[float, float]]
+) -> NDArray:
     """Return the ends of 95 % intervals of values (p,) with standard errors (p,): (p, 2).
 
     What is ``one_way``, play, a stiffness or a time constant, is never negative, however little is known of it.
+    ``onsets`` have ends of their own, by their place.
     """
     half = sure.critical * error
     low = value - half
-    return np.stack([np.where(one_way, np.minimum(np.maximum(low, 0.0), value), low), value + half], axis=1)
+    ends = np.stack([np.where(one_way, np.minimum(np.maximum(low, 0.0), value), low), value + half], axis=1)
+    for at, own in onsets.items():
+        ends[at] = own
+    return ends
+
+
+def _onsets(fit: Fit, sure: Uncertainty, number: int, run: int) -> dict[int, tuple[float, float]]:
+    """Return the ends of the interval of the instant at which a cause begins in a run, by its place among the cause's
+    parameters; nothing where it has none."""
+    linear = len(fit.causes[number].effect.linear)
+    return {linear + i: ends for (which, i, r), ends in sure.onsets.items() if (which, r) == (number, run)}
 
 
 def _bodies(baseline: Baseline) -> dict[str, list[int]]:
@@ -100,7 +116,7 @@ def values_in_run(fit: Fit, sure: Uncertainty, number: int, run: int) -> tuple[N
     values, slopes = _in_run(fit, sure, number, run)
     error = np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", slopes, sure.covariance, slopes), 0.0))
     one_way = np.array([p.typical[0] >= 0 for p in fit.causes[number].effect.parameters])
-    return values, _ends(values, error, sure, one_way)
+    return values, _ends(values, error, sure, one_way, _onsets(fit, sure, number, run))
 
 
 def residual_rows(run: Run, residual: NDArray, model: str) -> pd.DataFrame:

@@ -1,19 +1,18 @@
 """Intervals of an extended model's parameters, shapes included, that survive autocorrelation and small misfit."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from pipelines.diagnosis.candidates import Candidate
-from pipelines.diagnosis.fit import Fit, laden, slope, stacked_columns
+from pipelines.diagnosis.fit import Fit, laden, onsets_of, slope, stacked_columns
 from pipelines.diagnosis.observations import Baseline, Run
+from pipelines.diagnosis.onset import ALIKE_S
 from pipelines.diagnosis.slow import slow_error
 from pipelines.estimation.long_run import long_run_covariance
-
-ALIKE_S = 0.5
-"""How long what a model gets wrong stays alike: it goes with the motion, whose fastest parts are about 1 Hz."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +25,8 @@ class Uncertainty:
     """(cause, shape parameter, run) behind each shape's place after the linear values; run -1 where shared."""
     normal: NDArray
     """Weighted normal matrix of the same parameters in the same order: what collinearity is read from."""
+    onsets: Mapping[tuple[int, int, int], tuple[float, float]] = field(default_factory=dict)
+    """Of those shapes that are instants at which a cause begins, the ends of the 95 % interval, s."""
 
 
 def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: NDArray) -> Uncertainty:
@@ -34,7 +35,8 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
     Beside the noise stands what the model gets wrong with the motion: what it leaves of slow error, and at the least
     what no model of a good rig gets right, ``imperfect`` (O,) N·m rms. It is small against the noise, but much alike
     from sample to sample, and so the larger part of what hours of data leave in doubt. Shapes that are not fitted but
-    taken at a usual value may be anywhere in their typical range.
+    taken at a usual value may be anywhere in their typical range. When something begins is known so much better than
+    how large it is that neither makes the other less sure.
     """
     runs = laden(runs, fit, baseline)
     plain = stacked_columns(fit.causes, runs, baseline)
@@ -51,8 +53,9 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
     filling, critical, _ = long_run_covariance(lambda: enumerate(scores), gram.shape[0])
     misfit = np.maximum(imperfect, slow_error(runs, left).excess)
     for run, a in zip(runs, wide, strict=True):
-        alike = ALIKE_S * run.motion.sample_rate_hz / run.block.decimation
-        filling = filling + np.einsum("mo,o,moi,moj->ij", run.usable, alike * (weights * misfit) ** 2, a, a)
+        filling = filling + np.einsum(
+            "mo,o,moi,moj->ij", run.usable, run.blocks_in(ALIKE_S) * (weights * misfit) ** 2, a, a
+        )
     for place in _shapes(fit.causes, len(runs), fitted=False):
         low, high = fit.causes[place[0]].effect.shape[place[1]].typical
         assumed = slope(fit, place, runs, baseline, plain)
@@ -67,15 +70,31 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
         if i == 0:
             cause = fit.causes[number]
             covariance[at, at] += (cause.effect.known_to * cause.shapes[max(r, 0)][0]) ** 2
-    return Uncertainty(covariance, critical, tuple(places), gram)
+    onsets = _onsets(fit, runs, baseline, misfit)
+    return Uncertainty(
+        block_diag(covariance, *(((high - low) / (2.0 * critical)) ** 2 for low, high in onsets.values())),
+        critical, (*places, *onsets), block_diag(gram, np.zeros((len(onsets), len(onsets)))), onsets,
+    )  # fmt: skip
+
+
+def _onsets(
+    fit: Fit, runs: Sequence[Run], baseline: Baseline, misfit: NDArray
+) -> dict[tuple[int, int, int], tuple[float, float]]:
+    """Return the ends of the interval of each instant at which a cause begins, by (cause, shape parameter, run)."""
+    ends: dict[tuple[int, int, int], tuple[float, float]] = {}
+    for number, cause in enumerate(fit.causes):
+        if (i := cause.onset) is not None:
+            onsets = onsets_of(fit, number, i, runs, baseline)
+            ends |= {(number, i, r): onsets[r].interval(runs[r], misfit) for r in fit.acting(cause)}
+    return ends
 
 
 def _shapes(causes: Sequence[Candidate], runs: int, fitted: bool) -> list[tuple[int, int, int]]:
-    """Return each shape that is fitted, or not, as (cause, shape parameter, run); run -1 where all share it."""
+    """Return shapes but onsets that are fitted, or not: (cause, shape parameter, run), run -1 where all share it."""
     return [
         (number, i, run)
         for number, cause in enumerate(causes)
         for i, parameter in enumerate(cause.effect.shape)
-        if (parameter.default is None) == fitted and not parameter.forms
+        if (parameter.default is None) == fitted and not parameter.forms and i != cause.onset
         for run in (range(runs) if parameter.per_run else (-1,))
     ]
