@@ -226,8 +226,6 @@ def test_refinement_stays_at_the_maximum_that_the_scan_found():
     rhythm = Parameter("frequency", "Hz", "", "f", (0.1, 3.0))
     _, low, high = _scale(rhythm, 0.43, 1.0, -np.inf)
     assert (low, high) == pytest.approx((0.42, 0.44))
-    onset = Parameter("time", "s", "", "t", (0.0, 120.0), per_run=True)
-    assert _scale(onset, 30.0, 0.25, -np.inf)[1:] == pytest.approx((29.5, 30.5))
 
 
 def test_a_run_shorter_than_its_period_is_still_dealt_out_to_every_fold(run):
