@@ -87,7 +87,8 @@ class Candidate:
 
 def bends_motion(effect: Effect) -> bool:
     """Tell whether an effect changes kinematics or readings rather than adding torque of its own."""
-    return type(effect).corrected is not Effect.corrected or bool(effect.torque_reading is not None and effect.shape)
+    shaped = any(p.default is None for p in effect.shape)
+    return type(effect).corrected is not Effect.corrected or (effect.torque_reading is not None and shaped)
 
 
 def lowest(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> float:

@@ -36,10 +36,11 @@ from pipelines.diagnosis.evaluate import evaluate
 from pipelines.diagnosis.fit import fit
 from pipelines.diagnosis.floor import MOST_INDEPENDENT, Floor, noise_floor
 from pipelines.diagnosis.gram import solve
+from pipelines.diagnosis.imperfection import imperfection
 from pipelines.diagnosis.known import known_effects
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, observe, with_load
 from pipelines.diagnosis.scan import BENDING, values_of
-from pipelines.diagnosis.search import SHAPE_COST, imperfection
+from pipelines.diagnosis.search import SHAPE_COST
 from pipelines.diagnosis.session import refuse_unfit
 from pipelines.diagnosis.thinned import thinned
 from pipelines.effects import Effect, Parameter
@@ -151,7 +152,7 @@ class Sight:
         untouched = tuple(run.average(baseline.columns(run.motion, run.motion, run.motion)) for run in runs)
         plain = gram_of_runs(runs, untouched)
         there = np.isfinite(floor.rms) & (floor.rms > 0)
-        noise, imperfect = np.where(there, floor.rms, 1.0), imperfection(plain)
+        noise, imperfect = np.where(there, floor.rms, 1.0), imperfection(runs)
         share = np.minimum(floor.independent_share, MOST_INDEPENDENT)
         root = np.where(there, np.sqrt(share) / np.hypot(noise, imperfect), 0.0)
         independent = float(np.max(share * plain.count.sum(axis=0)))

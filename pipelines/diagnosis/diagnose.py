@@ -26,11 +26,11 @@ from pipelines.diagnosis.fit import Fit, fit, residuals_on
 from pipelines.diagnosis.fitted_model import model_of_run, values_of_each_run
 from pipelines.diagnosis.floor import Floor, noise_floor
 from pipelines.diagnosis.gain import Gain, errors_of
+from pipelines.diagnosis.imperfection import imperfection
 from pipelines.diagnosis.known import known_effects
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, like_trained, observe, with_load
 from pipelines.diagnosis.perceived import heard_in
 from pipelines.diagnosis.reversals import BuildUp, built_up
-from pipelines.diagnosis.search import imperfection
 from pipelines.diagnosis.second_look import slower
 from pipelines.diagnosis.session import refuse_unfit
 from pipelines.diagnosis.status import Standing, status_of
@@ -228,7 +228,7 @@ def _look(
     named = choice.named.labels
     status = "unknown_cause" if spoilt else status_of(standing, bool(named), examined.unsteady)
     diluted = dilution(choice, bank) if named else 1.0
-    sure = uncertainty(choice.named.fit, bank.runs, baseline, imperfection(bank.gram))
+    sure = uncertainty(choice.named.fit, bank.runs, baseline, imperfection(bank.runs))
     frame, covariance = tables.parameters(choice.named.fit, baseline, sure)
     return Diagnosis(
         baseline=baseline, bank=bank, choice=choice, status=status, before=before, after=after,

@@ -13,6 +13,7 @@ from pipelines.diagnosis.evaluate import evaluate
 from pipelines.diagnosis.fit import Fit
 from pipelines.diagnosis.floor import Floor, noise_floor, slow_scatter
 from pipelines.diagnosis.gain import Errors, Gain, errors_of, gain
+from pipelines.diagnosis.imperfection import telling_torque
 from pipelines.diagnosis.observations import Baseline, Run
 from pipelines.diagnosis.perceived import felt_in, heard_in
 from pipelines.diagnosis.slow import SlowError, slow_error
@@ -107,7 +108,7 @@ class Examined:
         sure = tuple(
             label for label in labels if all(e.perceived.get(label, 0.0) > NEEDED for e in (before, less[label]))
         )
-        all_sure = bool(sure) and len(sure) == len(labels)
+        all_sure = bool(sure) and len(sure) == len(labels) and not standing.drowns
         holds_up = all_sure or ((bool(sure) or not foreign) and standing.held_up(effects))
         if not holds_up and not foreign and choice.freer is not None:
             # What is left may be the cause's own, in a form that is freer than ours.
@@ -117,8 +118,5 @@ class Examined:
 
 
 def _standing(before: Extended, after: Extended, floor: Floor) -> Standing:
-    J, runs = len(before.runs[0].motion.joints), before.runs
-    count = np.maximum(sum(run.usable.sum(axis=0) for run in runs), 1)
-    squares = sum(np.sum(np.where(run.usable, run.measured, 0.0) ** 2, axis=0) for run in runs)
-    torque = np.sqrt(squares / count)
+    J, torque = len(before.runs[0].motion.joints), telling_torque(before.runs)
     return Standing(floor.rms[:J], before.errors.rms, after.errors.rms, before.slow, after.slow, torque)

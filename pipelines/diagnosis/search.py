@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.bank import Bank
 from pipelines.diagnosis.candidates import Candidate
 from pipelines.diagnosis.gram import Gram, held_out_error, solve
+from pipelines.diagnosis.imperfection import imperfection
 
 BEAM = 10
 """Sets carried from one size to the next."""
@@ -24,8 +25,6 @@ SHAPE_COST = 2.0
 """What a shape parameter must gain, in units of log likelihood, for having been searched."""
 CHANCE = 2.0
 """Log likelihood that a forbidden sign may gain by chance: the amplitude is nought then, within its noise."""
-IMPERFECTION = (0.009, 0.02)
-"""Share of a drive's and of a cuff's torque that even a good model of a good machine leaves."""
 
 
 @dataclass(frozen=True)
@@ -44,17 +43,6 @@ class Scored:
     def admissible(self) -> bool:
         """Whether the set may be named as it is."""
         return bool(np.isfinite(self.score)) and not self.bound
-
-
-def imperfection(gram: Gram) -> NDArray:
-    """Return what no model of a real machine gets right, (O,) N·m: errors below it are worth nothing."""
-    rms = np.sqrt(gram.square.sum(axis=0) / np.maximum(gram.count.sum(axis=0), 1))
-    return np.asarray(rms * imperfect_share(len(rms)))
-
-
-def imperfect_share(outputs: int) -> NDArray:
-    """Return the share of each output's torque, (O,), that is a little off on a good rig: drives first, then cuffs."""
-    return np.repeat(IMPERFECTION, outputs // 2)
 
 
 def log_likelihood(rms: NDArray, before: NDArray, independent: NDArray, imperfect: NDArray) -> float:
@@ -90,7 +78,7 @@ class Scorer:
         """
         self.bank, self.independent, self.evidence = bank, independent, evidence
         self.count = bank.gram.count.sum(axis=0)
-        self.imperfect = imperfection(bank.gram)
+        self.imperfect = imperfection(bank.runs)
         self.plain = self._held_out(bank.gram.select(bank.columns_of(())))
 
     def __call__(self, chosen: Sequence[int]) -> Scored:

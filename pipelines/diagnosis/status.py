@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.search import imperfect_share
+from pipelines.diagnosis.imperfection import imperfect_share
 from pipelines.diagnosis.slow import SlowError
 from pipelines.effects import Effect
 
@@ -49,7 +49,7 @@ class Standing:
     slow_before: SlowError
     slow_after: SlowError
     torque: NDArray
-    """(O,) rms of what was measured, N·m."""
+    """(O,) rms of what was measured, N·m, less a constant that tells nothing."""
 
     @property
     def unexplained(self) -> list[float | None]:
@@ -68,6 +68,16 @@ class Standing:
         worse = self.extended > WORSE * self.baseline
         together = np.sum((self.extended / self.floor) ** 2) <= np.sum((self.baseline / self.floor) ** 2)
         return self._share_left <= 1.0 - HELD_UP and bool(together) and not bool(worse.any())
+
+    @property
+    def drowns(self) -> bool:
+        """Whether the named causes take next to nothing of an error that is louder than the noise.
+
+        What is as loud may pass for what is heard or felt.
+        """
+        worst, left = self._left_at_the_worst()
+        loud = self.systematic(self.slow_after) & (self.slow_after.excess[: len(self.floor)] > self.floor)
+        return bool(loud[worst]) and left > 1.0 - HELD_UP
 
     def rings(self, effects: Sequence[Effect]) -> bool:
         """Tell whether what is left may be the ringing of a named transmission, which takes most of the error away."""
@@ -129,6 +139,12 @@ class Standing:
         J = len(self.floor)
         large = slow.excess[:J] > np.maximum(MATERIAL * self.floor, IMPERFECT * self.torque[:J])
         return np.asarray(large & (slow.sureness[:J] > SIGNIFICANT))
+
+    def of_a_good_rig(self, joint: int) -> float | None:
+        """Return which share of a joint's torque an error is that is plain, though a good rig's; None of others."""
+        slow = self.slow_before
+        plain = slow.excess[joint] > MATERIAL * self.floor[joint] and slow.sureness[joint] > SIGNIFICANT
+        return float(slow.excess[joint] / self.torque[joint]) if plain else None
 
     def hums(self, before: NDArray, after: NDArray, floor: NDArray) -> bool:
         """Tell whether a tone (J,) N·m is left that is beyond the floor and beyond a good rig's at some joint.

@@ -14,7 +14,7 @@ from pipelines.diagnosis.error_budget import error_budget
 from pipelines.diagnosis.faults import Fault
 from pipelines.diagnosis.perceived import PERCEIVED
 from pipelines.diagnosis.reversals import NEAR_S, BuildUp
-from pipelines.diagnosis.status import AT_FLOOR, EXPLAINED
+from pipelines.diagnosis.status import AT_FLOOR, EXPLAINED, IMPERFECT
 from pipelines.diagnosis.ties import tie_between
 from pipelines.diagnosis.unknown import Unknown, unknown
 from pipelines.effects import Effect, PreslidingHysteresis
@@ -331,7 +331,10 @@ def _finding(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -
         said = f"Nothing is missing that these data could show: the largest {exerted} error, at {the(joint)}, is {size}"
         hiding = _floor_that_hides(d).get(joint)
         if hiding is None:
-            return f"{said}."
+            beyond = d.standing.of_a_good_rig(worst)
+            if beyond is None:
+                return f"{said}."
+            return f"{said}. {beyond:.1%} of the {exerted} in it is no noise; even a good rig leaves {IMPERFECT:.1%}."
         return f"{said}, but the floor itself is {hiding:.0%} of the {exerted}: these data could show little."
     if d.status == "unknown_cause":
         described = f" {left.description}" if left else ""

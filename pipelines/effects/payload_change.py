@@ -1,6 +1,9 @@
 """A mass that comes or goes during a run."""
 
+from dataclasses import replace
+
 from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.mechanics.machine import THE_LEG
 from pipelines.mechanics.mechanisms.leg import LEG
 
 
@@ -22,3 +25,11 @@ class PayloadChange(Effect):
     inertial = True
     parity = Parity.EVEN
     reaction = staticmethod(LEG.reactions["payload_change"])
+
+    def __post_init__(self) -> None:
+        """Take it for a mass where the joint slides: along a way no distance matters."""
+        super().__post_init__()
+        if self.joint and self.on != THE_LEG and self.on.joint(self.joint).kind == "prismatic":
+            moment, time = self.linear[0], self.shape[0]
+            object.__setattr__(self, "linear", (replace(moment, meaning="mass that comes", symbol="m"),))
+            object.__setattr__(self, "shape", (time,))

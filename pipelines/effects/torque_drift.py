@@ -1,7 +1,10 @@
 """A torque channel whose zero wanders."""
 
+from dataclasses import replace
+
 from pipelines.effects.effect import Effect, Parameter, Parity, Side
 from pipelines.effects.kernel import torque_reading
+from pipelines.effects.torque_offset import TorqueOffset
 
 
 class TorqueDrift(Effect):
@@ -20,6 +23,14 @@ class TorqueDrift(Effect):
     )
     parity = Parity.EVEN
     more_than = "torque_offset"
+
+    def __post_init__(self) -> None:
+        """Take the level as nought where the mechanism's own parameters take up a constant torque."""
+        super().__post_init__()
+        if TorqueOffset.name in self.on.mechanism.absorbs:
+            rate, level = self.linear
+            object.__setattr__(self, "linear", (rate,))
+            object.__setattr__(self, "shape", (replace(level, per_run=False, forms=(0.0,)),))
 
     @torque_reading
     def torque_reading(t, torque, values, joint, state):

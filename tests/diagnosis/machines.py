@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 from scipy.integrate import solve_ivp
+from scipy.signal import lfilter
 
 from pipelines.contracts.table import Table
 
@@ -91,3 +92,22 @@ def lift(purpose, seed, spring=0.0, seconds=25.0):
     time, x, force = moved(reference, rate, 9000.0, 400.0, acceleration, seconds)
     noise = np.random.default_rng(seed).normal(0, 0.5, len(time))
     return table(time, x, force + noise, {"name": "carriage", "kind": "prismatic"}, purpose, gravity_m_s2=9.81)
+
+
+def driven(purpose, seed, kind, more, seconds=40.0, news=0.1):
+    """Return what a drive exerts to take an arm of 0.6 kg·m, or a lift of 12 kg, along a path, and more than that.
+
+    ``more(t, q, dq, ddq, torque)`` is in N·m, or in 20 N at the lift, whose q is in 0.1 m. Noise lasts for some
+    samples; ``news`` is what each adds, in the same units.
+    """
+    draw = np.random.default_rng(seed)
+    reference, rate = excitation(draw.integers(10**6), 0.6)
+    time = np.arange(0.0, seconds, 1.0 / RATE_HZ)
+    q, dq = reference(time), rate(time)
+    ddq = (rate(time + 1e-5) - rate(time - 1e-5)) / 2e-5
+    dry = 1.2 * np.tanh(dq / 0.01) + 0.8 * dq
+    own = 0.3 * ddq + 0.6 * 9.81 * np.sin(q) + dry if kind == "revolute" else 0.06 * ddq + 0.6 * 9.81 + dry
+    torque = own + more(time, q, dq, ddq, own) + lfilter([news], [1.0, -0.9], draw.normal(size=len(time)))
+    if kind == "revolute":
+        return table(time, q, torque, {"name": "arm", "kind": kind}, purpose, gravity_m_s2=9.81)
+    return table(time, 0.1 * q, 20.0 * torque, {"name": "carriage", "kind": kind}, purpose, gravity_m_s2=9.81)

@@ -164,6 +164,7 @@ def test_only_what_a_machine_can_have_and_show_is_a_candidate():
     gone = {"base_tilt", "mass_off_axis@table", "payload_change@table", "encoder_offset@table", "backlash@table"}
     assert not gone & labels(turntable)
     assert not {"torque_offset@lift", "coulomb_asymmetry@lift"} & labels(lift)
+    assert "payload_change@lift" in labels(lift)
     crane = Machine(replace(LEG, kinds=("prismatic", "revolute")), (Joint("trolley", "prismatic"), Joint("rod")))
     assert "base_tilt" not in labels(crane)
     elbow = machine_of([Joint("shoulder"), Joint("elbow")], Geometry(0.3))

@@ -22,26 +22,21 @@ from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table
 from pipelines.mechanics.scale import on_one_scale
 from pipelines.settings.filter import FilterSettings
-from tests.diagnosis.machines import RATE_HZ, excitation, table
+from tests.diagnosis.machines import driven
 
 SECONDS = 40.0
-HANDED = 0.08
-"""kg·m, at 0.3 m."""
-NEWS = 0.1
-"""N·m of noise that each sample adds to what is left of that before."""
+HANDED = 0.27
+"""kg."""
 
 
-def handed(purpose, seed, instant, mass_moment=HANDED):
-    """Return an arm to which a load is handed at an instant, in noise that lasts for some samples."""
-    draw = np.random.default_rng(seed)
-    reference, rate = excitation(draw.integers(10**6), 0.6)
-    time = np.arange(0.0, SECONDS, 1.0 / RATE_HZ)
-    q, dq = reference(time), rate(time)
-    ddq = (rate(time + 1e-5) - rate(time - 1e-5)) / 2e-5
-    load = mass_moment * (time >= instant)
-    torque = (0.3 + 0.3 * load) * ddq + 9.81 * (0.6 + load) * np.sin(q) + 0.8 * dq + 1.2 * np.tanh(dq / 0.01)
-    torque += lfilter([NEWS], [1.0, -0.9], draw.normal(size=len(time)))
-    made = table(time, q, torque, {"name": "arm", "kind": "revolute"}, purpose, gravity_m_s2=9.81)
+def handed(purpose, seed, instant, mass=HANDED, kind="revolute"):
+    """Return an arm or a lift to which a mass (kg) is handed at an instant, 0.3 m from the axis where there is one."""
+
+    def more(t, q, dq, ddq, own):
+        arm = 0.3 * mass * (0.3 * ddq + 9.81 * np.sin(q))
+        return (t >= instant) * (arm if kind == "revolute" else mass * (0.1 * ddq + 9.81) / 20.0)
+
+    made = driven(purpose, seed, kind, more, SECONDS)
     return replace(motion_from_table(motion_table(made, FilterSettings())), file=f"{purpose}_{seed}.parquet")
 
 
@@ -119,11 +114,19 @@ def test_a_run_to_which_nothing_was_handed_is_told_as_that():
     assert low <= high == pytest.approx(SECONDS, abs=0.1)
 
 
-def test_a_load_that_is_handed_over_is_named_with_when_in_every_run():
+@pytest.mark.parametrize(("kind", "of_all"), [("revolute", 0.3 * HANDED), ("prismatic", 2.0)])
+def test_a_load_that_is_handed_over_is_named_with_its_size_and_when_in_every_run(kind, of_all):
+    """At an arm by its moment in kg·m, at a lift by its mass."""
     hidden = {"train_1.parquet": 11.7, "train_2.parquet": 26.2, "validate_3.parquet": 30.4}
-    motions = [handed("train", 1, 11.7), handed("train", 2, 26.2), handed("validate", 3, 30.4)]
+    motions = [
+        handed(file.split("_")[0], seed, at, HANDED if kind == "revolute" else 2.0, kind)
+        for seed, (file, at) in enumerate(hidden.items(), start=1)
+    ]
     (cause,) = verdict(diagnose(motions))["causes"]
     assert cause["effect"] == "payload_change"
+    amount = cause["parameters"][0]
+    assert amount["ci95"][0] < of_all < amount["ci95"][1] and amount["value"] == pytest.approx(of_all, rel=0.1)
+    assert amount["unit"] == ("kg·m" if kind == "revolute" else "kg")
     told = {one["file"]: one for one in cause["each_run"]}
     assert {file: one["values"]["time"] for file, one in told.items()} == pytest.approx(hidden, abs=0.5)
     for file in ("train_1.parquet", "train_2.parquet"):
@@ -139,7 +142,7 @@ def test_intervals_of_a_diagnosis_hold_amplitude_and_instants_as_often_as_they_s
     instants, amplitudes = [], []
     for seed in range(100, 160, 2):
         begun = draw.uniform(6.0, 34.0, 3)
-        mass = draw.uniform(0.03, 0.12)
+        mass = draw.uniform(0.1, 0.4)
         motions = [
             handed(purpose, seed * 10 + k, at, mass)
             for k, (purpose, at) in enumerate(zip(("train", "train", "validate"), begun, strict=True))
@@ -147,7 +150,7 @@ def test_intervals_of_a_diagnosis_hold_amplitude_and_instants_as_often_as_they_s
         for cause in verdict(diagnose(motions))["causes"]:
             if cause["effect"] == "payload_change":
                 low, high = cause["parameters"][0]["ci95"]
-                amplitudes.append(low <= mass <= high)
+                amplitudes.append(low <= 0.3 * mass <= high)
                 for one, at in zip(cause["each_run"], begun[:2], strict=False):
                     low, high = one["ci95"]["time"] or (np.inf, np.inf)
                     instants.append(low <= at <= high)

@@ -65,6 +65,13 @@ def _payload_change(at, state, values, geometry, joint, out):
         out[0] += values[0] * (values[2] * at.ddq[0] + geometry[1] * sin(at.q[0]))
 
 
+@njit(REACTION, cache=True)
+def _mass_change(at, state, values, geometry, joint, out):
+    """Add a mass, once it is there: m (ddq + g), and no gravity where the joint is level."""
+    if at.t >= values[1]:
+        out[0] += values[0] * (at.ddq[0] + geometry[1])
+
+
 @njit(cache=True)
 def _lift_along(q, dq, ddq, geometry):
     Y = np.ones((q.shape[0], 1, 2))
@@ -127,7 +134,12 @@ TURNTABLE = replace(
 )
 
 SLIDE = replace(
-    TURNTABLE, title="one level prismatic joint", kinds=("prismatic",), parameters=(_MASS,), broken=_broken_mass
+    TURNTABLE,
+    title="one level prismatic joint",
+    kinds=("prismatic",),
+    parameters=(_MASS,),
+    reactions={"rigid_body": _inertia, "payload_change": _mass_change},
+    broken=_broken_mass,
 )
 
 LIFT = replace(
@@ -139,7 +151,7 @@ LIFT = replace(
         Inertial("X2", "N", "force that holds it still: its weight less a counterweight's", (-500.0, 500.0)),
     ),
     along=_lift_along,
-    reactions={"rigid_body": _lift},
+    reactions={"rigid_body": _lift, "payload_change": _mass_change},
     inertia_forms=_inertia_forms_under_gravity,
     absorbs=_ABSORBED | dict.fromkeys(("torque_offset", "coulomb_asymmetry"), "X2"),
 )

@@ -1,0 +1,73 @@
+"""What no cause of exoid's makes: said to be unknown, and no cause is named that takes next to nothing of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.verdict import verdict
+from pipelines.mechanics.kinematics import motion_table
+from pipelines.mechanics.motion import motion_from_table
+from pipelines.settings.filter import FilterSettings
+from tests.diagnosis.machines import driven
+
+
+def told(kind, more):
+    tables = [
+        driven(purpose, seed, kind, more, news=0.02) for seed, purpose in ((1, "train"), (2, "train"), (3, "validate"))
+    ]
+    motions = [motion_from_table(motion_table(made, FilterSettings())) for made in tables]
+    return verdict(diagnose([replace(m, file=f"{i}.parquet") for i, m in enumerate(motions)]))
+
+
+def rough_on_one_side(t, q, dq, ddq, own):
+    """A bearing that is worn beyond 0.1 rad: loud where the load changes sign, too, as play would be."""
+    return 1.0 * (q > 0.1) * np.tanh(dq / 0.02)
+
+
+def held_back(t, q, dq, ddq, own):
+    """A transmission whose torque lags behind by up to 0.2 N·m, as magnets and rubber do."""
+    lag = np.zeros_like(own)
+    for k, step in enumerate(np.diff(own), start=1):
+        lag[k] = lag[k - 1] + 0.8 * (step - abs(step) * lag[k - 1] / 0.2)
+    return lag
+
+
+def off_by_a_little(t, q, dq, ddq, own):
+    """A current that is read too small where it is large, by up to three percent."""
+    return -0.03 * own * (own / np.abs(own).max()) ** 2
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_a_bearing_that_is_rough_on_one_side_is_no_play(kind):
+    said = told(kind, rough_on_one_side)
+    assert said["status"] == "unknown_cause" and not said["causes"]
+
+
+def test_a_lifts_weight_hides_nothing_for_what_is_off_varies_with_the_force():
+    """Of the whole force it is within what a good rig leaves, for most of it is a weight that never changes."""
+    said = told("prismatic", held_back)
+    error, floor, force = (said[key]["carriage"] for key in ("baseline_rmse_nm", "noise_floor_nm", "torque_rms_nm"))
+    assert np.sqrt(error**2 - floor**2) < 0.015 * force
+    assert said["status"] == "unknown_cause"
+
+
+def test_an_error_that_is_no_noise_but_as_small_as_on_a_good_rig_is_told_as_that():
+    said = told("revolute", off_by_a_little)
+    assert said["status"] == "nothing_missing"
+    assert "of the torque in it is no noise; even a good rig leaves 1.5%" in said["summary"]
+
+
+def test_a_lift_of_which_nothing_is_hidden_misses_nothing():
+    said = told("prismatic", lambda t, *motion: np.zeros_like(t))
+    assert said["status"] == "nothing_missing" and "good rig" not in said["summary"]
+
+
+def test_a_drift_at_a_lift_is_told_by_its_rate_and_its_weight_stays_its_own():
+    """Where a force that never changes is the weight's, a level beside it could be anything."""
+    said = told("prismatic", lambda t, *motion: 0.02 * t)
+    (cause,) = said["causes"]
+    rate, level = cause["parameters"]
+    assert cause["effect"] == "torque_drift" and rate["value"] == pytest.approx(0.4, rel=0.05)
+    assert level["value"] == 0.0 and cause["each_run"] == []
