@@ -104,8 +104,14 @@ class Choice:
 
     def alone(self, cause: str) -> float:
         """Return what a cause gains in log likelihood with no other beside it."""
-        fine = self.refined[1].get((cause,))
-        return fine.score if fine else self.levels[0][(cause,)].score
+        return self.score_of((cause,))
+
+    def score_of(self, labels: tuple[str, ...]) -> float:
+        """Return what a set gains in log likelihood, refined, or else as the search has it; nought of no cause."""
+        if not labels:
+            return 0.0
+        fine = self.refined[len(labels)].get(labels)
+        return fine.score if fine else self.levels[len(labels) - 1][labels].score
 
 
 def nothing_chosen(empty: Fit) -> Choice:
@@ -261,16 +267,42 @@ def rivals(choice: Choice, bank: Bank, cause: str) -> dict[str, float]:
     others = tuple(sorted(set(choice.named.labels) - {cause}))
     size = len(choice.named.labels)
     behind: dict[str, float] = {}
-    fine = choice.refined[size]
-    best_coarse = choice.levels[size - 1][choice.named.labels].score
-    for labels, scored in choice.levels[size - 1].items():
+    for labels in choice.levels[size - 1]:
         if labels in choice.refuted | choice.shadows:
             continue
         if set(others) <= set(labels) and len(set(labels)) == len(labels) == size:
             rival = next(iter(set(labels) - set(others)))
-            gap = choice.named.score - fine[labels].score if labels in fine else best_coarse - scored.score
-            behind[rival] = max(gap, 0.0) if rival != cause else 0.0
+            behind[rival] = max(_behind(choice, labels, bank), 0.0) if rival != cause else 0.0
     return {rival: gap for rival, gap in behind.items() if gap <= behind.get(_within(rival), np.inf)}
+
+
+def _behind(choice: Choice, labels: tuple[str, ...], bank: Bank) -> float:
+    """Return the log likelihood of another set behind the named one, both refined, or else both as the search has them.
+
+    A set without a shape to refine is what it is in the search.
+    """
+    size = len(labels)
+    if labels in choice.refined[size]:
+        return choice.named.score - choice.refined[size][labels].score
+    coarse = choice.levels[size - 1]
+    apart = coarse[choice.named.labels].score - coarse[labels].score
+    causes = [bank.candidates[i] for i in coarse[labels].chosen]
+    if any(p.default is None for cause in causes for p in cause.effect.shape):
+        return apart
+    return max(apart, choice.named.score - coarse[labels].score)
+
+
+def idle(choice: Choice, cause: str) -> frozenset[str]:
+    """Return those of a cause's rivals that explain nothing: the others of the set do as well without any.
+
+    Doubt of what the named cause leaves makes all others likelier, those too; but it makes none an explanation.
+    """
+    others = tuple(sorted(set(choice.named.labels) - {cause}))
+    explained = choice.score_of(others)
+    sets = [labels for labels in choice.levels[len(others)] if set(others) <= set(labels)]
+    return frozenset(
+        label for labels in sets if choice.score_of(labels) <= explained for label in set(labels) - {*others, cause}
+    )
 
 
 def in_place_of(choice: Choice, bank: Bank, cause: str, rival: str) -> Effect:

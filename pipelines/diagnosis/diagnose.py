@@ -16,6 +16,7 @@ from pipelines.diagnosis.choice import (
     Choice,
     choose,
     dilution,
+    idle,
     nothing_chosen,
     probabilities,
     rivals,
@@ -66,6 +67,8 @@ class Diagnosis:
     """The named set less one cause, by that cause's label."""
     likely: dict[str, dict[str, float]]
     """For each named cause the probability of it and of each that could stand in its place."""
+    idle: dict[str, frozenset[str]]
+    """Those of these that explain nothing."""
     standing: Standing
     floor: Floor
     unsteady: bool
@@ -142,7 +145,8 @@ class Diagnosis:
     def alike(self, label: str) -> dict[str, float]:
         """Return a named cause and those that cannot be told from it, with their probabilities."""
         odds = self.likely[label]
-        return {other: p for other, p in odds.items() if p >= ALIKE * odds[label]}
+        explaining = {other: p for other, p in odds.items() if other not in self.idle[label]}
+        return {other: p for other, p in explaining.items() if p >= ALIKE * odds[label]}
 
 
 def diagnose(
@@ -234,6 +238,7 @@ def _look(
         baseline=baseline, bank=bank, choice=choice, status=status, before=before, after=after,
         without=examined.without,
         likely={label: probabilities(rivals(choice, bank, label), diluted) for label in named},
+        idle={label: idle(choice, label) for label in named},
         standing=standing, floor=floor, unsteady=examined.unsteady,
         perceived=examined.sure, sure=sure, parameters=frame, covariance=covariance,
         residuals=tables.residual_table(validate, {"baseline": before.residuals, "extended": after.residuals}),
