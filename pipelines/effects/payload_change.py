@@ -8,7 +8,7 @@ from pipelines.mechanics.mechanisms.leg import LEG
 
 
 class PayloadChange(Effect):
-    """A point mass on the segment's axis from some time on; negative where it is lost."""
+    """A point mass on the segment's axis from some time on; negative where it is lost. Where a joint slides, a mass."""
 
     name = "payload_change"
     title = "Payload change"

@@ -7,13 +7,13 @@ import pytest
 
 from pipelines.diagnosis.bank import fill
 from pipelines.diagnosis.candidates import Candidate, columns_under
-from pipelines.diagnosis.choice import NEEDED, Choice, Ranked, choose
+from pipelines.diagnosis.choice import NEEDED, Choice, Ranked, choose, idle
 from pipelines.diagnosis.evaluate import evaluate
 from pipelines.diagnosis.fit import Fit, fit, residuals_on
 from pipelines.diagnosis.floor import noise_floor
 from pipelines.diagnosis.observations import baseline_of, observe, with_load
 from pipelines.diagnosis.perceived import heard_in
-from pipelines.diagnosis.search import Scorer
+from pipelines.diagnosis.search import Scored, Scorer
 from pipelines.effects import PayloadChange, QuadraticDrag, StribeckFriction
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table
@@ -48,6 +48,28 @@ def test_what_was_heard_stays_when_what_stood_beside_it_is_refuted():
     assert choice.just(["quadratic_drag@knee"]).refuted == {both.labels}
     assert choice.just([]) is None
     assert choice.just(both.labels) is None, "that is what was refuted"
+
+
+def scored(score):
+    return Scored((0,), score, np.ones(2))
+
+
+def test_a_rival_that_explains_nothing_is_no_tie_however_little_is_known():
+    """Of the sets with another cause in the named one's place, those that are no better than the rest without any."""
+    drag, both = ranked(QuadraticDrag(joint="knee"), 50.0), ranked(QuadraticDrag(joint="knee"), 80.0)
+    play = Candidate(StribeckFriction(joint="hip"), ((),))
+    both = Ranked(replace(both.fit, causes=(*both.fit.causes, play)), 80.0)
+    label, at = "quadratic_drag@knee", "stribeck_friction@hip"
+    singles = {(label,): scored(48.0), (at,): scored(20.0), ("base_tilt",): scored(-3.0), ("cogging@hip",): scored(4.0)}
+    pairs = {
+        both.labels: scored(79.0), (label, "spasticity@hip"): scored(70.0), ("base_tilt", label): scored(49.0),
+        ("cogging@hip", at): scored(90.0),
+    }  # fmt: skip
+    alone = Choice(drag, [singles], [{}, {drag.labels: drag}], np.ones(2))
+    assert idle(alone, label) == {"base_tilt"}
+    two = Choice(both, [singles, pairs], [{}, {drag.labels: drag}, {both.labels: both}], np.ones(2))
+    assert idle(two, at) == {"base_tilt"}, "beside the drag, which alone gains 50"
+    assert idle(two, label) == frozenset(), "beside the other, which alone gains 20"
 
 
 def test_what_training_hardly_shows_stands_for_other_runs_to_decide_where_nothing_was_named_or_refuted():
