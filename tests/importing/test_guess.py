@@ -70,6 +70,14 @@ def test_what_names_do_not_say_is_unsure(guessed, pendulum, write_csv):
     assert "integrates to it" in doubts["joint[0].angle.column"]
 
 
+def test_a_speed_in_another_unit_than_the_angles_integrates_to_all_of_it(guessed, pendulum, write_csv):
+    columns, factors = swinging(pendulum), (1, 180 / np.pi, 30 / np.pi, 1)
+    names = ("Time (s)", "Angle [deg]", "Speed [rpm]", "Torque [Nm]")
+    logged = {name: factor * values for name, factor, values in zip(names, factors, columns.values(), strict=True)}
+    told = re.search(r"integrates to ([\d.]+) of the angle", guessed(write_csv(logged))[0])
+    assert float(told[1]) == pytest.approx(1.0, abs=0.01)
+
+
 def test_units_in_names_leave_no_doubt(guessed, pendulum, write_csv):
     names = ("Time (s)", "Angle (deg)", "Speed (deg/s)", "Torque (Nm)")
     columns = swinging(pendulum)

@@ -85,7 +85,9 @@ def _from_slope(agreement: Agreement, unit: str, why: str, sure: bool, velocity_
     ]
     same = [pair for pair in fitting if pair[0] == unit]
     if same:
-        return Units(unit, why, sure, same[0][1], said, True, sign)
+        of_it = sign * _turns(slope, *same[0])
+        in_units = f"integrates to {of_it:.4g} of the angle ({agreement.explained:.0%} of its variance)"
+        return Units(unit, why, sure, same[0][1], in_units, True, sign)
     if fitting and not sure:
         other, velocity = fitting[0]
         return Units(other, f"fits the velocity, which {said}", False, velocity, said, False, sign)
