@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.contracts.joints import the
+from pipelines.contracts.joints import either, the
 from pipelines.diagnosis.floor import Floor
 from pipelines.diagnosis.observations import FOLDS, Run
 from pipelines.diagnosis.spline import Curve, fold_products, held_out_error
+from pipelines.mechanics.machine import Machine
 
 LONGEST_S = 2.0
 """Time since a reversal after which it no longer counts."""
@@ -42,7 +43,7 @@ class Variable:
 
     name: str
     words: str
-    """As a sentence says it; ``{joint}`` and ``{other}`` are filled in."""
+    """As a sentence says it; ``{joint}``, ``{place}`` and ``{effort}`` are filled in, and ``{other}`` with its own."""
     unit: str
     of: Callable[[Run, int], NDArray | None]
     """(m,) values in a run for a joint; None where the run does not know it."""
@@ -89,17 +90,17 @@ def _phase(run: Run, j: int) -> NDArray | None:
 
 
 VARIABLES = (
-    Variable("angle", "{joint}'s angle", "rad", lambda run, j: run.state[0][:, j]),
+    Variable("angle", "{joint}'s {place}", "rad", lambda run, j: run.state[0][:, j]),
     # What friction does has a jump where the joint reverses.
     Variable("speed", "{joint}'s speed", "rad/s", lambda run, j: run.state[1][:, j], by_direction=True),
     Variable("acceleration", "{joint}'s acceleration", "rad/s²", lambda run, j: run.state[2][:, j]),
     Variable(
         "reversals", "{joint}'s direction and the time since it reversed", "s", _since_reversal, by_direction=True
     ),
-    Variable("load", "the torque that {joint} passes on", "N·m", _load, by_direction=True),
-    Variable("other_angle", "{other}'s angle", "rad", lambda run, j: _of_other(run, 0, j)),
+    Variable("load", "the {effort} that {joint} passes on", "N·m", _load, by_direction=True),
+    Variable("other_angle", "{other}'s {other_place}", "rad", lambda run, j: _of_other(run, 0, j)),
     Variable("other_speed", "{other}'s speed", "rad/s", lambda run, j: _of_other(run, 1, j)),
-    Variable("other_load", "the torque that {other} passes on", "N·m", _load_of_other),
+    Variable("other_load", "the {other_effort} that {other} passes on", "N·m", _load_of_other),
     Variable("cuff_force", "the cuffs' torque about {joint}", "N·m", _cuff),
     Variable("temperature", "the temperature of {joint}'s motor", "°C", _temperature),
     Variable("time", "the time since the run began", "s", lambda run, j: run.time, lasting=False, knots=2),
@@ -145,14 +146,14 @@ class Excess:
 
 def dependences(runs: Sequence[Run], residuals: Sequence[NDArray]) -> list[Dependence]:
     """Rank what the residuals (m, O) of the drives depend on, most first, joint by joint."""
-    joints = runs[0].motion.joints
+    machine = runs[0].motion.machine
     found = []
-    for j, joint in enumerate(joints):
+    for j, joint in enumerate(machine.names):
         shares = {v: variable_share(v, runs, residuals, j) for v in VARIABLES if knows(v, runs, j)}
-        made = [Dependence(joint, v.name, s, _sentence(joint, joints, v.words, s)) for v, s in shares.items()]
+        made = [Dependence(joint, v.name, s, _sentence(joint, machine, v.words, s)) for v, s in shares.items()]
         frequency, share = tone(runs, [run.with_fast(r) for run, r in zip(runs, residuals, strict=True)], j)
         words = f"a tone of {frequency:.2f} Hz that is no harmonic of the motion"
-        made.append(Dependence(joint, "tone", share, _sentence(joint, joints, words, share)))
+        made.append(Dependence(joint, "tone", share, _sentence(joint, machine, words, share)))
         found += sorted(made, key=_rank, reverse=True)
     return found
 
@@ -166,13 +167,16 @@ def knows(variable: Variable, runs: Iterable[Run], j: int) -> bool:
     return any(variable.of(run, j) is not None for run in runs)
 
 
-def _sentence(joint: str, joints: Sequence[str], words: str, share: float) -> str:
-    return f"{100 * share:.0f} % of what is left at {the(joint)} goes with {_words(joint, joints, words)}"
+def _sentence(joint: str, machine: Machine, words: str, share: float) -> str:
+    return f"{100 * share:.0f} % of what is left at {the(joint)} goes with {_words(joint, machine, words)}"
 
 
-def _words(joint: str, joints: Sequence[str], words: str) -> str:
-    others = [name for name in joints if name != joint]
-    return words.format(joint=the(joint), other=" and ".join(map(the, others)))
+def _words(joint: str, machine: Machine, words: str) -> str:
+    own, others = machine.joint(joint), [other for other in machine.joints if other.name != joint]
+    return words.format(
+        joint=the(joint), place=own.place, effort=own.effort, other=" and ".join(the(other.name) for other in others),
+        other_place=either(other.place for other in others), other_effort=either(other.effort for other in others),
+    )  # fmt: skip
 
 
 def by_kind(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Iterable[tuple[list[Run], list[NDArray]]]:
@@ -284,7 +288,9 @@ def excesses(runs: Sequence[Run], residuals: Sequence[NDArray], floor: Floor) ->
     ]  # fmt: skip
 
 
-def describe(found: Sequence[Dependence], above: Sequence[Excess], together: Sequence[Together] = ()) -> str:
+def describe(
+    machine: Machine, found: Sequence[Dependence], above: Sequence[Excess], together: Sequence[Together] = ()
+) -> str:
     """Say in a sentence or two what the joint with most above its floor depends on, and where that is.
 
     ``together`` are pairs of variables that foretell the residual (see ``smooth_term``).
@@ -295,7 +301,7 @@ def describe(found: Sequence[Dependence], above: Sequence[Excess], together: Seq
     own = [d for d in found if d.joint == joint]
     pair = max((t for t in together if t.joint == joint), key=lambda t: t.share, default=None)
     if pair and pair.share > MUCH_MORE * max(_rank(own[0]), LITTLE):
-        words = " together with ".join(_words(joint, list(squares), variable.words) for variable in pair.variables)
+        words = " together with ".join(_words(joint, machine, variable.words) for variable in pair.variables)
         return f"{100 * pair.share:.0f} % of what is left at {the(joint)} goes with {words}{where}."
     if own[0].share < LITTLE:
         return (

@@ -44,7 +44,7 @@ def unknown(d: Diagnosis, found: list[Dependence]) -> Unknown:
     left = [r - np.nan_to_num(term.torque(run)) for run, r in zip(d.validate, d.after.residuals, strict=True)]
     rms = errors_of(d.validate, left).rms
     return Unknown(
-        description=describe(found, above, together=term.together),
+        description=describe(d.baseline.machine, found, above, term.together),
         depends_on=found[:MENTIONED],
         smooth=term.describe(),
         rmse_nm={joint: float(v) for joint, v in zip(d.baseline.joints, rms, strict=True)},

@@ -12,6 +12,7 @@ from pipelines.diagnosis.observations import observe
 from pipelines.diagnosis.planned import planned_motions
 from pipelines.diagnosis.smooth_term import smooth_term
 from pipelines.mechanics.fourier import FourierTrajectory
+from pipelines.mechanics.machine import THE_LEG
 from pipelines.settings.design import NoiseSettings
 from pipelines.settings.plant import PlantSettings
 
@@ -97,7 +98,7 @@ def test_a_tone_beside_the_harmonics_is_found_with_its_frequency(runs):
 
 def test_the_description_names_joint_variable_and_kind_of_run(runs):
     residuals = with_law(runs, np.random.default_rng(2), LAWS["angle"], kinds=("with_human",))
-    text = describe(dependences(runs, residuals), excesses(runs, residuals, FLOOR))
+    text = describe(THE_LEG, dependences(runs, residuals), excesses(runs, residuals, FLOOR))
     assert "left at the knee goes with the knee's angle" in text
     assert "mostly with the human" in text
 
@@ -105,7 +106,7 @@ def test_the_description_names_joint_variable_and_kind_of_run(runs):
 def test_of_noise_it_is_said_that_nothing_foretells_it(runs):
     residuals = noise(runs, np.random.default_rng(3))
     assert "depends on nothing that was measured" in describe(
-        dependences(runs, residuals), excesses(runs, residuals, FLOOR)
+        THE_LEG, dependences(runs, residuals), excesses(runs, residuals, FLOOR)
     )
 
 
@@ -122,7 +123,7 @@ def test_a_law_learnt_on_one_excitation_lowers_the_error_on_another(runs, fresh)
 def test_two_variables_are_named_where_neither_alone_foretells(runs):
     residuals = with_law(runs, np.random.default_rng(5), product)
     together = smooth_term(runs, residuals).together
-    text = describe(dependences(runs, residuals), excesses(runs, residuals, FLOOR), together)
+    text = describe(THE_LEG, dependences(runs, residuals), excesses(runs, residuals, FLOOR), together)
     assert "together with" in text
 
 

@@ -51,6 +51,7 @@ def test_a_lifts_weight_hides_nothing_for_what_is_off_varies_with_the_force():
     error, floor, force = (said[key]["carriage"] for key in ("baseline_rmse_nm", "noise_floor_nm", "torque_rms_nm"))
     assert np.sqrt(error**2 - floor**2) < 0.015 * force
     assert said["status"] == "unknown_cause"
+    assert "goes with the force that the carriage passes on" in said["summary"]
 
 
 def test_an_error_that_is_no_noise_but_as_small_as_on_a_good_rig_is_told_as_that():
