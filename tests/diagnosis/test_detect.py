@@ -10,9 +10,9 @@ from pipelines.diagnosis.candidates import Candidate, torque_columns
 from pipelines.diagnosis.choice import MATERIAL, NEEDED
 from pipelines.diagnosis.detect import POWER, Look, _alike, detectability, needed_noncentrality
 from pipelines.diagnosis.floor import Floor
+from pipelines.diagnosis.imperfection import IMPERFECTION
 from pipelines.diagnosis.observations import baseline_of, observe
 from pipelines.diagnosis.planned import planned_motions, planned_noise
-from pipelines.diagnosis.search import IMPERFECTION
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.trajectory import read_trajectory
 from pipelines.settings.datasets import datasets

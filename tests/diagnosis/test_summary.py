@@ -1,5 +1,6 @@
 """The summary: two sentences that say what is missing, what naming it gains, and where more is left."""
 
+from collections import defaultdict
 from dataclasses import replace
 
 import numpy as np
@@ -121,7 +122,7 @@ def test_a_gain_is_what_the_cause_takes_of_the_error_that_the_others_leave(stuck
     taken, left = gain["rmse_reduction_nm"], told["extended_rmse_nm"][gain["joint"]]
     said = f"it takes {taken:.2f} of {left + taken:.2f} N·m of torque error at the {gain['joint']}"
     assert told["causes"][0]["evidence"][0] == f"{said} on runs no fit has seen"
-    two = replace(stuck, likely=stuck.likely | {"base_tilt": {"base_tilt": 0.9}})
+    two = replace(stuck, likely=stuck.likely | {"base_tilt": {"base_tilt": 0.9}}, idle=defaultdict(frozenset))
     beside = _evidence(two, label, ParallelSpring("knee"), taken, gain["joint"], {label: 0.9})[0]
     assert beside == f"{said} that the other causes leave on runs no fit has seen"
 
