@@ -49,11 +49,11 @@ def show_verdict(said: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
 
 
 def _excess_left(said: Mapping[str, Any], joint: str) -> str:
-    """Return the share of a joint's error beyond noise that is left; none is told where nothing is beyond chance."""
+    """Return the share of a joint's error beyond noise that is left; none is told where nothing is missing."""
     share = said["unexplained"][joint]
     if share is None:
         return "at the floor"
-    return "by chance" if said["status"] == "nothing_missing" else f"{share:.0%}"
+    return "too little" if said["status"] == "nothing_missing" else f"{share:.0%}"
 
 
 def _show_cause(cause: Mapping[str, Any]) -> None:

@@ -21,6 +21,7 @@ from pipelines.effects import Effect, PreslidingHysteresis
 from pipelines.estimation.angle_noise import CUTOFF_HZ, IN_WORDS
 from pipelines.estimation.regression import mask_in_words
 from pipelines.label import amount, cause_label, effect_labelled, effect_told, in_words, number
+from pipelines.mechanics.geometry import Geometry
 
 HIGHEST = 0.96
 """A probability never claims more than calibration has shown: some causes that nobody lists look like a listed one."""
@@ -250,7 +251,18 @@ def _caveats(d: Diagnosis) -> list[str]:
         for effect in d.baseline.known
     ]
     shown = hiding * (not d.spoilt) + turning
-    return known + [noisy] * d.noisy_angles + shown + _of_one_run(d) + _of_one_kind(d)
+    return known + _untold_length(d) + [noisy] * d.noisy_angles + shown + _of_one_run(d) + _of_one_kind(d)
+
+
+def _untold_length(d: Diagnosis) -> list[str]:
+    """Say that the distance between two axes is another machine's, which a leg's default is where it was not told."""
+    machine, length = d.baseline.machine, d.train[0].motion.geometry.thigh_length_m
+    if machine.is_exoskeleton or not machine.mechanism.has_length or length != Geometry().thigh_length_m:
+        return []
+    return [
+        f"nobody told how far apart the axes of {machine.names[0]} and {machine.names[1]} are: taken for "
+        f"{length:g} m, an exoskeleton's; set geometry.thigh_length_m in the map, and import again"
+    ]
 
 
 def _reversal(d: Diagnosis, one: BuildUp) -> dict[str, Any]:

@@ -20,8 +20,8 @@ def test_a_parameter_has_its_unit_and_an_interval_only_if_it_was_fitted(value, u
     assert _in_words({"name": "play", "value": value, "unit": unit, "ci95": ci95}) == said
 
 
-@pytest.mark.parametrize(("status", "left"), [("explained", "5%"), ("nothing_missing", "by chance")])
-def test_what_chance_may_have_left_is_told_by_no_share(capsys, status, left):
+@pytest.mark.parametrize(("status", "left"), [("explained", "5%"), ("nothing_missing", "too little")])
+def test_what_chance_or_a_good_rig_may_have_left_is_told_by_no_share(capsys, status, left):
     show_verdict(verdict_of(status=status, causes=[]), HIP_AND_KNEE)
     (knee,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("knee")]
     assert knee.endswith(left)

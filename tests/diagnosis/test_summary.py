@@ -2,16 +2,20 @@
 
 from collections import defaultdict
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from pipelines.contracts.joints import Joint
 from pipelines.contracts.table import Table
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.gain import scored
-from pipelines.diagnosis.verdict import _evidence, _finding, _in_words, _times, verdict
+from pipelines.diagnosis.verdict import _evidence, _finding, _in_words, _times, _untold_length, verdict
 from pipelines.effects import ParallelSpring
+from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.kinematics import motion_table
+from pipelines.mechanics.machine import machine_of
 from pipelines.mechanics.motion import motion_from_table
 from pipelines.settings.filter import FilterSettings
 from tests.diagnosis.sessions import recordings
@@ -163,3 +167,17 @@ def test_ties_are_one_answer_with_one_probability():
 @pytest.mark.parametrize(("likely", "other", "said"), [(0.8, 0.2, "4 times"), (1.0, 0.0, "over 1000 times")])
 def test_odds_beyond_a_thousand_are_not_told_by_a_figure(likely, other, said):
     assert _times(likely, other) == said
+
+
+@pytest.mark.parametrize(
+    ("names", "length", "said"),
+    [(("shoulder", "elbow"), None, True), (("shoulder", "elbow"), 0.3, False), (("hip", "knee"), None, False)],
+)
+def test_an_arm_whose_length_nobody_told_is_said_to_have_an_exoskeletons(names, length, said):
+    geometry = Geometry() if length is None else Geometry(thigh_length_m=length)
+    machine = machine_of([Joint(name) for name in names], geometry)
+    run = SimpleNamespace(motion=SimpleNamespace(geometry=geometry))
+    found = SimpleNamespace(baseline=SimpleNamespace(machine=machine), train=[run])
+    told = _untold_length(found)
+    assert bool(told) == said
+    assert not said or "0.38952 m, an exoskeleton's; set geometry.thigh_length_m" in told[0]

@@ -43,7 +43,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
             raise InputError(
                 f"none of {', '.join(source.names)} goes forward as a clock does, over ten rows or more and at "
                 f"{clock.SLOWEST_HZ:g} to {clock.FASTEST_HZ:g} Hz; write the map by hand, with time.rate_hz where rows "
-                "are uniform: docs/import.md tells how"
+                "are uniform, or time.unit = 'iso8601' where a column is dates: docs/import.md tells how"
             )
     for path in paths[1:]:
         _refuse_other_columns(path, source)
