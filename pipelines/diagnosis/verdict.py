@@ -220,7 +220,9 @@ def _summary(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -
         return f"Acquisition, not physics: {_in_short(d.spoilt[0], d)}."
     said = _finding(d, causes, left)
     if not d.floor.from_periods:
-        said += f" No motion here repeats, so the noise floor is a guess from {_floor_from(d)}."
+        told = any(run.motion.period_s for run in (*d.train, *d.validate))
+        why = "No run holds two periods" if told else "No recording tells of a period after which its motion repeats"
+        said += f" {why}, so the noise floor is a guess from {_floor_from(d)}."
     return f"{said} Beside it, faults of acquisition: {_in_short(d.faults[0], d)}." if d.faults else said
 
 

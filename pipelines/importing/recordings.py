@@ -19,6 +19,7 @@ from pipelines.importing.finding import Finding, counted
 from pipelines.importing.log import Log, read_log
 from pipelines.importing.numbers import TAKEN_FOR_MISSING
 from pipelines.importing.plausible import look_at
+from pipelines.importing.repetition import repeats_after
 from pipelines.importing.sources.open import open_source
 from pipelines.importing.turns import Beginnings
 from pipelines.settings.import_map import ImportMap, RecordingSettings
@@ -131,6 +132,7 @@ def _recordings_of(
     _refuse_absurd_angles(columns, settings)
     _refuse_absurd_torques(columns, settings)
     _refuse_long_periods(wanted, float(run.time_s[-1]))
+    findings += _period_findings(columns, settings, wanted)
     findings += look_at(columns, settings)
     findings += before.look_at(f"{path.name}{suffix}", columns, log.turns)
     spans = [_span(time, float(run.time_s[-1]), recording) for recording in wanted]
@@ -206,6 +208,21 @@ def _sampling_findings(sampling: Sampling) -> list[Finding]:
         )
         found.append(Finding("time", seen, "told in `gaps`; nothing is filled in"))
     return found
+
+
+def _period_findings(
+    columns: Mapping[str, NDArray], settings: ImportMap, wanted: Sequence[RecordingSettings]
+) -> list[Finding]:
+    """Tell of a period that the map does not: without it noise cannot be told from what repeats."""
+    if all(recording.period_s is not None for recording in wanted):
+        return []
+    asked = [joint.joint.column("reference") for joint in settings.joint]
+    motion = asked if all(name in columns for name in asked) else [j.joint.column("angle") for j in settings.joint]
+    period_s = repeats_after(columns["time_s"], np.column_stack([columns[name] for name in motion]))
+    if period_s is None:
+        return []
+    to_do = f"period_s = {period_s:.6g} in [[recording]] lets diagnose measure the noise instead of guessing it"
+    return [Finding("time", f"the motion repeats every {period_s:.6g} s, of which the map tells nothing", to_do)]
 
 
 def _refuse_absurd_angles(columns: Mapping[str, NDArray], settings: ImportMap) -> None:

@@ -82,8 +82,16 @@ def test_the_gain_is_told_where_it_is_made_and_not_where_the_error_is_largest(st
 
 def test_a_floor_that_no_repetition_shows_is_said_to_be_a_guess(stuck):
     assert "guess" not in verdict(stuck)["summary"]
-    without_periods = replace(stuck, floor=replace(stuck.floor, from_periods=False))
-    assert "so the noise floor is a guess from the band above the motion." in verdict(without_periods)["summary"]
+    short = replace(stuck, floor=replace(stuck.floor, from_periods=False))
+    guess = ", so the noise floor is a guess from the band above the motion."
+    assert f"No run holds two periods{guess}" in verdict(short)["summary"]
+    runs = {of: tuple(without_a_period(run) for run in getattr(stuck, of)) for of in ("train", "validate")}
+    told = verdict(replace(short, **runs))["summary"]
+    assert f"No recording tells of a period after which its motion repeats{guess}" in told
+
+
+def without_a_period(run):
+    return replace(run, motion=replace(run.motion, period_s=None))
 
 
 def nothing_missing(d, share, from_periods):

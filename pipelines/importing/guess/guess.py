@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from pipelines.errors import InputError, about
 from pipelines.importing import clock
 from pipelines.importing.guess.joint_table import write_joint
-from pipelines.importing.guess.joints import group_joints
+from pipelines.importing.guess.joints import JointColumns, group_joints
 from pipelines.importing.guess.names import meanings
 from pipelines.importing.guess.proposal import Proposal
-from pipelines.importing.guess.time import guess_time, write_time
+from pipelines.importing.guess.time import TimeGuess, guess_time, write_time
 from pipelines.importing.numbers import numbers
+from pipelines.importing.repetition import repeats_after
 from pipelines.importing.sources.open import open_source
 from pipelines.importing.sources.source import Source
 from pipelines.settings.import_map import SourceSettings
@@ -67,7 +68,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
     for number, joint in enumerate(joints):
         used |= set(write_joint(proposal, number, joint, here, run.time_s, len(joints) == 1, single))
     _write_geometry(proposal, len(joints))
-    _write_recordings(proposal, paths)
+    _write_recordings(proposal, paths, [_period(path, time, joints) for path in paths])
     _remark_on_the_rest(proposal, [name for name in source.names if name not in used], columns)
     return proposal
 
@@ -106,13 +107,26 @@ def _write_geometry(proposal: Proposal, joints: int) -> None:
         proposal.unknown("thigh_length_m", "axis of the first joint to that of the second", blocks=False)
 
 
-def _write_recordings(proposal: Proposal, paths: Sequence[Path]) -> None:
+def _period(path: Path, time: TimeGuess, joints: Sequence[JointColumns]) -> float | None:
+    """Return the period, s, of the motion that a file holds: as it was asked for, where that was logged."""
+    motion = [(joint.columns.get("reference") or joint.columns["angle"]).column for joint in joints]
+    with about(path):
+        columns = open_source(path, SourceSettings()).load([time.column, *motion])
+    stamps, *moved = (_numeric(columns[name]) for name in (time.column, *motion))
+    if any(values.dtype.kind not in "iuf" or len(values) != len(stamps) for values in (stamps, *moved)):
+        return None
+    run = _longest_run(stamps, time.unit)
+    return repeats_after(run.time_s, np.column_stack([values[run.rows].astype(float) for values in moved]))
+
+
+def _write_recordings(proposal: Proposal, paths: Sequence[Path], periods: Sequence[float | None]) -> None:
     """Propose what trains and what validates: the end of the only file, or the last third of several."""
     if len(paths) == 1:
         for purpose, span in (("train", [0.0, TRAIN]), ("validate", [TRAIN, 1.0])):
             proposal.table("[[recording]]", "recording")
             proposal.key("purpose", purpose)
             proposal.key("span", span, "shares of the run")
+            _write_period(proposal, periods[0])
         return
     train = max(1, round(TRAIN * len(paths)))
     alike = len({path.stem for path in paths}) < len(paths)
@@ -122,6 +136,14 @@ def _write_recordings(proposal: Proposal, paths: Sequence[Path]) -> None:
         proposal.key("files", here.replace("[", "[[]"))
         proposal.key("name", "{folder}_{file}" if alike else "{file}")
         proposal.key("purpose", "train" if number < min(train, len(paths) - 1) else "validate")
+        _write_period(proposal, periods[number])
+
+
+def _write_period(proposal: Proposal, period_s: float | None) -> None:
+    if period_s is None:
+        proposal.remark("period_s: no motion repeats here; without periods the noise is a guess, not measured")
+    else:
+        proposal.key("period_s", period_s, "the motion repeats so: what differs between periods is noise")
 
 
 def _remark_on_the_rest(proposal: Proposal, unused: Sequence[str], columns: Mapping[str, NDArray]) -> None:
