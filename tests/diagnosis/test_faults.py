@@ -168,6 +168,13 @@ def test_a_drive_that_follows_weakly_is_in_no_other_unit(sound, share, told):
     assert any("in another unit" in what for what in said) == told
 
 
+def test_a_joint_that_rests_on_its_friction_while_its_set_point_goes_is_in_no_other_unit(sound):
+    frame, metadata = sound[SPOILED]
+    creeps = frame.assign(hip_angle_rad=0.4 + np.radians(frame["hip_reference_rad"]))
+    session = [(creeps, metadata) if number == SPOILED else run for number, run in enumerate(sound)]
+    assert not any("in another unit" in fault.what for fault in faults_of(session) if fault.channel == "hip_angle_rad")
+
+
 def test_a_counter_that_starts_anew_is_named(sound):
     session = [(frame.copy(), metadata) for frame, metadata in sound]
     session[SPOILED][0].loc[3000:, "sequence"] -= 3000
@@ -195,6 +202,15 @@ def test_a_stuck_encoder_is_named_and_its_samples_excluded(session, joint):
     assert fault.samples[2000:2601].all() and fault.samples.sum() < 800
     left = excluding([motion(frame, metadata, "with_human.parquet")], [fault])[0]
     assert not left.valid[2000:2601].any() and left.valid.sum() > 4500
+
+
+def test_a_joint_that_never_moves_in_a_run_repeats_no_old_samples(sound):
+    frame, metadata = sound[SPOILED]
+    torque = frame["hip_torque_nm"].to_numpy().copy()
+    torque[1::3] = torque[::3][: len(torque[1::3])]
+    rests = frame.assign(hip_angle_rad=0.4, hip_torque_nm=torque)
+    session = [(rests, metadata) if number == SPOILED else run for number, run in enumerate(sound)]
+    assert not any("repeated samples" in fault.what for fault in faults_of(session))
 
 
 def test_a_stuck_torque_is_not_taken_for_stale_samples(session):

@@ -76,13 +76,13 @@ def _repeated(motion: Motion) -> Iterator[Fault]:
 
 
 def _count_of(angle: NDArray) -> float:
-    """Return the smallest step of an encoder, rad; of one without steps, zero.
+    """Return the smallest step of an encoder, rad; of one that never moved, beyond all.
 
     The smallest difference would do but for rounding: equal counts differ by 1e-16 in radians.
     """
     steps = np.abs(np.diff(angle))
     steps = steps[steps > 1e-9]
-    return float(steps.min()) if len(steps) else 0.0
+    return float(steps.min()) if len(steps) else np.inf
 
 
 def _stuck_angle(motion: Motion, joint: int) -> Iterator[Fault]:

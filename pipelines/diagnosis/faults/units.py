@@ -36,6 +36,8 @@ TORQUE_UNITS = {
     "N·mm": 1e3, "N·cm": 1e2, "kgf·cm": 10.197, "lbf·in": 8.851, "ozf·in": 141.6, "kgf·m": 0.10197, "kN·m": 1e-3,
 }  # fmt: skip
 SAME_UNIT = 1.3
+FOLLOWS = 0.7
+"""Correlation of an angle with its set-point below which it does not go after it, in whatever unit."""
 SMALLER_UNITS, NEAR = (1 / (2 * np.pi), np.pi / 180, 1 / 360), 1.25
 """Turns under set-points in radians, radians under degrees, turns under degrees; and how near to one of these is it."""
 
@@ -73,13 +75,17 @@ def _is_a_unit(factor: float) -> bool:
 
 
 def _times_set_point(motion: Motion, joint: int) -> float | None:
+    """Return how many times its set-point an angle is; None where it goes elsewhere, as a joint that rests does."""
     if motion.reference is None:
         return None
     reference, q = motion.reference[motion.valid, joint], motion.q[motion.valid, joint]
     known = np.isfinite(reference)
-    if known.sum() < 2 or np.ptp(reference[known]) == 0.0:
+    asked, went = reference[known], q[known]
+    if known.sum() < 2 or np.ptp(asked) == 0.0 or np.ptp(went) == 0.0:
         return None
-    return float(np.ptp(q[known]) / np.ptp(reference[known])) or None
+    times = float(np.ptp(went) / np.ptp(asked))
+    follows = np.corrcoef(went, asked)[0, 1] > FOLLOWS and abs(went.mean() - times * asked.mean()) < np.ptp(went)
+    return times if follows else None
 
 
 def torque_unit_faults(runs: Sequence[Averages]) -> Iterator[Fault]:
