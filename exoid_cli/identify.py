@@ -60,7 +60,7 @@ def identify(
         return
     files, output = inputs_and_folder("identify", files, output, config, "no motion is given")
     settings = settings_in_force(config)
-    estimator = estimator_named(method or settings.identify.method)
+    estimator = estimator_named(settings.identify.method if method is None else method)
     runs = read_runs(files, settings.filter, geometry_from(settings))
     refuse_another_mechanism(settings.mechanism, runs)
     with console.working("fitting"):

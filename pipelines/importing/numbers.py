@@ -27,9 +27,15 @@ def numbers(values: NDArray, where: str, findings: list[Finding]) -> NDArray:
 
 
 def whole_nanoseconds(values: NDArray) -> NDArray:
-    """Return dates written out, ``2026-01-31 12:00:00.125``, as nanoseconds (n,) int64; NaN where there is none."""
+    """Return dates written out, ``2026-01-31 12:00:00.125``, as nanoseconds (n,) int64; NaN where there is none.
+
+    Times of day without a date are those of one day.
+    """
     if values.dtype.kind in "iuf":
         return values
-    dates = pd.to_datetime(pd.Series(values), errors="coerce", format="ISO8601", utc=True)
+    text = pd.Series(values)
+    dates = pd.to_datetime(text, errors="coerce", format="ISO8601", utc=True)
+    if dates.isna().all():
+        dates = pd.to_datetime("1970-01-01T" + text.astype("str"), errors="coerce", format="ISO8601", utc=True)
     stamps = dates.astype("datetime64[ns, UTC]").astype("int64")
     return stamps.to_numpy() if dates.notna().all() else stamps.where(dates.notna()).to_numpy(dtype=float)

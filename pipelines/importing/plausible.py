@@ -17,6 +17,8 @@ OFF = 0.15
 """By so much the slope between both may be off 1: a filter in the drive, a late sample."""
 STRONGEST = {"torque": 1e3, "force": 1e5}
 """N·m and N: the drives of legs, arms and robots deliver less at a joint; what is more is mostly in another unit."""
+SHORTEST = {"revolute": (1e-3, "rad"), "prismatic": (1e-5, "m")}
+"""Play and bending of a gear or a screw are as much: of a joint that moves less nothing is learnt."""
 FAR = 20.0
 """Times further off the middle than 99 % of a column's rows: no motion or load of a machine does that once."""
 GIVES_BACK = 0.2
@@ -28,6 +30,7 @@ def look_at(columns: Mapping[str, NDArray], settings: ImportMap) -> Iterator[Fin
     for joint in settings.joint:
         yield from _still(columns, joint)
         yield from _velocity(columns, joint)
+        yield from _too_short(columns, joint)
         yield from _slips(columns, joint)
         yield from _too_strong(columns, joint)
     yield from _power(columns, settings.joint)
@@ -46,6 +49,14 @@ def _still(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Fin
         name = joint.joint.column(quantity)
         if np.ptp(columns[name]) == 0.0:
             yield Finding(name, f"is {columns[name][0]:.6g} in every row", "nothing can be learnt from it")
+
+
+def _too_short(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:
+    name, (least, unit) = joint.joint.column("angle"), SHORTEST[joint.kind]
+    way = float(np.ptp(columns[name]))
+    if 0.0 < way < least:
+        seen = f"moves over {way:.3g} {unit} only, and what a joint does within {least:g} {unit} shows no mass"
+        yield Finding(name, seen, "kept; check its unit, scale and gear_ratio")
 
 
 def _slips(columns: Mapping[str, NDArray], joint: JointSettings) -> Iterator[Finding]:

@@ -41,7 +41,7 @@ def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
     if len(time_s) < 40:
         return None
     step = max(float(np.median(np.diff(time_s))), (time_s[-1] - time_s[0]) / POINTS)
-    grid = np.arange(time_s[0], time_s[-1], step)
+    grid = np.arange(time_s[0], time_s[-1] + 0.5 * step, step)
     columns = np.column_stack([np.interp(grid, time_s, column) for column in moving])
     columns = (columns - columns.mean(axis=0)) / np.maximum(columns.std(axis=0), 1e-300)
 
@@ -55,7 +55,7 @@ def repeats_after(time_s: NDArray, motion: NDArray) -> float | None:
     lag, least = min((lag, difference) for lag, difference in near if difference <= max(AS_GOOD * best, EQUAL))
     rounder = (float(f"{step * lag:.{digits}g}") for digits in range(1, 7))
     as_good = (one for one in rounder if unlike(one / step) < max(AS_ROUND * least, EQUAL))
-    return next(as_good, step * lag)
+    return next(as_good, float(f"{step * lag:.6g}"))
 
 
 def _difference(columns: NDArray) -> NDArray:
@@ -87,8 +87,8 @@ def _of_a_usual_pair(columns: NDArray, lag: float) -> float:
     They are cut from the middle of the run, for ramps are at its ends; a lag between samples is interpolated to.
     """
     n, length = len(columns), int(lag)
-    count = int(n / lag)
-    begins = 0.5 * (n - 1 - count * lag) + lag * np.arange(count)
+    count = int(n / lag + 1e-6)
+    begins = 0.5 * (n - count * lag) + lag * np.arange(count)
     at = begins[:, np.newaxis] + np.arange(length)
     periods = np.stack([np.interp(at, np.arange(n), column) for column in columns.T], axis=-1)
     moving = [period for period in periods if (period.var(axis=0) > AT_REST).all()]

@@ -5,6 +5,7 @@ import re
 import tomllib
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 from scipy.io import savemat
@@ -524,3 +525,22 @@ def test_a_counter_that_starts_anew_is_counted_on(imported, guessed, pendulum, w
     path = write_csv(columns | {"angle": columns["angle"] * turn / (2.0 * np.pi) % turn})
     found = tomllib.loads(guessed(path)[0])["joint"][0]["angle"]
     assert (found["unit"], found["wraps_at"]) == (unit, turn)
+
+
+@pytest.mark.parametrize("form", ["%Y-%m-%d %H:%M:%S.%f", "%Y-%m-%dT%H:%M:%S.%f+01:00", "%H:%M:%S.%f"])
+def test_dates_and_times_of_day_are_a_clock(imported, guessed, pendulum, write_csv, form):
+    columns = swinging(pendulum)
+    stamps = pd.Timestamp("2026-03-01 12:00:00") + pd.to_timedelta(columns["time"], unit="s")
+    path = write_csv(columns | {"time": np.array(stamps.strftime(form))})
+    text, doubts = guessed(path)
+    assert tomllib.loads(text)["time"] == {"column": "time", "unit": "iso8601"} and "time.unit" not in doubts
+    found = imported(path, map_text=text).recording("log_train").frame["time_s"]
+    assert_allclose(np.diff(found), 0.005, atol=1e-9)
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("mrad", 1e3), ("deg", 180 / np.pi)])
+def test_the_sign_of_a_torque_is_seen_in_any_unit_of_angle(guessed, pendulum, write_csv, unit, factor):
+    columns = swinging(pendulum)
+    path = write_csv({"t": columns["time"], f"q [{unit}]": factor * columns["angle"], "tau [Nm]": -columns["torque"]})
+    text, doubts = guessed(path)
+    assert tomllib.loads(text)["joint"][0]["torque"]["sign"] == -1 and "joint[0].torque.sign" not in doubts

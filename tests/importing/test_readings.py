@@ -318,3 +318,10 @@ def test_of_many_logs_each_has_a_line_and_what_was_seen_in_several_is_told_once(
     assert [len(one["recordings"][0]["findings"]) > 0 for one in told] == [False, True, True, True]
     few = imported(*paths[:3], map_text=several).out
     assert few.count("no value in") == 2
+
+
+def test_an_angle_that_hardly_moves_is_told_of(imported, pendulum, write_csv):
+    columns = pendulum.columns()
+    tiny = columns | {"angle": 1e-9 * columns["angle"], "velocity": 1e-9 * columns["velocity"]}
+    assert "rad only, and what a joint does within 0.001 rad shows no mass" in imported(write_csv(tiny)).told
+    assert "shows no mass" not in imported(write_csv(columns, "usual.csv")).told

@@ -13,7 +13,7 @@ from pipelines.importing.guess.joints import JointColumns, group_joints
 from pipelines.importing.guess.names import meanings
 from pipelines.importing.guess.proposal import Proposal
 from pipelines.importing.guess.time import TimeGuess, guess_time, write_time
-from pipelines.importing.numbers import numbers
+from pipelines.importing.numbers import numbers, whole_nanoseconds
 from pipelines.importing.repetition import repeats_after
 from pipelines.importing.sources.open import open_source
 from pipelines.importing.sources.source import Source
@@ -35,8 +35,10 @@ def propose(paths: Sequence[Path]) -> Proposal:
     with about(paths[0]):
         source = open_source(paths[0], SourceSettings())
         columns = {name: _numeric(values) for name, values in source.load(source.names).items()}
+        dates = {name: stamps for name, values in columns.items() if (stamps := _dates(values)) is not None}
+        columns |= dates
         found = meanings(source.names)
-        time = guess_time(found, columns)
+        time = guess_time(found, columns, dates)
         if time is None:
             back = [m.column for m in found if m.quantity == "time" and _goes_back(columns[m.column])]
             if back:
@@ -44,7 +46,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
             raise InputError(
                 f"none of {', '.join(source.names)} goes forward as a clock does, over ten rows or more and at "
                 f"{clock.SLOWEST_HZ:g} to {clock.FASTEST_HZ:g} Hz; write the map by hand, with time.rate_hz where rows "
-                "are uniform, or time.unit = 'iso8601' where a column is dates: docs/import.md tells how"
+                "are uniform: docs/import.md tells how"
             )
     for path in paths[1:]:
         _refuse_other_columns(path, source)
@@ -95,6 +97,14 @@ def _numeric(values: NDArray) -> NDArray:
     return np.where(finite, found, np.nan) if finite.any() or values.dtype.kind == "f" else values
 
 
+def _dates(values: NDArray) -> NDArray | None:
+    """Return a column of dates as nanoseconds; None of one that is not so written."""
+    if values.dtype.kind in "biufM" or not len(values) or np.isnan(whole_nanoseconds(values[:1])).any():
+        return None
+    stamps = whole_nanoseconds(values)
+    return stamps if np.isfinite(stamps).all() else None
+
+
 def _longest_run(stamps: NDArray, unit: str) -> clock.Run:
     runs = clock.runs((stamps - clock.first_stamp(stamps)).astype(float) * UNITS[unit].factor, stamps, [])
     return max(runs, key=len)
@@ -112,7 +122,9 @@ def _period(path: Path, time: TimeGuess, joints: Sequence[JointColumns]) -> floa
     motion = [(joint.columns.get("reference") or joint.columns["angle"]).column for joint in joints]
     with about(path):
         columns = open_source(path, SourceSettings()).load([time.column, *motion])
-    stamps, *moved = (_numeric(columns[name]) for name in (time.column, *motion))
+    moved = [_numeric(columns[name]) for name in motion]
+    logged = columns[time.column]
+    stamps = whole_nanoseconds(logged) if time.unit == "iso8601" else _numeric(logged)
     if any(values.dtype.kind not in "iuf" or len(values) != len(stamps) for values in (stamps, *moved)):
         return None
     run = _longest_run(stamps, time.unit)

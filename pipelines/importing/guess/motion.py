@@ -26,7 +26,7 @@ VELOCITY_OF = {
 }  # fmt: skip
 ANGLES, VELOCITIES = ("rad", "deg", "rev", "m", "mm"), ("rad/s", "deg/s", "rpm", "rev/s", "m/s", "mm/s")
 """Units that a log may be in without saying so."""
-TURNS = {"rad": 2.0 * np.pi, "deg": 360.0, "rev": 1.0}
+TURNS = {"rad": 2.0 * np.pi, "mrad": 2000.0 * np.pi, "deg": 360.0, "rev": 1.0}
 """A full turn in each unit."""
 
 

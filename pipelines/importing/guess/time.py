@@ -1,7 +1,7 @@
 """Which column is the clock, and in which unit."""
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,8 +29,8 @@ class TimeGuess:
     restarts: bool
 
 
-def guess_time(meanings: Sequence[Meaning], columns: Mapping[str, NDArray]) -> TimeGuess | None:
-    """Return the clock among columns (n,); None where none is one."""
+def guess_time(meanings: Sequence[Meaning], columns: Mapping[str, NDArray], dates: Container[str]) -> TimeGuess | None:
+    """Return the clock among columns (n,), of which ``dates`` were written out, here in ns; None where none is one."""
     advancing = [meaning for meaning in meanings if _advances(columns[meaning.column])]
     candidates = [meaning for meaning in advancing if meaning.quantity == "time"] or advancing
     for found in sorted(candidates, key=lambda meaning: meaning.unit is None):
@@ -40,15 +40,13 @@ def guess_time(meanings: Sequence[Meaning], columns: Mapping[str, NDArray]) -> T
             u for u in ("s", "ms", "us", "ns") if clock.SLOWEST_HZ <= 1.0 / (step * UNITS[u].factor) <= clock.FASTEST_HZ
         ]
         unit = found.unit if found.unit and UNITS[found.unit].dimension == "time" else None
+        unit = "iso8601" if found.column in dates else unit
         if unit is None and not fitting:
             continue
         chosen = unit or fitting[0]
         rate = f"{1.0 / (step * UNITS[chosen].factor):.4g} Hz"
-        why = (
-            f"its name says so: {rate}"
-            if unit
-            else f"steps of {step:.4g} are {rate} in {chosen}, and no rate in another"
-        )
+        said = "dates written out" if unit == "iso8601" else "its name says so" if unit else ""
+        why = f"{said}: {rate}" if said else f"steps of {step:.4g} are {rate} in {chosen}, and no rate in another"
         named = found.quantity == "time"
         wraps_at, restarts = _breaks(values, chosen)
         usual = clock.SLOWEST_HZ <= 1.0 / (step * UNITS[chosen].factor) <= clock.FASTEST_HZ
