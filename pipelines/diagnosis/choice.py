@@ -114,6 +114,17 @@ class Choice:
         return fine.score if fine else self.levels[len(labels) - 1][labels].score
 
 
+def of_a_bent_spring(choice: Choice, bank: Bank, evidence: Mapping[str, float], empty: Fit) -> frozenset[str]:
+    """Return which named causes a named spring would do without, if it might harden, soften or go slack."""
+    scorer = Scorer(bank, choice.independent, evidence)
+    return frozenset(
+        label
+        for label in choice.named.labels
+        for causes in bent([cause for cause in choice.named.fit.causes if cause.label != label])
+        if _ranked(scorer, causes, empty).score > choice.named.score - NEEDED
+    )
+
+
 def nothing_chosen(empty: Fit) -> Choice:
     """Return the choice of no cause."""
     nothing = Ranked(empty, 0.0)

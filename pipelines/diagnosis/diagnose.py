@@ -18,6 +18,7 @@ from pipelines.diagnosis.choice import (
     dilution,
     idle,
     nothing_chosen,
+    of_a_bent_spring,
     probabilities,
     rivals,
 )
@@ -51,6 +52,8 @@ from pipelines.model import unrealizable
 
 SEARCH_SHARE = 0.75
 """Of the progress bar that filling the bank takes."""
+OR_A_BENT_SPRING = 0.5
+"""No spring is straight all the way: what one that bends would explain as well is as likely there as not."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,8 @@ class Diagnosis:
     """For each named cause the probability of it and of each that could stand in its place."""
     idle: dict[str, frozenset[str]]
     """Those of these that explain nothing."""
+    of_a_bent_spring: frozenset[str]
+    """Named causes that explain no more than a named spring would whose line is bent."""
     standing: Standing
     floor: Floor
     unsteady: bool
@@ -113,7 +118,7 @@ class Diagnosis:
             return ()
 
         def order(label: str) -> tuple[float, float]:
-            return (-round(sum(self.alike(label).values()), 1), -self.choice.alone(label))
+            return (-round(self.chance(label), 1), -self.choice.alone(label))
 
         return tuple(sorted(self.likely, key=order))
 
@@ -141,6 +146,11 @@ class Diagnosis:
     def spoilt(self) -> list[Fault]:
         """Faults of acquisition beside which no physics is blamed."""
         return [fault for fault in self.faults if fault.spoils]
+
+    def chance(self, label: str) -> float:
+        """Return how likely a named cause is among its rivals, with those that cannot be told from it."""
+        among_rivals = min(sum(self.alike(label).values()), 1.0)
+        return OR_A_BENT_SPRING * among_rivals if label in self.of_a_bent_spring else among_rivals
 
     def alike(self, label: str) -> dict[str, float]:
         """Return a named cause and those that cannot be told from it, with their probabilities."""
@@ -239,6 +249,7 @@ def _look(
         without=examined.without,
         likely={label: probabilities(rivals(choice, bank, label), diluted) for label in named},
         idle={label: idle(choice, label) for label in named},
+        of_a_bent_spring=of_a_bent_spring(choice, bank, evidence, empty),
         standing=standing, floor=floor, unsteady=examined.unsteady,
         perceived=examined.sure, sure=sure, parameters=frame, covariance=covariance,
         residuals=tables.residual_table(validate, {"baseline": before.residuals, "extended": after.residuals}),

@@ -113,7 +113,7 @@ def _cause(d: Diagnosis, label: str) -> dict[str, Any]:
         "effect": effect.name,
         "joint": effect.joint,
         "side": str(effect.side),
-        "probability": _probability(d, sum(alike.values())),
+        "probability": _probability(d, label),
         "parameters": _values(rows),
         "gain": {
             "rmse_reduction_nm": worth.value,
@@ -148,11 +148,11 @@ def _never_rising(causes: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return causes
 
 
-def _probability(d: Diagnosis, among_rivals: float) -> float:
+def _probability(d: Diagnosis, label: str) -> float:
     """Return how likely a named cause is: among its rivals, and that what is missing is of this kind at all."""
     crowded = OF_THREE if len(d.causes) > 2 else 1.0
     # Each cause is doubted for what all of them leave.
-    return HIGHEST * crowded * d.standing.trust ** len(d.causes) * min(among_rivals, 1.0)
+    return HIGHEST * crowded * d.standing.trust ** len(d.causes) * d.chance(label)
 
 
 def _tie(effect: Effect, rival: Effect, probability: float) -> dict[str, Any]:
@@ -179,6 +179,11 @@ def _evidence(d: Diagnosis, label: str, effect: Effect, worth: float, joint: str
         sentences.append(doubt[1])
     if effect.each_run:
         sentences.append(_set_anew(d, label, effect))
+    if label in d.of_a_bent_spring:
+        sentences.append(
+            "without it a spring that hardens, softens or goes slack would explain as much: hold the joint at several "
+            "angles and see whether the torque lies on a straight line"
+        )
     if label in d.perceived:
         sentences.append(PERCEIVED[effect.name])
     others = {k: p for k, p in d.likely[label].items() if k not in alike}

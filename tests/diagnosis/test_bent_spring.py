@@ -7,9 +7,11 @@ import pytest
 
 from pipelines.contracts.table import Table
 from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.verdict import verdict
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table
 from pipelines.settings.filter import FilterSettings
+from tests.diagnosis.machines import driven
 from tests.diagnosis.sessions import recordings
 
 LAWS = {
@@ -29,3 +31,30 @@ def test_a_spring_of_any_form_is_named_alone(law):
     motions = [motion_from_table(motion_table(with_spring(t), FilterSettings())) for t in recordings(seed=4)]
     found = diagnose([replace(motion, file=f"run_{i}.parquet") for i, motion in enumerate(motions)])
     assert found.causes == ("parallel_spring@knee",)
+
+
+def over_a_pulley(t, q, dq, ddq, torque):
+    """Return the torque of a balancing spring between a point above the axis and one on the link."""
+    return -2.5 * np.sin((q - 0.3) / 1.2) / np.sqrt(1.5 - np.cos((q - 0.3) / 1.2))
+
+
+def diagnosed(more):
+    tables = [driven(p, seed, "revolute", more) for seed, p in enumerate(("train", "train", "validate"), 3)]
+    motions = [motion_from_table(motion_table(table, FilterSettings())) for table in tables]
+    return diagnose([replace(motion, file=f"run_{i}.parquet") for i, motion in enumerate(motions)])
+
+
+def test_what_a_bent_spring_would_explain_as_well_is_as_likely_there_as_not():
+    causes = verdict(diagnosed(over_a_pulley))["causes"]
+    assert [cause["effect"] for cause in causes] == ["parallel_spring", "mass_off_axis"]
+    assert causes[0]["probability"] > 0.9
+    for beside in causes[1:]:
+        assert beside["probability"] < 0.5
+        assert any(
+            "a spring that hardens, softens or goes slack would explain as much" in e for e in beside["evidence"]
+        )
+
+
+def test_what_no_bent_spring_explains_keeps_its_probability():
+    causes = verdict(diagnosed(lambda t, q, dq, ddq, torque: 5.0 * q + 0.9 * np.sin(11.0 * q)))["causes"]
+    assert {c["effect"]: c["probability"] > 0.9 for c in causes} == {"parallel_spring": True, "cogging": True}
