@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from pipelines.contracts.joints import the
@@ -32,6 +33,8 @@ OF_THREE = 0.5
 HIDING = 0.2
 """Share of a joint's torque from which a guessed floor is told as one that hides what may be missing: no drive's
 current and no torque sensor is as noisy as that, so much of it is what the model lacks; and friction is seldom more."""
+PLAIN = 1.25
+"""Times the floor from which what is left is described, whatever share the causes took away."""
 MENTIONED = 3
 """Causes that could stand for each other, in the summary; ``indistinguishable_from`` has all."""
 CERTAIN = 1000.0
@@ -44,7 +47,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
     causes = _never_rising([_cause(d, label) for label in d.causes])
     before = dependences(d.validate, d.before.residuals)
     after = dependences(d.validate, d.after.residuals) if d.causes else before
-    left = unknown(d, after) if d.status in ("unknown_cause", "partly_explained") and not d.spoilt else None
+    left = unknown(d, after) if _leaves_something(d) else None
     return {
         "contract": "verdict/1",
         "status": d.status,
@@ -74,6 +77,14 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "runs": sorted({run.motion.run for run in d.validate}),
         "noise_floor_from": _floor_from(d),
     }
+
+
+def _leaves_something(d: Diagnosis) -> bool:
+    """Tell whether more than noise is left: a cause that explains four fifths may leave many times the floor."""
+    if d.spoilt or d.status == "nothing_missing":
+        return False
+    plain = d.standing.systematic(d.standing.slow_after) | (d.standing.extended > PLAIN * d.standing.floor)
+    return d.status != "explained" or bool(plain.any())
 
 
 def _known(d: Diagnosis, effect: Effect) -> dict[str, Any]:
@@ -364,12 +375,13 @@ def _finding(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -
     doubts = [f", {doubt[0]}" if (doubt := _doubt(d, cause_label(cause))) else "" for cause in causes]
     named = "; and ".join(_in_words(cause) + doubt for cause, doubt in zip(causes, doubts, strict=True))
     most = int(((before**2 - after**2) / floor**2).argmax())
+    of_what_is_left = f" {left.description}" if left and np.any(after > AT_FLOOR * floor) else ""
     joint = d.baseline.joints[most]
     return (
         f"Missing from the simulation: {named}. With {'it' if len(causes) == 1 else 'them'} "
         f"{the(joint)}'s {machine.joint(joint).effort} error falls from {amount(machine, joint, before[most])}, "
         f"{before[most] / floor[most]:.2f} times the noise floor, to {amount(machine, joint, after[most])}, "
-        f"{_remains(d, most)}."
+        f"{_remains(d, most)}.{of_what_is_left}"
     )
 
 

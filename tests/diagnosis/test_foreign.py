@@ -39,6 +39,20 @@ def off_by_a_little(t, q, dq, ddq, own):
     return -0.03 * own * (own / np.abs(own).max()) ** 2
 
 
+def damped_beyond_a_speed(t, q, dq, ddq, own):
+    """A damper with a dead zone: friction that is no line in speed, as Stribeck's is none, but of another form."""
+    return 3.0 * np.sign(dq) * np.maximum(np.abs(dq) - 1.2, 0.0)
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_what_a_cause_of_another_form_leaves_is_told_with_what_it_goes_with(kind):
+    said = told(kind, damped_beyond_a_speed)
+    (joint,) = said["unexplained"]
+    assert said["status"] == "explained" and said["extended_rmse_nm"][joint] > 1.1 * said["noise_floor_nm"][joint]
+    assert said["residual"]["depends_on"][0]["variable"] == "speed"
+    assert f"of what is left at the {joint} goes with the {joint}'s speed" in said["summary"]
+
+
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])
 def test_a_bearing_that_is_rough_on_one_side_is_no_play(kind):
     said = told(kind, rough_on_one_side)
