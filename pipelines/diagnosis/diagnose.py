@@ -185,7 +185,7 @@ def diagnose(
     refuse_unfit(motions)
     beside = known_effects(known, motions[0].machine)
     faults = tuple(find_faults(motions))
-    sound = [thinned(motion) for motion in excluding(motions, faults)]
+    sound = [thinned(motion) for motion in excluding(motions, faults) if motion.valid.any()]
     train, validate = _dealt(sound)
     if noisy := is_loud([run.motion for run in train]):
         train, validate = _dealt(sound, CUTOFF_HZ)

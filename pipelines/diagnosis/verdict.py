@@ -359,6 +359,8 @@ def _finding(d: Diagnosis, causes: list[dict[str, Any]], left: Unknown | None) -
     size = f"{amount(machine, joint, before[worst])}, {before[worst] / floor[worst]:.2f} times the noise floor"
     if d.status == "nothing_missing":
         said = f"Nothing is missing that these data could show: the largest {exerted} error, at {the(joint)}, is {size}"
+        if not np.isfinite(d.standing.slow_before.floor[worst]):
+            return f"{said}, and the runs to validate on are too short to tell whether that is noise."
         hiding = _floor_that_hides(d).get(joint)
         if hiding is None:
             beyond = d.standing.of_a_good_rig(worst)

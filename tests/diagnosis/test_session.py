@@ -151,3 +151,14 @@ def test_where_a_fault_leaves_nothing_of_a_run_masking_does_not_help(motions):
     (fault,) = find_faults([replace(motions[0], torque=torque)])
     assert "stuck" in fault.what and fault.samples is None
     assert excluding(motions[:1], [fault])[0].valid.any()
+
+
+def test_a_run_that_a_fault_leaves_nothing_of_is_left_out_where_others_suffice(motions):
+    torque = motions[0].torque.copy()
+    torque[:, 1] = 3.0
+    stuck = replace(motions[0], file="stuck.parquet", torque=torque)
+    (fault,) = find_faults([*motions, stuck])
+    assert fault.file == "stuck.parquet" and fault.what.endswith("; this run is left out") and not fault.spoils
+    with_it, without = diagnose([*motions, stuck]), diagnose(motions)
+    assert with_it.causes == without.causes and with_it.status == without.status
+    assert {run.motion.file for run in with_it.train} == {run.motion.file for run in without.train}

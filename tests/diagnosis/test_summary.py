@@ -90,6 +90,13 @@ def test_a_floor_that_no_repetition_shows_is_said_to_be_a_guess(stuck):
     assert f"No recording tells of a period after which its motion repeats{guess}" in told
 
 
+def test_runs_too_short_to_tell_noise_are_said_to_be(stuck):
+    quiet = nothing_missing(stuck, 0.05, from_periods=False)
+    slow = replace(quiet.standing.slow_before, floor=np.full_like(quiet.standing.slow_before.floor, np.inf))
+    told = verdict(replace(quiet, standing=replace(quiet.standing, slow_before=slow)))["finding"]
+    assert told.endswith("and the runs to validate on are too short to tell whether that is noise.")
+
+
 def without_a_period(run):
     return replace(run, motion=replace(run.motion, period_s=None))
 

@@ -5,7 +5,7 @@ those before it left. Slow or small changes that physics can make (a drift, a ga
 offset) are no faults.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -38,6 +38,8 @@ def find_faults(motions: Sequence[Motion]) -> list[Fault]:
     found = _hopeless(motions, found)
     rightly_wired = []
     for motion in excluding(motions, found):
+        if not motion.valid.any():
+            continue
         found += sampling_faults(motion)
         wrong = [*angle_faults(motion), *angle_unit_faults(motion)]
         wrong = wrong or [*sign_faults(motion)]
@@ -51,15 +53,35 @@ def find_faults(motions: Sequence[Motion]) -> list[Fault]:
     return sorted(found, key=lambda fault: files.index(fault.file))
 
 
-def _hopeless(motions: Sequence[Motion], faults: Iterable[Fault]) -> list[Fault]:
-    """Return the faults, those of runs of which too little is left without them as such that masking does not help."""
-    hopeless = {
-        sound.file
-        for whole, sound in zip(motions, excluding(motions, faults), strict=True)
-        if sound.valid.sum()
-        < min(sound.machine.lasting(LEAST_S) * sound.sample_rate_hz, LEAST_SHARE * whole.valid.sum())
-    }
-    return [replace(fault, samples=None) if fault.file in hopeless else fault for fault in faults]
+def _hopeless(motions: Sequence[Motion], faults: Sequence[Fault]) -> list[Fault]:
+    """Return the faults, those of runs of which too little is left without them as such that masking does not help.
+
+    Where other runs of its kind suffice such a run is left out instead, whole: it spoils nothing but itself.
+    """
+    sound = excluding(motions, faults)
+    hopeless = {m.file: m for whole, m in zip(motions, sound, strict=True) if _too_little(whole, m)}
+    told: list[Fault] = []
+    for fault in faults:
+        run = hopeless.get(fault.file)
+        if run is None:
+            told.append(fault)
+        elif fault.samples is None or not _others_suffice(run, motions, hopeless):
+            told.append(replace(fault, samples=None))
+        else:
+            told.append(replace(fault, what=f"{fault.what}; this run is left out", samples=np.ones(len(run), bool)))
+    return told
+
+
+def _too_little(whole: Motion, sound: Motion) -> bool:
+    least = min(sound.machine.lasting(LEAST_S) * sound.sample_rate_hz, LEAST_SHARE * whole.valid.sum())
+    return bool(sound.valid.sum() < least)
+
+
+def _others_suffice(run: Motion, motions: Sequence[Motion], hopeless: Container[str]) -> bool:
+    """Tell whether half of what was recorded of a run's kind and for its purpose is in runs that are usable."""
+    alike = [m for m in motions if (m.run, m.purpose) == (run.run, run.purpose)]
+    usable = sum(len(m) for m in alike if m.file not in hopeless)
+    return usable >= LEAST_SHARE * sum(map(len, alike))
 
 
 def excluding(motions: Sequence[Motion], faults: Iterable[Fault]) -> list[Motion]:
