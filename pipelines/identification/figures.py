@@ -122,15 +122,20 @@ def _residual_over(axis: Axes, x: pd.Series, run: pd.DataFrame, joint: Joint, do
         return
     axis.plot(x[~scored], residual[~scored], ".", ms=1.2, color=MEASURED, alpha=0.5, label="near a reversal")
     axis.plot(x[scored], residual[scored], ".", ms=1.2, color=LEFT, alpha=0.6, label="scored")
+    axis.axhline(0, color="black", lw=0.6)
+    if not scored.any():
+        return
     bins = run.loc[scored].groupby(pd.cut(x[scored], BINS), observed=False)[joint.column("residual")]
     mean = bins.mean().where(bins.count() >= FEWEST)
     axis.plot([b.mid for b in mean.index], mean, color=PREDICTED, lw=1.6, label="mean")
-    axis.axhline(0, color="black", lw=0.6)
     # A joint that sticks leaves errors ten times the rest, which would flatten what there is to see.
     height = 6 * residual[scored].std()
-    axis.set_ylim(-height, height)
+    if height > 0.0:
+        axis.set_ylim(-height, height)
 
 
 def _error(drawn: _Drawn, joint: Joint) -> str:
+    if not drawn.scored:
+        return "no sample away from reversals to score"
     residual, torque = (drawn.rms(joint.column(name)) for name in ("residual", "torque"))
     return f"RMSE {residual:.2f} of {torque:.1f} {joint.unit('torque')} rms"
