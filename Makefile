@@ -8,11 +8,14 @@ INSTALLED := $(VENV)/.installed
 EXPERIMENT := $(MAKE) --no-print-directory -f datasets/experiments/experiment.mk \
 	EXOID=$(BIN)/exoid CONFIG=datasets/experiments/default.toml OUT=build/default
 
+# What blind examinations left, for `make blind-page`.
+LEGS = $(wildcard build/blind/report.json build/blind-full/report.json)
+MACHINES = $(wildcard build/blind-machines/report.json)
 # Seeds of the blind examination: tests/blind/README.md says why there are two ranges.
 SEEDS ?= tuning
 
 .DEFAULT_GOAL := help
-.PHONY: help all test test-slow invariants check format bench estimators real fuzz blind blind-full blind-fixed blind-page docs lock clean install
+.PHONY: help all test test-slow invariants check format bench estimators real fuzz blind blind-full blind-machines blind-fixed blind-page docs lock clean install
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | sort | expand -t 12
@@ -64,11 +67,15 @@ blind: $(INSTALLED) ## examine `exoid diagnose` on 300 sessions whose truth it c
 blind-full: $(INSTALLED) ## the same on 300 sessions with nothing hidden and 30 of each cause and joint; takes hours
 	$(BIN)/python -m tests.blind --full --seeds $(SEEDS) --out build/blind-full
 
+blind-machines: $(INSTALLED) ## the same on 200 machines of one joint
+	$(BIN)/python -m tests.blind --one-joint --cases 200 --seeds $(SEEDS) --out build/blind-machines
+
 blind-fixed: $(INSTALLED) ## record anew how the fixed set of CI comes out, in tests/blind/fixed_set.json
 	$(BIN)/python -m tests.blind --fixed --write --out build/blind-fixed
 
-blind-page: $(INSTALLED) ## write docs/blind.md from the examinations that were made
-	$(BIN)/python -m tests.blind.page $(wildcard build/blind/report.json build/blind-full/report.json) docs/blind.md
+blind-page: $(INSTALLED) ## write docs/blind.md and docs/blind-machines.md from the examinations that were made
+	$(if $(LEGS),$(BIN)/python -m tests.blind.page $(LEGS) docs/blind.md)
+	$(if $(MACHINES),$(BIN)/python -m tests.blind.page $(MACHINES) docs/blind-machines.md)
 
 docs: $(INSTALLED) ## bring the generated pages up to date, and make the site of all pages in build/site
 	$(BIN)/python -m pipelines.settings.reference > docs/settings.md

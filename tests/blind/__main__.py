@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import track
 
 from tests.blind import fixed_set, report
-from tests.blind.cases import MIX, SINGLES, Case, case, full, mixed
+from tests.blind.cases import MIX, SINGLES, Case, case, full, mixed, of_one_joint
 from tests.blind.examine import Folders, examine, prepare
 from tests.blind.plan import JOINTS
 from tests.blind.seeds import RANGES
@@ -32,6 +32,7 @@ def main(
     only: Annotated[str, typer.Option(help="Singles of this cause only, such as backlash@knee.")] = "",
     out: Annotated[Path, typer.Option(help="Folder of sessions, answers and report.")] = Path("build/blind"),
     workers: Annotated[int, typer.Option(min=1, help="Sessions at a time.")] = 2,
+    one_joint: Annotated[bool, typer.Option("--one-joint", help="Machines of one joint instead of the leg.")] = False,
     fixed: Annotated[bool, typer.Option("--fixed", help="The fixed set that CI examines.")] = False,
     write: Annotated[
         bool, typer.Option("--write", help="With --fixed: diagnose anew, record how it came out.")
@@ -43,7 +44,10 @@ def main(
     if write and not fixed:
         raise typer.BadParameter("only the fixed set has a record: add --fixed", param_hint="--write")
     base = RANGES[seeds].start if seed_base is None else seed_base
-    planned = fixed_set.fixed_set() if fixed else _planned(cases, base, mix, every, only)
+    if one_joint:
+        planned = of_one_joint(cases, base)
+    else:
+        planned = fixed_set.fixed_set() if fixed else _planned(cases, base, mix, every, only)
     console = Console()
     if simulate_only:
         for one in track(planned, "simulating", console=console):

@@ -6,11 +6,14 @@ import numpy as np
 
 from tests.blind.causes import CAUSES, HUMAN_CAUSES, joints_of
 from tests.blind.faults import FAULTS
-from tests.blind.outside import OUTSIDE
-from tests.blind.plan import HIP, JOINTS, KNEE
+from tests.blind.mechanisms import MECHANISMS, ONE_JOINT
+from tests.blind.outside import OF_ONE_JOINT, OUTSIDE
+from tests.blind.plan import HIP, KNEE
 
 MIX = {"single": 0.55, "none": 0.10, "imperfect": 0.08, "pair": 0.12, "outside": 0.09, "fault": 0.06}
 """Shares of the categories in a mixed examination."""
+MIX_OF_ONE_JOINT = {"single": 0.55, "none": 0.10, "imperfect": 0.10, "outside": 0.25}
+"""The same of machines of one joint."""
 Spec = tuple[str, int | None]
 SINGLES: tuple[Spec, ...] = tuple((effect, joint) for effect in CAUSES for joint in joints_of(effect))
 NOT_TOGETHER = (
@@ -29,11 +32,13 @@ class Case:
     """Effects and their joints (0 hip, 1 knee, none for the whole leg)."""
     fault: str | None = None
     kinds: tuple[str, ...] = ("exo_alone", "with_human")
+    machine: str = "leg"
 
     @property
     def label(self) -> str:
         """What is hidden, for reports."""
-        names = [e if j is None else f"{e}@{JOINTS[j]}" for e, j in self.hidden]
+        joints = MECHANISMS[self.machine].joints
+        names = [e if j is None else f"{e}@{joints[j]}" for e, j in self.hidden]
         return " + ".join(names) or self.fault or self.category
 
     def as_dict(self) -> dict:
@@ -48,6 +53,24 @@ def mixed(cases: int, seed_base: int, mix: dict[str, float] = MIX) -> list[Case]
     counts[max(mix, key=mix.__getitem__)] += cases - sum(counts.values())
     planned = [(category, i) for category, count in counts.items() for i in range(count)]
     return [case(seed_base + k, category, i) for k, (category, i) in enumerate(planned)]
+
+
+def of_one_joint(cases: int, seed_base: int) -> list[Case]:
+    """Return cases of machines of one joint, each category going through machines and causes in turn."""
+    places = [(name, effect) for effect in CAUSES for name in ONE_JOINT if effect in ONE_JOINT[name].effects]
+    outside = [(name, f"outside:{kind.__name__}") for kind in OF_ONE_JOINT for name in ONE_JOINT]
+    plain = [(name, "") for name in ONE_JOINT]
+    hides = {"single": places, "outside": outside, "none": plain, "imperfect": plain}
+    planned = []
+    for category, share in MIX_OF_ONE_JOINT.items():
+        choices = hides[category]
+        # A step that shares no factor with their number takes every choice before any a second time.
+        step = next(s for s in range(7, 7 + len(choices)) if np.gcd(s, len(choices)) == 1)
+        planned += [(category, *choices[i * step % len(choices)]) for i in range(round(cases * share))]
+    return [
+        Case(seed_base + k, category, ((effect, HIP),) if effect else (), None, ("exo_alone",), machine)
+        for k, (category, machine, effect) in enumerate(planned)
+    ]
 
 
 def full(seed_base: int, each: int = 30, none: int = 300) -> list[Case]:

@@ -42,6 +42,8 @@ class Cause:
     human: bool = False
     slow: bool = False
     """Does it change over a whole run?"""
+    kin: tuple[str, ...] = ()
+    """Causes of the contract that a person would call it by, where it is none of them."""
 
     @property
     def label(self) -> str:

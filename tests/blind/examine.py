@@ -20,7 +20,7 @@ from tests.blind.scoring import Score, score
 
 SIMULATOR = (
     "body", "cases", "causes", "dry", "excitation", "faults", "floor", "imperfections", "loop", "machine", "magnitude",
-    "outside", "people", "plan", "plant", "session", "smooth", "wandering",
+    "mechanisms", "outside", "people", "plan", "plant", "session", "smooth", "units", "wandering",
 )  # fmt: skip
 """What decides how a session looks: when one of these files changes, sessions are simulated anew."""
 ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")}

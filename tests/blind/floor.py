@@ -45,6 +45,7 @@ def left_by_the_baseline(rig: Rig, runs: Sequence[Recorded]) -> NDArray:
         k = kinds.index(r.run.kind)
         wide[:, :, 4 * k : 4 * k + 4], wide[:, :, -4:] = Y[:, :, :4], Y[:, :, 4:]
         scored = _scored(r)
+        wide = np.append(wide, np.full((*wide.shape[:2], 1), rig.weight) * [[1.0], [0.0]], axis=2)
         rows.append(blocks(wide)[scored])
         effects.append(blocks(r.effect)[scored])
     A, b = np.concatenate(rows), np.concatenate(effects)
@@ -60,7 +61,7 @@ def _squares(rig: Rig, runs: Sequence[Recorded], cutoff_hz: float) -> NDArray:
         dq = np.gradient(q, SAMPLE_S, axis=0)
         ddq = np.gradient(dq, SAMPLE_S, axis=0)
         needed = Body(rig.leg(r.run)).inverse(q, dq, ddq)
-        needed[:, 0] += rig.machine.hip_rotor * ddq[:, 0]
+        needed[:, 0] += rig.machine.hip_rotor * ddq[:, 0] + rig.weight
         needed += rig.machine.coulomb * np.sign(r.true_speed) + rig.machine.viscous * dq
         errors.append(blocks(r.torque - r.effect - needed)[_scored(r)])
     return np.mean(np.concatenate(errors) ** 2, axis=0)
@@ -73,7 +74,9 @@ def blocks(x: NDArray) -> NDArray:
 
 
 def _scored(r: Recorded) -> NDArray:
-    return moving(r).all(axis=1)
+    """Tell in which blocks every joint moves that ever does, (m,) bool."""
+    found = moving(r)
+    return found[:, found.any(axis=0)].all(axis=1)
 
 
 def moving(r: Recorded) -> NDArray:

@@ -1,5 +1,7 @@
 """What a good rig has too: several small effects at once, each below 1 % of the joint's rms torque."""
 
+from collections.abc import Sequence
+
 from numpy.random import Generator
 
 from tests.blind.causes import Cause, random_cause
@@ -14,7 +16,7 @@ SMALL = (
 LEAST, MOST = 0.002, 0.009
 
 
-def random_imperfections(rng: Generator) -> list[tuple[Cause, float]]:
-    """Draw three to six small effects and the magnitude of each."""
-    chosen = rng.choice(len(SMALL), size=int(rng.integers(3, 7)), replace=False)
-    return [(random_cause(rng, *SMALL[i]), float(rng.uniform(LEAST, MOST))) for i in sorted(chosen)]
+def random_imperfections(rng: Generator, small: Sequence[tuple[str, int | None]]) -> list[tuple[Cause, float]]:
+    """Draw three to six effects of those that may be ``small``, and the magnitude of each."""
+    chosen = rng.choice(len(small), size=int(rng.integers(3, 7)), replace=False)
+    return [(random_cause(rng, *small[i]), float(rng.uniform(LEAST, MOST))) for i in sorted(chosen)]

@@ -114,12 +114,37 @@ def kicks(rng, joint):
     return dict(install=install, start=2.0, slow=True)
 
 
+def dead_zone_damper(rng, joint):
+    """A damper that grips only above some speed."""
+    threshold = rng.uniform(0.3, 0.8)
+    install = hidden_torque(smooth.DEAD_ZONE, joint, threshold)
+    return dict(install=install, start=3.0, shape=(threshold,), kin=("quadratic_drag",))
+
+
+def detent(rng, joint):
+    """A magnet that pulls the joint into one place."""
+    place, width = rng.uniform(-0.2, 0.8), rng.uniform(0.1, 0.25)
+    return dict(install=hidden_torque(smooth.DETENT, joint, place, width), start=3.0, shape=(place, width))
+
+
+def rough_patch(rng, joint):
+    """A bearing that is rough on one side of the range."""
+    place, width = rng.uniform(0.0, 0.6), rng.uniform(0.05, 0.3)
+    return dict(install=hidden_torque(smooth.ROUGH, joint, place, width, either(rng)), start=2.0, shape=(place, width))
+
+
 OUTSIDE = (
     tone, friction_by_other_joint, voltage_sag, cable_drag, end_stop, fading_gain, cross_talk, ringing,
     eccentric_encoder, band_across_both_joints, kicks,
 )  # fmt: skip
 
 
+OF_ONE_JOINT = (
+    tone, cable_drag, end_stop, fading_gain, ringing, eccentric_encoder, kicks, dead_zone_damper, detent, rough_patch,
+)  # fmt: skip
+"""What a machine of one joint can have of it, and more."""
+
+
 def random_outside(rng, kind, joint: int) -> Cause:
-    """Draw the shape of one of ``OUTSIDE``."""
+    """Draw the shape of something that is not in the catalogue."""
     return Cause(effect=f"outside:{kind.__name__}", joint=joint, form=kind.__name__, own=False, **kind(rng, joint))

@@ -1,6 +1,6 @@
 """One run on the simulated rig: build the leg with what is hidden in it, move it, and measure."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.random import Generator
@@ -13,6 +13,8 @@ from tests.blind.excitation import PERIOD_S, Excitation
 from tests.blind.machine import DRIVE_RATE_HZ, SPEED_CUTOFF_HZ, Machine
 from tests.blind.people import Person
 from tests.blind.plan import HIP, Plan, Run
+from tests.blind.smooth import TABLE
+from tests.blind.units import Units
 
 REVERSAL_SPEED, REVERSAL_PADDING_S = 0.04, 0.08
 FOLLOWED = butter(2, 12.0, fs=1.0 / loop.SAMPLE_S, output="sos")
@@ -24,6 +26,14 @@ class Rig:
 
     machine: Machine
     person: Person
+    units: Units = field(default_factory=Units)
+    weight: float = 0.0
+    """What the first drive holds at rest whatever the angle, as a lift's does, N·m."""
+
+    def load(self, plan: Plan) -> None:
+        """Put what has a weight of its own on the first drive."""
+        if self.weight:
+            plan.torque(TABLE, HIP, self.weight, table=np.ones(2))
 
     def leg(self, run: Run) -> Leg:
         """Return what moves in a kind of run, nothing hidden."""
@@ -89,7 +99,7 @@ def _needed(rig: Rig, plan: Plan, run: Run, log: loop.Log) -> NDArray:
     # A motor behind something soft trembles alone; the leg follows only what is slower.
     acceleration[:, soft] = sosfiltfilt(FOLLOWED, acceleration[:, soft], axis=0)
     needed = Body(rig.leg(run)).inverse(log.angle, log.speed, acceleration)
-    needed[:, HIP] += machine.hip_rotor * acceleration[:, HIP]
+    needed[:, HIP] += machine.hip_rotor * acceleration[:, HIP] + rig.weight
     needed += machine.rotors * (log.acceleration - acceleration)
     return needed + machine.coulomb * np.sign(log.speed) + machine.viscous * log.speed
 

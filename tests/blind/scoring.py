@@ -39,6 +39,7 @@ class Score:
     covered: tuple[tuple[str, str, bool], ...] = ()
     """Effect, parameter, and whether its 95 % interval holds the truth."""
     seconds: float = 0.0
+    machine: str = "leg"
 
     @property
     def first(self) -> str:
@@ -62,13 +63,14 @@ def score(truth: Mapping[str, Any], answer: Mapping[str, Any], smallest: Mapping
     verdict = answer["verdict"] or {"status": _without_verdict(answer["exit_code"]), "causes": [], "data_faults": []}
     hidden = tuple((h["effect"], h["joint"]) for h in truth["hidden"])
     causes = verdict["causes"]
+    kin = {(effect, h["joint"]) for h in truth["hidden"] for effect in h["kin"]}
     unseen = _unseen(truth, smallest) and verdict["status"] == SILENT
     right = {
         "single": lambda: bool(causes) and hidden[0] in names_of(causes[0]),
         "pair": lambda: all(any(h in names_of(c) for c in causes) for h in hidden),
         "none": lambda: verdict["status"] == SILENT and not verdict["data_faults"],
         "imperfect": lambda: verdict["status"] == SILENT and not verdict["data_faults"],
-        "outside": lambda: verdict["status"] == "unknown_cause",
+        "outside": lambda: verdict["status"] == "unknown_cause" or bool(causes and kin & names_of(causes[0])),
         "fault": lambda: fault_is_named(truth["fault"], verdict["data_faults"], answer["message"]),
     }[category]()
     return Score(
@@ -78,19 +80,22 @@ def score(truth: Mapping[str, Any], answer: Mapping[str, Any], smallest: Mapping
         forms=tuple(h["form"] for h in truth["hidden"]),
         own_form=all(h["own_form"] for h in truth["hidden"]),
         magnitude=truth["hidden"][0]["magnitude"] if len(hidden) == 1 else None,
-        visibility=max(truth["left_by_baseline_nm"][joint] / truth["noise_floor_nm"][joint] for joint in JOINTS),
+        visibility=max(left / truth["noise_floor_nm"][joint] for joint, left in truth["left_by_baseline_nm"].items()),
         kinds=tuple(truth["case"]["kinds"]),
         status=verdict["status"],
         named=tuple((c["effect"], c["joint"]) for c in causes),
         right=right or unseen,
         unseen=unseen,
         probabilities=tuple(
-            (float(c["probability"]), any(h in names_of(c) for h in hidden)) for c in causes if category != "fault"
+            (float(c["probability"]), any(h in names_of(c) for h in (*hidden, *kin)))
+            for c in causes
+            if category != "fault"
         ),
         rmse_over_floor=_ratio(verdict.get("extended_rmse_nm"), truth["noise_floor_nm"], category),
         floor_over_truth=_ratio(verdict.get("noise_floor_nm"), truth["noise_floor_nm"], category),
         covered=tuple(_covered(truth["hidden"], causes)),
         seconds=float(answer["seconds"]),
+        machine=truth["case"]["machine"],
     )
 
 
@@ -129,7 +134,7 @@ def _unseen(truth: Mapping[str, Any], smallest: Mapping[Named, float] | None) ->
 def _ratio(values: Mapping[str, float] | None, floor: Mapping[str, float], category: str) -> dict[str, float]:
     if not values or category == "fault":
         return {}
-    return {joint: values[joint] / floor[joint] for joint in JOINTS if values.get(joint) is not None}
+    return {joint: values[joint] / noise for joint, noise in floor.items() if values.get(joint) is not None}
 
 
 def _covered(hidden: Iterable[Mapping[str, Any]], causes: Iterable[Mapping[str, Any]]):

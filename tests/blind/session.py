@@ -16,14 +16,13 @@ from numpy.random import Generator
 from tests.blind import outside
 from tests.blind.cases import Case
 from tests.blind.causes import SOFT, Cause, log_uniform, random_cause
-from tests.blind.excitation import PERIOD_S, random_excitation
+from tests.blind.excitation import PERIOD_S
 from tests.blind.faults import IN_EVERY_RUN, fault_named
 from tests.blind.floor import left_by_the_baseline, moving, noise_floor, ripple_floor
 from tests.blind.imperfections import random_imperfections
-from tests.blind.machine import DRIVE_RATE_HZ, random_machine
 from tests.blind.magnitude import rms, size_for
-from tests.blind.people import random_person
-from tests.blind.plan import HIP, JOINTS, KNEE, Plan, Run
+from tests.blind.mechanisms import MECHANISMS
+from tests.blind.plan import HIP, KNEE, Plan, Run
 from tests.blind.plant import Recorded, Rig, record
 from tests.blind.smooth import SPRING
 
@@ -71,9 +70,9 @@ class _Draw:
         self.case = case
         self.stream = [case.seed, 2, attempt]
         rng = self.rng(0)
-        self.person = random_person(rng)
-        self.rig = Rig(random_machine(rng, self.person.thigh_length), self.person)
-        self.excitation = {purpose: random_excitation(rng) for purpose in PURPOSES}
+        self.mechanism = MECHANISMS[case.machine]
+        self.rig = self.mechanism.rig(rng)
+        self.excitation = {purpose: self.mechanism.excitation(rng) for purpose in PURPOSES}
         self.duration = float(rng.choice([60.0, 70.0, 80.0]))
         self.softness = rng.uniform(0.0, 0.25, 2)
 
@@ -89,19 +88,19 @@ class _Draw:
         runs = [(kind, purpose) for kind in self.case.kinds for purpose in PURPOSES]
         causes = [(cause, size) for cause, size, _ in hidden]
         recorded = [self._record(causes, kind, purpose, self.duration) for kind, purpose in runs]
-        if min(moving(r).mean(axis=0).min() for r in recorded) < LEAST_MOVING:
-            raise FloatingPointError("the simulated leg is stuck most of the time")
+        joints = len(self.mechanism.joints)
+        if min(moving(r).mean(axis=0)[:joints].min() for r in recorded) < LEAST_MOVING:
+            raise FloatingPointError("the simulated machine is stuck most of the time")
         return Session(self.case, self.rig, hidden, recorded)
 
     def _wanted(self) -> list[tuple[Cause, float]]:
         rng = self.rng(1)
         if self.case.category == "imperfect":
-            return random_imperfections(rng)
+            return random_imperfections(rng, self.mechanism.small)
         wanted = []
         for effect, joint in self.case.hidden:
             if effect.startswith("outside:"):
-                kind = getattr(outside, effect.removeprefix("outside:"))
-                cause = outside.random_outside(rng, kind, joint)
+                cause = outside.random_outside(rng, getattr(outside, effect.removeprefix("outside:")), joint)
             else:
                 cause = random_cause(rng, effect, joint)
             wanted.append((cause, log_uniform(rng, LEAST, MOST)))
@@ -122,6 +121,7 @@ class _Draw:
         number = 2 * (kind == "with_human") + (purpose == "validate")
         run = Run(kind, purpose, duration, self.rng(2, number))
         plan = Plan()
+        self.rig.load(plan)
         if self.case.category != "none" and run.has_human:
             # Relaxed muscles are a little elastic: far below what is hidden.
             for j, rest in ((HIP, 0.5), (KNEE, -0.9)):
@@ -138,11 +138,12 @@ def write(session: Session, recordings: Path, truth: Path) -> None:
     rng = np.random.default_rng([session.case.seed, 4])
     names = [f"run_{number}.parquet" for number in rng.permutation(len(session.runs)) + 1]
     label = hashlib.sha256(f"session {session.case.seed}".encode()).hexdigest()[:8]
-    tables = [_columns(r) for r in session.runs]
+    mechanism = MECHANISMS[session.case.machine]
+    tables = [mechanism.columns(session.rig, r) for r in session.runs]
     fault = _spoil(session, tables, names, rng) if session.case.fault else None
     for r, columns, name in zip(session.runs, tables, names, strict=True):
         table = pa.table({key: pa.array(values) for key, values in columns.items()})
-        header = json.dumps(_header(session.rig, r, label)).encode()
+        header = json.dumps(_header(session, r, label)).encode()
         pq.write_table(table.replace_schema_metadata({b"exoid": header}), recordings / name)
     truth.parent.mkdir(parents=True, exist_ok=True)
     # Last and whole: a truth that is there means that the session is complete.
@@ -151,36 +152,11 @@ def write(session: Session, recordings: Path, truth: Path) -> None:
     part.rename(truth)
 
 
-def _columns(r: Recorded) -> dict[str, np.ndarray]:
-    columns = {"time_s": r.time.copy()}
-    pairs = {"angle_rad": r.angle, "torque_nm": r.torque, "reference_rad": r.reference, "velocity_rad_s": r.drive_speed}
-    for quantity, values in pairs.items():
-        for j, joint in enumerate(JOINTS):
-            columns[f"{joint}_{quantity}"] = values[:, j].copy()
-    if r.forces is not None:
-        for s, sensor in enumerate(("thigh_front", "thigh_back", "shank_front", "shank_back")):
-            for i, axis in enumerate("xyz"):
-                columns[f"{sensor}_force_{axis}_n"] = r.forces[:, s, i].copy()
-    columns["sequence"] = np.arange(len(r.time), dtype=np.int64)
-    return columns
-
-
-def _header(rig: Rig, r: Recorded, label: str) -> dict[str, Any]:
-    machine = rig.machine
-    geometry = {"thigh_length_m": machine.leg.length, "gravity_m_s2": machine.leg.gravity}
-    if r.run.has_human:
-        thigh, shank = machine.cuff_distance
-        geometry |= {"thigh_cuff_distance_m": thigh, "shank_cuff_distance_m": shank}
-    controller = {
-        joint: {
-            "type": "pd", "kp_nm_rad": float(machine.kp[j]), "kd_nm_s_rad": float(machine.kd[j]),
-            "rate_hz": DRIVE_RATE_HZ, "limit_nm": float(machine.limit[j]),
-        }
-        for j, joint in enumerate(JOINTS)
-    }  # fmt: skip
+def _header(session: Session, r: Recorded, label: str) -> dict[str, Any]:
+    told = MECHANISMS[session.case.machine].header(session.rig, r)
     return {
         "contract": "recording/1", "run": r.run.kind, "purpose": r.run.purpose, "sample_rate_hz": 200.0,
-        "period_s": PERIOD_S, "session": label, "controller": controller, "geometry": geometry,
+        "period_s": PERIOD_S, "session": label, **told,
     }  # fmt: skip
 
 
@@ -197,14 +173,19 @@ def _spoil(session: Session, tables: list[dict], names: list[str], rng: Generato
 
 def _truth(session: Session, names: list[str], fault: dict[str, Any] | None) -> dict[str, Any]:
     validate, rig = session.of("validate"), session.rig
+
+    def by_joint(values: np.ndarray) -> dict[str, float]:
+        joints = MECHANISMS[session.case.machine].joints
+        return dict(zip(joints, (rig.units.torque * np.asarray(values, float)).tolist(), strict=False))
+
     return {
         "case": session.case.as_dict(),
         "hidden": [_hidden(session, *one) for one in session.hidden],
         "fault": fault,
-        "noise_floor_nm": _by_joint(noise_floor(rig, validate)),
-        "ripple_floor_nm": _by_joint(ripple_floor(validate)),
-        "left_by_baseline_nm": _by_joint(left_by_the_baseline(rig, session.runs)),
-        "torque_rms_nm": _by_joint(np.sqrt(np.mean([np.mean(r.torque**2, axis=0) for r in validate], axis=0))),
+        "noise_floor_nm": by_joint(noise_floor(rig, validate)),
+        "ripple_floor_nm": by_joint(ripple_floor(validate)),
+        "left_by_baseline_nm": by_joint(left_by_the_baseline(rig, session.runs)),
+        "torque_rms_nm": by_joint(np.sqrt(np.mean([np.mean(r.torque**2, axis=0) for r in validate], axis=0))),
         "runs": [
             {"file": name, "run": r.run.kind, "purpose": r.run.purpose, "duration_s": r.run.duration_s}
             for name, r in zip(names, session.runs, strict=True)
@@ -224,17 +205,14 @@ def _hidden(session: Session, cause: Cause, size: float, wanted: float) -> dict[
     share = effect / torque if len(session.hidden) == 1 else wanted
     return {
         "effect": cause.effect,
-        "joint": None if cause.joint is None else JOINTS[cause.joint],
+        "joint": None if cause.joint is None else MECHANISMS[session.case.machine].joints[cause.joint],
         "form": cause.form,
         "own_form": cause.own,
         "size": size,
         "shape": [float(x) for x in cause.shape],
-        "parameters": cause.parameters(size),
+        "parameters": session.rig.units.converted(cause.effect, cause.parameters(size)),
+        "kin": list(cause.kin),
         "wanted_magnitude": wanted,
         "magnitude": share,
-        "rms_nm": share * torque,
+        "rms_nm": share * torque * session.rig.units.torque,
     }
-
-
-def _by_joint(values: np.ndarray) -> dict[str, float]:
-    return dict(zip(JOINTS, np.asarray(values, float).tolist(), strict=True))

@@ -20,6 +20,7 @@ END_EXPONENTIAL, END_TANH, END_POWER = 31, 32, 33
 RHYTHM, RHYTHM_WANDERING, RHYTHM_BURSTS = 34, 35, 36
 REFLEX, REFLEX_SMOOTH = 37, 38
 TONE, BOTH_SPEEDS, BIARTICULAR, RINGING, TABLE = 40, 41, 42, 43, 44
+DEAD_ZONE, DETENT, ROUGH = 45, 46, 47
 MEMORIES = 6
 TABLE_RATE_HZ = 50.0
 
@@ -136,6 +137,13 @@ def _uncatalogued(kind, p, m, table, t, dt, j, q, v, a):
             m[2] = 0.0
         m[3] = v[j]
         return p[0] * exp(-m[2] / p[2]) * cos(2.0 * pi * p[1] * m[2])
+    if kind == DEAD_ZONE:
+        return p[0] * max(0.0, abs(v[j]) - p[1]) * (1.0 if v[j] > 0 else -1.0)
+    if kind == DETENT:
+        x = (q[j] - p[1]) / p[2]
+        return p[0] * x * exp(0.5 - 0.5 * x * x)
+    if kind == ROUGH:
+        return p[0] * 0.5 * (1.0 + tanh(p[3] * (q[j] - p[1]) / p[2])) * tanh(v[j] / 0.01)
     place = min(max(t, 0.0) * TABLE_RATE_HZ, len(table) - 2.0)
     i = int(place)
     return p[0] * (table[i] + (place - i) * (table[i + 1] - table[i]))

@@ -73,6 +73,11 @@ def by_origin(scores: Sequence[Score]) -> Page:
     return _rates("By origin of the form", singles, lambda s: "the catalogue's own" if s.own_form else "another")
 
 
+def by_machine(scores: Sequence[Score]) -> Page:
+    """Count singles by the machine that has them."""
+    return _rates("By machine", of(scores, "single"), lambda s: s.machine)
+
+
 def by_kinds(scores: Sequence[Score]) -> Page:
     """Count singles by the kinds of run in the session."""
     return _rates("By kinds of run", of(scores, "single"), lambda s: ", ".join(s.kinds))

@@ -2,8 +2,10 @@
 
 from collections import Counter
 
-from tests.blind.cases import MIX, SINGLES, full, mixed
+from tests.blind.cases import MIX, SINGLES, full, mixed, of_one_joint
 from tests.blind.causes import HUMAN_CAUSES
+from tests.blind.mechanisms import ONE_JOINT
+from tests.blind.outside import OF_ONE_JOINT
 
 
 def test_a_mixed_examination_has_all_categories_and_every_cause():
@@ -32,3 +34,11 @@ def test_causes_of_the_person_are_hidden_where_there_is_one():
     for c in full(900_000):
         if any(effect in HUMAN_CAUSES for effect, _ in c.hidden):
             assert "with_human" in c.kinds
+
+
+def test_machines_of_one_joint_take_turns_and_hide_what_each_can_have():
+    cases = of_one_joint(300, 900_000)
+    singles = {(c.machine, c.hidden[0][0]) for c in cases if c.category == "single"}
+    assert singles == {(name, effect) for name, machine in ONE_JOINT.items() for effect in machine.effects}
+    assert {c.hidden[0][0] for c in cases if c.category == "outside"} == {f"outside:{k.__name__}" for k in OF_ONE_JOINT}
+    assert {c.machine for c in cases if c.category == "none"} == set(ONE_JOINT)

@@ -77,6 +77,12 @@ def test_singles_are_told_by_the_examination_with_most_of_them_and_all_else_by_e
     assert "Examination 1:" in outside and "Examination 2:" not in outside
 
 
+def test_a_page_of_machines_of_one_joint_says_so():
+    slid = replace(MIXED, scores=[replace(s, machine="slide") for s in MIXED.scores])
+    assert "machines of one joint" in page([slid]) and "machines of one joint" not in page([MIXED])
+    assert "| slide | 50.0 % of 2 (9 to 91) |" in section(page([slid]), "By machine")
+
+
 @pytest.mark.parametrize("scores", [MIXED.scores, [SILENT]], ids=["mixed", "nothing was named"])
 def test_the_page_and_its_picture_are_written_from_records(tmp_path, scores):
     write(tmp_path, replace(MIXED, scores=scores))

@@ -12,15 +12,15 @@ from tests.blind.scoring import score
 SECRET = {"hip": 0.5, "knee": 0.4}
 
 
-def truth_of(category, *hidden, fault=None):
+def truth_of(category, *hidden, fault=None, kin=()):
     effects = [
         {
             "effect": effect, "joint": joint, "form": "some", "own_form": False, "parameters": {"play": 0.03},
-            "magnitude": 0.1, "rms_nm": 1.0,
+            "magnitude": 0.1, "rms_nm": 1.0, "kin": list(kin),
         }
         for effect, joint in hidden
     ]  # fmt: skip
-    case = {"seed": 1, "category": category, "kinds": ["exo_alone", "with_human"]}
+    case = {"seed": 1, "category": category, "kinds": ["exo_alone", "with_human"], "machine": "leg"}
     return {"case": case, "hidden": effects, "fault": fault, "noise_floor_nm": SECRET, "left_by_baseline_nm": SECRET}
 
 
@@ -43,6 +43,21 @@ def answer_of(*causes, status="explained", faults=(), exit_code=0, message=""):
 
 
 PLAY = ("backlash", "knee")
+
+
+@pytest.mark.parametrize(
+    ("answer", "right"),
+    [
+        (answer_of(status="unknown_cause"), True),
+        (answer_of(cause("quadratic_drag", "knee")), True),
+        (answer_of(cause("stribeck_friction", "knee"), cause("quadratic_drag", "knee")), False),
+        (answer_of(cause("quadratic_drag", "hip")), False),
+        (answer_of(status="nothing_missing"), False),
+    ],
+)
+def test_what_is_outside_the_catalogue_is_unknown_or_called_what_a_person_would_call_it(answer, right):
+    truth = truth_of("outside", ("outside:dead_zone_damper", "knee"), kin=("quadratic_drag",))
+    assert score(truth, answer).right is right
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,178 @@
+"""What is moved and recorded: the exoskeleton's leg with its wearer, or a machine of one joint.
+
+A machine of one joint is the simulated leg whose knee stands still and whose shank weighs nothing; what it records is
+the hip's, under another name and in the units of a machine of another size.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.random import Generator
+
+from tests.blind import imperfections
+from tests.blind.body import Leg, Segment
+from tests.blind.causes import log_uniform
+from tests.blind.excitation import Excitation, random_excitation
+from tests.blind.machine import DRIVE_RATE_HZ, random_machine
+from tests.blind.people import random_person
+from tests.blind.plan import HIP, JOINTS
+from tests.blind.plant import Recorded, Rig
+from tests.blind.units import Units
+
+WEIGHTLESS = Segment(1e-4, 0.0, 1e-5)
+LENGTH = 0.4
+QUIET = 0.4
+"""Of a leg's noise: a single link needs less torque."""
+Spec = tuple[str, int | None]
+
+
+class Mechanism(Protocol):
+    """What the rest of the examination asks of it."""
+
+    joints: tuple[str, ...]
+    small: tuple[Spec, ...]
+    """What may be a little off on a good one."""
+
+    def rig(self, rng: Generator) -> Rig:
+        """Draw one, and who wears it."""
+
+    def excitation(self, rng: Generator) -> Excitation:
+        """Draw a motion."""
+
+    def columns(self, rig: Rig, r: Recorded) -> dict[str, np.ndarray]:
+        """Return a run as its recording has it."""
+
+    def header(self, rig: Rig, r: Recorded) -> dict[str, Any]:
+        """Return what the recording says of the machine."""
+
+
+@dataclass(frozen=True)
+class ExoskeletonLeg:
+    """Hip and knee."""
+
+    joints: ClassVar = JOINTS
+    small: ClassVar = imperfections.SMALL
+
+    def rig(self, rng: Generator) -> Rig:
+        """Draw a person and an exoskeleton that fits."""
+        person = random_person(rng)
+        return Rig(random_machine(rng, person.thigh_length), person)
+
+    def excitation(self, rng: Generator) -> Excitation:
+        """Draw a motion of both joints."""
+        return random_excitation(rng)
+
+    def columns(self, rig: Rig, r: Recorded) -> dict[str, np.ndarray]:
+        """Return time, both joints, cuff forces and counter."""
+        columns = {"time_s": r.time.copy()}
+        for quantity, values in _REVOLUTE(r).items():
+            for j, joint in enumerate(JOINTS):
+                columns[f"{joint}_{quantity}"] = values[:, j].copy()
+        if r.forces is not None:
+            for s, sensor in enumerate(("thigh_front", "thigh_back", "shank_front", "shank_back")):
+                for i, axis in enumerate("xyz"):
+                    columns[f"{sensor}_force_{axis}_n"] = r.forces[:, s, i].copy()
+        return columns | _counted(r)
+
+    def header(self, rig: Rig, r: Recorded) -> dict[str, Any]:
+        """Return controller and geometry."""
+        machine = rig.machine
+        geometry = {"thigh_length_m": machine.leg.length, "gravity_m_s2": machine.leg.gravity}
+        if r.run.has_human:
+            thigh, shank = machine.cuff_distance
+            geometry |= {"thigh_cuff_distance_m": thigh, "shank_cuff_distance_m": shank}
+        controller = {
+            joint: {
+                "type": "pd", "kp_nm_rad": float(machine.kp[j]), "kd_nm_s_rad": float(machine.kd[j]),
+                "rate_hz": DRIVE_RATE_HZ, "limit_nm": float(machine.limit[j]),
+            }
+            for j, joint in enumerate(JOINTS)
+        }  # fmt: skip
+        return {"controller": controller, "geometry": geometry}
+
+
+@dataclass(frozen=True)
+class OneJoint:
+    """One driven joint and nobody in it."""
+
+    kind: str
+    gravity: float
+    """What turns a revolute joint back, m/s²; 0 where its axis stands upright or it slides."""
+    weight: bool = False
+    """Whether a slide carries its weight."""
+    joints: ClassVar = ("axis",)
+
+    @property
+    def small(self) -> tuple[Spec, ...]:
+        """What is small at a leg's hip and can be at this machine."""
+        return tuple(one for one in imperfections.SMALL if one[1] == HIP and one[0] in self.effects)
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Causes of the contract that such a machine can have, and that are no part of its rigid body."""
+        turned = ("backlash", "mass_off_axis", "payload_change", "encoder_offset")
+        constant = ("coulomb_asymmetry", "torque_offset")
+        return (*ANYWHERE, *(turned if self.gravity else ()), *(() if self.weight else constant))
+
+    def rig(self, rng: Generator) -> Rig:
+        """Draw a link, a drive, and how large the whole is."""
+        mass, along = rng.uniform(2.5, 8.0), rng.uniform(0.15, 0.45)
+        link = Segment(mass, along, mass * rng.uniform(0.01, 0.03))
+        drawn = random_machine(rng, LENGTH)
+        leg = Leg(link, WEIGHTLESS, LENGTH, self.gravity)
+        machine = replace(drawn, leg=leg, ripple=QUIET * drawn.ripple)
+        size = Units(log_uniform(rng, 0.01, 5.0))
+        if self.kind == "prismatic":
+            size = Units(log_uniform(rng, 1.0, 100.0), log_uniform(rng, 0.02, 0.5))
+        return Rig(machine, random_person(rng), size, rng.uniform(5.0, 25.0) if self.weight else 0.0)
+
+    def excitation(self, rng: Generator) -> Excitation:
+        """Draw a motion, about hanging down where that matters; what would be the knee stands still."""
+        drawn = random_excitation(rng)
+        still = np.zeros_like(drawn.a)
+        still[HIP] = 1.0
+        middle = np.array([rng.uniform(-0.4, 0.8), drawn.theta0[1]])
+        return Excitation(middle, drawn.a * still, drawn.b * still)
+
+    def columns(self, rig: Rig, r: Recorded) -> dict[str, np.ndarray]:
+        """Return time, the joint and counter."""
+        found = _PRISMATIC(r) if self.kind == "prismatic" else _REVOLUTE(r)
+        of_force = rig.units.torque
+        scaled = {q: (of_force if q[:5] in ("torqu", "force") else rig.units.angle) * v for q, v in found.items()}
+        return {"time_s": r.time.copy(), **{f"axis_{q}": v[:, HIP].copy() for q, v in scaled.items()}} | _counted(r)
+
+    def header(self, rig: Rig, r: Recorded) -> dict[str, Any]:
+        """Return joint and gravity."""
+        gravity = 9.81 if self.weight else self.gravity
+        return {"joints": [{"name": "axis", "kind": self.kind}], "geometry": {"gravity_m_s2": gravity}}
+
+
+ANYWHERE = (
+    "stribeck_friction", "viscous_asymmetry", "load_dependent_friction", "quadratic_drag", "presliding_hysteresis",
+    "friction_warmup", "cogging", "joint_elasticity", "parallel_spring", "torque_drift", "time_delay",
+)  # fmt: skip
+"""Causes that a joint can have wherever it stands."""
+ONE_JOINT: dict[str, OneJoint] = {
+    "pendulum": OneJoint("revolute", 9.81),
+    "turntable": OneJoint("revolute", 0.0),
+    "slide": OneJoint("prismatic", 0.0),
+    "lift": OneJoint("prismatic", 0.0, weight=True),
+}
+MECHANISMS: dict[str, Mechanism] = {"leg": ExoskeletonLeg(), **ONE_JOINT}
+
+
+def _named(angle: str, torque: str, speed: str):
+    def of(r: Recorded) -> dict[str, np.ndarray]:
+        reference = angle.replace("angle", "reference").replace("position", "reference")
+        return {angle: r.angle, torque: r.torque, reference: r.reference, speed: r.drive_speed}
+
+    return of
+
+
+_REVOLUTE = _named("angle_rad", "torque_nm", "velocity_rad_s")
+_PRISMATIC = _named("position_m", "force_n", "velocity_m_s")
+
+
+def _counted(r: Recorded) -> dict[str, np.ndarray]:
+    return {"sequence": np.arange(len(r.time), dtype=np.int64)}

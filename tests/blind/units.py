@@ -1,0 +1,42 @@
+"""What a machine of another size and kind would have written of the same run."""
+
+from dataclasses import dataclass
+
+POWERS: dict[tuple[str, str], tuple[int, int]] = {
+    ("stribeck_friction", "stribeck_torque"): (1, 0),
+    ("stribeck_friction", "stribeck_velocity"): (0, 1),
+    ("coulomb_asymmetry", "asymmetry"): (1, 0),
+    ("viscous_asymmetry", "asymmetry"): (1, -1),
+    ("quadratic_drag", "drag"): (1, -2),
+    ("presliding_hysteresis", "friction_torque"): (1, 0),
+    ("presliding_hysteresis", "presliding_angle"): (0, 1),
+    ("friction_warmup", "viscous_drop"): (1, -1),
+    ("friction_warmup", "coulomb_drop"): (1, 0),
+    ("cogging", "amplitude"): (1, 0),
+    ("cogging", "cycles_per_turn"): (0, -1),
+    ("joint_elasticity", "stiffness"): (1, -1),
+    ("parallel_spring", "stiffness"): (1, -1),
+    ("parallel_spring", "rest_angle"): (0, 1),
+    ("mass_off_axis", "mass_moment"): (1, 0),
+    ("payload_change", "mass_moment"): (1, 0),
+    ("torque_offset", "offset"): (1, 0),
+    ("torque_drift", "rate"): (1, 0),
+    ("encoder_offset", "offset"): (0, 1),
+}
+"""Of a parameter with a unit other than that of time: its powers of torque and of angle."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """What a simulated newton metre and a simulated radian are in the recording: N·m and rad, or N and m."""
+
+    torque: float = 1.0
+    angle: float = 1.0
+
+    def converted(self, effect: str, parameters: dict[str, float]) -> dict[str, float]:
+        """Return parameters as the recording's units have them."""
+        return {name: self._factor(effect, name) * value for name, value in parameters.items()}
+
+    def _factor(self, effect: str, name: str) -> float:
+        torque, angle = POWERS.get((effect, name), (0, 0))
+        return self.torque**torque * self.angle**angle
