@@ -1,5 +1,7 @@
 """What a file holds, as numbers: text that is none is told of, and counts as missing."""
 
+import re
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -8,6 +10,8 @@ from pipelines.importing.finding import Finding, counted
 
 LONGEST = 20
 """Letters of a text that a finding shows."""
+THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})*(?:\.\d+)?")
+"""A number with marks between its thousands, or too small to have one."""
 TAKEN_FOR_MISSING = "taken for missing"
 """What is made of a text where a number should be."""
 
@@ -17,6 +21,9 @@ def numbers(values: NDArray, where: str, findings: list[Finding]) -> NDArray:
     if values.dtype.kind in "biuf":
         return values.astype(float, copy=False)
     text = pd.Series(values)
+    if _have_thousands(text):
+        findings.append(Finding(where, "commas between thousands", "read without them"))
+        text = text.str.replace(",", "")
     found = pd.to_numeric(text, errors="coerce").to_numpy(dtype=float, na_value=np.nan)
     words = np.isnan(found) & text.notna().to_numpy()
     if words.any():
@@ -24,6 +31,18 @@ def numbers(values: NDArray, where: str, findings: list[Finding]) -> NDArray:
         seen = f"{counted(int(words.sum()), 'row')} with text, the first {str(values[row])[:LONGEST]!r} in row {row}"
         findings.append(Finding(where, seen, TAKEN_FOR_MISSING))
     return found
+
+
+def _have_thousands(text: pd.Series) -> bool:
+    """Tell whether numbers have commas between their thousands: a comma and a point, in every one that is so large.
+
+    Without a point in some of them a comma may be a decimal one.
+    """
+    if not pd.api.types.is_string_dtype(text.dropna()):
+        return False
+    written = text.dropna()
+    both = written.str.contains(",", regex=False) & written.str.contains(".", regex=False)
+    return bool(both.any()) and bool(written.str.fullmatch(THOUSANDS).all())
 
 
 def whole_nanoseconds(values: NDArray) -> NDArray:

@@ -65,6 +65,15 @@ def test_a_guess_imports_the_truth(imported, guessed, pendulum, write_csv, names
     assert_allclose(frame[f"{name}_torque_nm"], columns["torque"][:rows], rtol=1e-9, atol=1e-9)
 
 
+def test_a_clock_too_coarse_for_its_rows_gives_their_rate(imported, guessed, pendulum, write_csv):
+    """Stamps in whole hundredths of a second, of rows that are 5 ms apart."""
+    path = write_csv(swinging(pendulum) | {"time": np.floor(100.0 * pendulum.time) / 100.0})
+    text, doubts = guessed(path)
+    assert "rate_hz = 200.0" in text and "one stamp of time" in doubts["time.rate_hz"]
+    frame = imported(path, map_text=text).recording("log_train").frame
+    assert_allclose(frame["time_s"], pendulum.time[: len(frame)], atol=1e-9)
+
+
 def test_what_names_do_not_say_is_unsure(guessed, pendulum, write_csv):
     _, doubts = guessed(write_csv(dict(zip("abcd", swinging(pendulum).values(), strict=True))))
     assert {"joint[0].angle.column", "joint[0].angle.unit", "joint[0].torque.column", "time.column"} <= doubts.keys()

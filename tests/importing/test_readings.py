@@ -325,3 +325,22 @@ def test_an_angle_that_hardly_moves_is_told_of(imported, pendulum, write_csv):
     tiny = columns | {"angle": 1e-9 * columns["angle"], "velocity": 1e-9 * columns["velocity"]}
     assert "rad only, and what a joint does within 0.001 rad shows no mass" in imported(write_csv(tiny)).told
     assert "shows no mass" not in imported(write_csv(columns, "usual.csv")).told
+
+
+def test_commas_between_thousands_are_read_over(imported, pendulum, tmp_path):
+    path = tmp_path / "log.csv"
+    rows = zip(pendulum.time, pendulum.angle, pendulum.velocity, 1e3 * pendulum.torque, strict=True)
+    lines = [f'{t:.3f},{q:.12f},{dq:.12f},"{tau:,.6f}"' for t, q, dq, tau in rows]
+    path.write_text("\n".join(["time,angle,velocity,torque", *lines]))
+    outcome = imported(path, map_text=MAP.replace('unit = "N·m"', 'unit = "mN·m"'))
+    assert_allclose(outcome.recording().frame["pivot_torque_nm"], pendulum.torque, atol=1e-9)
+    assert "torque: commas between thousands; read without them" in " ".join(outcome.out.split())
+
+
+def test_a_comma_that_may_be_a_decimal_one_is_not_taken_for_one_between_thousands(imported, pendulum, tmp_path):
+    path = tmp_path / "log.csv"
+    rows = zip(pendulum.time, pendulum.angle, pendulum.velocity, pendulum.torque, strict=True)
+    lines = [f'{t:.3f},{q:.12f},{dq:.12f},"{f"{tau:.3f}".replace(".", ",")}"' for t, q, dq, tau in rows]
+    path.write_text("\n".join(["time,angle,velocity,torque", *lines]))
+    outcome = imported(path)
+    assert outcome.code == 2 and "torque" in outcome.err

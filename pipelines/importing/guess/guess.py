@@ -56,6 +56,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
     for note in source.notes:
         proposal.remark(f"Read as {source.format}: {note}.")
     write_time(proposal, time)
+    columns[time.column] = time.stamps(columns[time.column])
     run = _longest_run(columns[time.column], time.unit)
     here = {name: values[run.rows] for name, values in columns.items() if len(values) == len(columns[time.column])}
     with about(paths[0]):
@@ -124,7 +125,7 @@ def _period(path: Path, time: TimeGuess, joints: Sequence[JointColumns]) -> floa
         columns = open_source(path, SourceSettings()).load([time.column, *motion])
     moved = [_numeric(columns[name]) for name in motion]
     logged = columns[time.column]
-    stamps = whole_nanoseconds(logged) if time.unit == "iso8601" else _numeric(logged)
+    stamps = time.stamps(whole_nanoseconds(logged) if time.unit == "iso8601" else _numeric(logged))
     if any(values.dtype.kind not in "iuf" or len(values) != len(stamps) for values in (stamps, *moved)):
         return None
     run = _longest_run(stamps, time.unit)

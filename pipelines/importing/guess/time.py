@@ -27,15 +27,23 @@ class TimeGuess:
     unit_sure: bool
     wraps_at: float | None
     restarts: bool
+    rate_hz: float | None = None
+    """Of rows that are uniform, where the clock is too coarse to tell them apart."""
+
+    def stamps(self, values: NDArray) -> NDArray:
+        """Return the stamps of rows (n,) in the clock's unit, from what stands in its column."""
+        return values if self.rate_hz is None else np.arange(len(values)) / (self.rate_hz * UNITS[self.unit].factor)
 
 
 def guess_time(meanings: Sequence[Meaning], columns: Mapping[str, NDArray], dates: Container[str]) -> TimeGuess | None:
     """Return the clock among columns (n,), of which ``dates`` were written out, here in ns; None where none is one."""
     advancing = [meaning for meaning in meanings if _advances(columns[meaning.column])]
-    candidates = [meaning for meaning in advancing if meaning.quantity == "time"] or advancing
+    named_so = [meaning for meaning in meanings if meaning.quantity == "time"]
+    coarse = [meaning for meaning in named_so if _stands_still(columns[meaning.column])]
+    candidates = [meaning for meaning in advancing if meaning.quantity == "time"] or coarse or advancing
     for found in sorted(candidates, key=lambda meaning: meaning.unit is None):
         values = columns[found.column].astype(float)
-        step = float(np.median(np.diff(values)[np.diff(values) > 0]))
+        step = _step(values, found in coarse)
         fitting = [
             u for u in ("s", "ms", "us", "ns") if clock.SLOWEST_HZ <= 1.0 / (step * UNITS[u].factor) <= clock.FASTEST_HZ
         ]
@@ -52,13 +60,18 @@ def guess_time(meanings: Sequence[Meaning], columns: Mapping[str, NDArray], date
         usual = clock.SLOWEST_HZ <= 1.0 / (step * UNITS[chosen].factor) <= clock.FASTEST_HZ
         why += "" if named else "; no name says which column is the time"
         why += "" if usual else f", at which no machine is sampled: is it {' or '.join(fitting) or 'another column'}?"
-        return TimeGuess(found.column, chosen, why, named, named and usual, wraps_at, restarts)
+        even = 1.0 / (step * UNITS[chosen].factor) if found in coarse else None
+        return TimeGuess(found.column, chosen, why, named, named and usual, wraps_at, restarts, even)
     return None
 
 
 def write_time(proposal: Proposal, found: TimeGuess) -> None:
     """Write the clock's table."""
     proposal.table("[time]", "time")
+    if found.rate_hz is not None:
+        why = f"several rows have one stamp of {found.column}; taken for uniform, {found.unit} for its unit"
+        proposal.key("rate_hz", float(f"{found.rate_hz:.6g}"), why, sure=False)
+        return
     proposal.key("column", found.column, _how_it_goes(found), found.sure)
     proposal.key("unit", found.unit, found.why, found.unit_sure)
     if found.wraps_at:
@@ -79,6 +92,26 @@ def _advances(values: NDArray) -> bool:
     if np.all(steps == 1.0):
         return False  # a counter of rows
     return bool(np.mean(steps > 0) > ADVANCES)
+
+
+def _stands_still(values: NDArray) -> bool:
+    """Tell whether a column (n,) is a clock that is too coarse for its rows: it never goes back, and seldom on."""
+    if values.dtype.kind not in "iuf" or len(values) < 10:
+        return False
+    steps = np.diff(values.astype(float))
+    return bool(np.all(steps >= 0.0) and 0.0 < np.mean(steps > 0.0) <= ADVANCES)
+
+
+def _step(values: NDArray, coarse: bool) -> float:
+    """Return the step from one row to the next."""
+    if coarse:
+        # Rows before the first step and after the last are of stamps that were not seen whole.
+        whole = np.flatnonzero(np.diff(values))
+        if len(whole) > 1:
+            return float((values[whole[-1]] - values[whole[0]]) / (whole[-1] - whole[0]))
+        return float((values[-1] - values[0]) / (len(values) - 1))
+    steps = np.diff(values)
+    return float(np.median(steps[steps > 0]))
 
 
 def _breaks(values: NDArray, unit: str) -> tuple[float | None, bool]:
