@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import track
 
 from tests.blind import fixed_set, report
-from tests.blind.cases import MIX, SINGLES, Case, case, full, mixed, of_one_joint
+from tests.blind.cases import MIX, MIX_OF_ONE_JOINT, SINGLES, Case, case, full, mixed, of_one_joint
 from tests.blind.examine import Folders, examine, prepare
 from tests.blind.plan import JOINTS
 from tests.blind.seeds import RANGES
@@ -23,11 +23,15 @@ class Seeds(StrEnum):
     reporting = "reporting"
 
 
+def _written(mix: dict[str, float]) -> str:
+    return ",".join(f"{category}={share}" for category, share in mix.items())
+
+
 def main(
     cases: Annotated[int, typer.Option(min=1, help="How many cases.")] = 300,
     seeds: Annotated[Seeds, typer.Option(help="Which range of seeds.")] = Seeds.tuning,
     seed_base: Annotated[int | None, typer.Option(help="First seed, instead of the range's own.")] = None,
-    mix: Annotated[str, typer.Option(help="Shares of the categories.")] = ",".join(f"{k}={v}" for k, v in MIX.items()),
+    mix: Annotated[str, typer.Option(help=f"Shares of the categories, as {_written(MIX)}.")] = "",
     every: Annotated[bool, typer.Option("--full", help="300 with nothing hidden, 30 of each cause and joint.")] = False,
     only: Annotated[str, typer.Option(help="Singles of this cause only, such as backlash@knee.")] = "",
     out: Annotated[Path, typer.Option(help="Folder of sessions, answers and report.")] = Path("build/blind"),
@@ -44,10 +48,7 @@ def main(
     if write and not fixed:
         raise typer.BadParameter("only the fixed set has a record: add --fixed", param_hint="--write")
     base = RANGES[seeds].start if seed_base is None else seed_base
-    if one_joint:
-        planned = of_one_joint(cases, base)
-    else:
-        planned = fixed_set.fixed_set() if fixed else _planned(cases, base, mix, every, only)
+    planned = fixed_set.fixed_set() if fixed else _planned(cases, base, mix, every, only, one_joint)
     console = Console()
     if simulate_only:
         for one in track(planned, "simulating", console=console):
@@ -62,7 +63,7 @@ def main(
         fixed_set.write(fixed_set.outcomes(planned, scores))
 
 
-def _planned(cases: int, base: int, mix: str, every: bool, only: str) -> list[Case]:
+def _planned(cases: int, base: int, mix: str, every: bool, only: str, one_joint: bool) -> list[Case]:
     if every:
         return full(base)
     if only:
@@ -70,10 +71,15 @@ def _planned(cases: int, base: int, mix: str, every: bool, only: str) -> list[Ca
         if not turns:
             raise typer.BadParameter(f"there is no cause {only!r}; one is backlash@knee", param_hint="--only")
         return [case(base + k, "single", turns[k % len(turns)]) for k in range(cases)]
-    shares = {name: float(share) for name, _, share in (part.partition("=") for part in mix.split(","))}
-    if unknown := set(shares) - set(MIX):
-        raise typer.BadParameter(f"unknown category {unknown.pop()!r}, known are {', '.join(MIX)}", param_hint="--mix")
-    return mixed(cases, base, shares)
+    usual = MIX_OF_ONE_JOINT if one_joint else MIX
+    shares = (
+        {name: float(share) for name, _, share in (part.partition("=") for part in mix.split(","))} if mix else usual
+    )
+    if unknown := set(shares) - set(usual):
+        raise typer.BadParameter(
+            f"unknown category {unknown.pop()!r}, known are {', '.join(usual)}", param_hint="--mix"
+        )
+    return of_one_joint(cases, base, shares) if one_joint else mixed(cases, base, shares)
 
 
 typer.run(main)

@@ -48,25 +48,29 @@ class Case:
 
 def mixed(cases: int, seed_base: int, mix: dict[str, float] = MIX) -> list[Case]:
     """Return cases of all categories; each goes through its causes in turn."""
-    total = sum(mix.values())
-    counts = {category: int(np.floor(cases * share / total)) for category, share in mix.items()}
-    counts[max(mix, key=mix.__getitem__)] += cases - sum(counts.values())
-    planned = [(category, i) for category, count in counts.items() for i in range(count)]
+    planned = [(category, i) for category, count in _counts(cases, mix).items() for i in range(count)]
     return [case(seed_base + k, category, i) for k, (category, i) in enumerate(planned)]
 
 
-def of_one_joint(cases: int, seed_base: int) -> list[Case]:
+def _counts(cases: int, mix: dict[str, float]) -> dict[str, int]:
+    total = sum(mix.values())
+    counts = {category: int(np.floor(cases * share / total)) for category, share in mix.items()}
+    counts[max(mix, key=mix.__getitem__)] += cases - sum(counts.values())
+    return counts
+
+
+def of_one_joint(cases: int, seed_base: int, mix: dict[str, float] = MIX_OF_ONE_JOINT) -> list[Case]:
     """Return cases of machines of one joint, each category going through machines and causes in turn."""
     places = [(name, effect) for effect in CAUSES for name in ONE_JOINT if effect in ONE_JOINT[name].effects]
     outside = [(name, f"outside:{kind.__name__}") for kind in OF_ONE_JOINT for name in ONE_JOINT]
     plain = [(name, "") for name in ONE_JOINT]
     hides = {"single": places, "outside": outside, "none": plain, "imperfect": plain}
     planned = []
-    for category, share in MIX_OF_ONE_JOINT.items():
+    for category, count in _counts(cases, mix).items():
         choices = hides[category]
         # A step that shares no factor with their number takes every choice before any a second time.
         step = next(s for s in range(7, 7 + len(choices)) if np.gcd(s, len(choices)) == 1)
-        planned += [(category, *choices[i * step % len(choices)]) for i in range(round(cases * share))]
+        planned += [(category, *choices[i * step % len(choices)]) for i in range(count)]
     return [
         Case(seed_base + k, category, ((effect, HIP),) if effect else (), None, ("exo_alone",), machine)
         for k, (category, machine, effect) in enumerate(planned)

@@ -1,4 +1,4 @@
-"""How large a hidden effect is: rms of its torque away from reversals over the joint's rms torque."""
+"""How large a hidden effect is: rms of its torque away from reversals over the rms of the joint's, a weight apart."""
 
 from collections.abc import Callable, Sequence
 
@@ -26,7 +26,7 @@ def rms(cause: Cause, runs: Sequence[Recorded]) -> tuple[float, float]:
     j = HIP if cause.joint is None else cause.joint
     acting = [(r, moving(r)[:, j]) for r in runs if cause.acts_in(r.run.kind)]
     hidden = np.concatenate([blocks(r.effect)[rows, j] for r, rows in acting])
-    torque = np.concatenate([blocks(r.clean_torque)[rows, j] for r, rows in acting])
+    torque = np.concatenate([blocks(r.clean_torque)[rows, j] - r.weight for r, rows in acting])
     if not len(hidden):
         raise FloatingPointError("the simulated leg is stuck")
     return float(np.sqrt(np.mean(hidden**2))), float(np.sqrt(np.mean(torque**2)))

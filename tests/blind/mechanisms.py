@@ -128,11 +128,11 @@ class OneJoint:
         return Rig(machine, random_person(rng), size, rng.uniform(5.0, 25.0) if self.weight else 0.0)
 
     def excitation(self, rng: Generator) -> Excitation:
-        """Draw a motion, about hanging down where that matters; what would be the knee stands still."""
+        """Draw a motion, on either side of where stops and detents are; what would be the knee stands still."""
         drawn = random_excitation(rng)
         still = np.zeros_like(drawn.a)
         still[HIP] = 1.0
-        middle = np.array([rng.uniform(-0.4, 0.8), drawn.theta0[1]])
+        middle = np.array([rng.uniform(0.2, 0.8), drawn.theta0[1]])
         return Excitation(middle, drawn.a * still, drawn.b * still)
 
     def columns(self, rig: Rig, r: Recorded) -> dict[str, np.ndarray]:

@@ -59,6 +59,8 @@ class Recorded:
     true_speed: NDArray
     link: NDArray
     """(n, 6) q, dq, ddq of hip and knee of the links."""
+    weight: float = 0.0
+    """Of the clean torque at the hip, what is held whatever the motion, N·m."""
 
     def away_from_reversals(self) -> NDArray:
         """(n, 2) bool, by the true speed."""
@@ -88,6 +90,7 @@ def record(rig: Rig, excitation: Excitation, plan: Plan, run: Run, noise: Genera
         effect=clean - needed,
         true_speed=log.speed,
         link=log.link,
+        weight=rig.weight,
     )
 
 
