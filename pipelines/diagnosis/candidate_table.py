@@ -123,6 +123,11 @@ def _judged(d: Diagnosis, labels: tuple[str, ...], score: float, more: float | N
         return "named", "it earned its place: nothing smaller explains as much, nothing larger enough more"
     if labels in d.choice.refuted:
         return "rejected", "it explains the train runs about as well as anything does, and fails on validation runs"
+    if labels in d.choice.impostors:
+        return "rejected", (
+            "it could only explain these data as on no machine or person: with an amplitude beyond any, as an excess "
+            "over friction that gives energy, or by a rhythm of the motion's own"
+        )
     if not d.causes:
         return "rejected", (
             f"it gains {score:.1f} in log likelihood; a cause must gain {NEEDED:g}, take away a material share of a "

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.bank import Bank
-from pipelines.diagnosis.bent_spring import bent
 from pipelines.diagnosis.candidates import Candidate
 from pipelines.diagnosis.fit import Fit, fit, refined, residuals_on
 from pipelines.diagnosis.floor import MOST_INDEPENDENT, Floor, independent_share
+from pipelines.diagnosis.freer_form import OF, FreerForm, freed
 from pipelines.diagnosis.perceived import heard_in
 from pipelines.diagnosis.rhythm import shadows_motion
 from pipelines.diagnosis.search import Scored, Scorer, cost, known_besides, log_likelihood, search
@@ -61,11 +61,12 @@ class Choice:
     Behind each, the named one too, stands the same with other values in every run of what may differ from run to run.
     """
     freer: Fit | None = None
-    """The named set in the best of its freer forms, a cause in two shapes or a spring bent, where one was tried."""
+    """The named set in the best of its freer forms, a cause in two shapes or bent, where one was tried."""
     refuted: frozenset[tuple[str, ...]] = frozenset()
     """Sets that explain the training runs and fail on others."""
-    shadows: frozenset[tuple[str, ...]] = frozenset()
-    """Sets in which a rhythm of the motion's own takes what other causes leave, or little of all."""
+    impostors: frozenset[tuple[str, ...]] = frozenset()
+    """Sets in which a rhythm of the motion's own takes what other causes leave, or little of all, and sets that no
+    machine can have."""
 
     def next_best(self) -> "Choice | None":
         """Return the choice with the named set refuted and the next of those as good; None where there is none.
@@ -114,15 +115,14 @@ class Choice:
         return fine.score if fine else self.levels[len(labels) - 1][labels].score
 
 
-def of_a_bent_spring(choice: Choice, bank: Bank, evidence: Mapping[str, float], empty: Fit) -> frozenset[str]:
-    """Return which named causes a named spring would do without, if it might harden, soften or go slack."""
-    scorer = Scorer(bank, choice.independent, evidence)
-    return frozenset(
-        label
+def of_a_freer_form(choice: Choice, scorer: Scorer, empty: Fit) -> dict[str, type[FreerForm]]:
+    """Return which named causes the others would do without, if one of those might be of a freer form, and of which."""
+    return {
+        label: form
         for label in choice.named.labels
-        for causes in bent([cause for cause in choice.named.fit.causes if cause.label != label])
+        for causes, form in freed([cause for cause in choice.named.fit.causes if cause.label != label])
         if _ranked(scorer, causes, empty).score > choice.named.score - NEEDED
-    )
+    }
 
 
 def nothing_chosen(empty: Fit) -> Choice:
@@ -145,11 +145,15 @@ def choose(bank: Bank, floor: Floor, evidence: Mapping[str, float]) -> Choice:
     ranked = [{named.labels: named}]
     freer: list[Ranked] = []
     standby: list[Ranked] = []
-    shadows: set[tuple[str, ...]] = set()
+    impostors: set[tuple[str, ...]] = set()
     for level in levels:
         finalists = [_rank(scorer, s, empty) for s in _finalists(level, named, scorer)]
-        shadows |= {r.labels for r in finalists if shadows_motion(r.fit, empty.rms, floor.rms, bank.runs)}
-        finalists = [r for r in finalists if r.labels not in shadows and not r.fit.is_absurd(bank.baseline)]
+        impostors |= {
+            r.labels
+            for r in finalists
+            if r.fit.is_absurd(bank.baseline) or shadows_motion(r.fit, empty.rms, floor.rms, bank.runs)
+        }
+        finalists = [r for r in finalists if r.labels not in impostors]
         ranked.append({r.labels: r for r in finalists})
         if not finalists:
             break
@@ -161,7 +165,7 @@ def choose(bank: Bank, floor: Floor, evidence: Mapping[str, float]) -> Choice:
         freer, standby = [], [r for r in others if r.score > named.score - NEEDED]
     _, *others = itertools.chain.from_iterable(_and_anew(r, scorer, empty) for r in (named, *standby))
     best = max(freer, key=lambda r: r.score).fit if freer else None
-    return Choice(named, levels, ranked, independent, tuple(others), best, shadows=frozenset(shadows))
+    return Choice(named, levels, ranked, independent, tuple(others), best, impostors=frozenset(impostors))
 
 
 def _and_anew(ranked: Ranked, scorer: Scorer, empty: Fit) -> Iterator[Ranked]:
@@ -179,11 +183,11 @@ def _and_anew(ranked: Ranked, scorer: Scorer, empty: Fit) -> Iterator[Ranked]:
 
 
 def _freer(level: dict[tuple[str, ...], Scored], named: Ranked, scorer: Scorer, empty: Fit) -> list[Ranked]:
-    """Return the named set in freer forms: the best with a cause in two shapes at once, each with a spring bent."""
+    """Return the named set in freer forms: the best with a cause in two shapes at once, each with one of them bent."""
     made = [tuple(sorted((*named.labels, label))) for label in named.labels]
     found = [level[labels] for labels in made if labels in level and level[labels].admissible]
     twice = [_rank(scorer, s, empty) for s in sorted(found, key=lambda s: -s.score)[:1]]
-    return twice + [_ranked(scorer, causes, empty) for causes in bent(named.fit.causes)]
+    return twice + [_ranked(scorer, causes, empty) for causes, _ in freed(named.fit.causes)]
 
 
 def _finalists(level: dict[tuple[str, ...], Scored], named: Ranked, scorer: Scorer) -> list[Scored]:
@@ -269,21 +273,25 @@ def dilution(choice: Choice, bank: Bank) -> float:
     return float(min(1.0, independent.sum() / choice.independent.sum()))
 
 
-def rivals(choice: Choice, bank: Bank, cause: str) -> dict[str, float]:
+def rivals(choice: Choice, scorer: Scorer, empty: Fit, cause: str) -> dict[str, float]:
     """Return every effect that could stand in a named cause's place, and its log likelihood behind the named set.
 
     The others of the set stay; nought is the named cause itself. None that is more than another of them and explains
-    no more: what it is besides does not show.
+    no more: what it is besides does not show. At the joint of the named cause a rival may be of a freer form than its
+    own, for the named one has its pick of shapes, too.
     """
     others = tuple(sorted(set(choice.named.labels) - {cause}))
     size = len(choice.named.labels)
     behind: dict[str, float] = {}
     for labels in choice.levels[size - 1]:
-        if labels in choice.refuted | choice.shadows:
+        if labels in choice.refuted | choice.impostors:
             continue
         if set(others) <= set(labels) and len(set(labels)) == len(labels) == size:
             rival = next(iter(set(labels) - set(others)))
-            behind[rival] = max(_behind(choice, labels, bank), 0.0) if rival != cause else 0.0
+            apart = min(
+                _behind(choice, labels, scorer.bank), _freed_behind(choice, labels, (cause, rival), scorer, empty)
+            )
+            behind[rival] = max(apart, 0.0) if rival != cause else 0.0
     return {rival: gap for rival, gap in behind.items() if gap <= behind.get(_within(rival), np.inf)}
 
 
@@ -301,6 +309,20 @@ def _behind(choice: Choice, labels: tuple[str, ...], bank: Bank) -> float:
     if any(p.default is None for cause in causes for p in cause.effect.shape):
         return apart
     return max(apart, choice.named.score - coarse[labels].score)
+
+
+def _freed_behind(
+    choice: Choice, labels: tuple[str, ...], places: tuple[str, str], scorer: Scorer, empty: Fit
+) -> float:
+    """Return the log likelihood of a set behind the named one if a rival at the cause's joint is of a freer form."""
+    cause, rival = (effect_labelled(label) for label in places)
+    form = OF.get(type(rival))
+    if rival == cause or rival.joint != cause.joint or form is None or form.imitates:
+        return np.inf
+    chosen = [scorer.bank.candidates[i] for i in choice.levels[len(labels) - 1][labels].chosen]
+    ((freer, _),) = freed(chosen, rival.label)
+    made = _ranked(scorer, freer, empty)
+    return np.inf if made.fit.is_absurd(scorer.bank.baseline) else choice.named.score - made.score
 
 
 def idle(choice: Choice, cause: str) -> frozenset[str]:

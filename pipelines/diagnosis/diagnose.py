@@ -18,7 +18,7 @@ from pipelines.diagnosis.choice import (
     dilution,
     idle,
     nothing_chosen,
-    of_a_bent_spring,
+    of_a_freer_form,
     probabilities,
     rivals,
 )
@@ -27,12 +27,14 @@ from pipelines.diagnosis.faults import Fault, excluding, find_faults
 from pipelines.diagnosis.fit import Fit, fit, residuals_on
 from pipelines.diagnosis.fitted_model import model_of_run, values_of_each_run
 from pipelines.diagnosis.floor import Floor, noise_floor
+from pipelines.diagnosis.freer_form import FreerForm
 from pipelines.diagnosis.gain import Gain, errors_of
 from pipelines.diagnosis.imperfection import imperfection
 from pipelines.diagnosis.known import known_effects
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, like_trained, observe, with_load
 from pipelines.diagnosis.perceived import heard_in
 from pipelines.diagnosis.reversals import BuildUp, built_up
+from pipelines.diagnosis.search import Scorer
 from pipelines.diagnosis.second_look import slower
 from pipelines.diagnosis.session import refuse_unfit
 from pipelines.diagnosis.status import Standing, status_of
@@ -52,8 +54,8 @@ from pipelines.model import unrealizable
 
 SEARCH_SHARE = 0.75
 """Of the progress bar that filling the bank takes."""
-OR_A_BENT_SPRING = 0.5
-"""No spring is straight all the way: what one that bends would explain as well is as likely there as not."""
+OR_A_FREER_FORM = 0.5
+"""No spring is straight all the way, no drag a mere square: what one that bends explains as well is likely as not."""
 
 
 @dataclass(frozen=True)
@@ -72,8 +74,8 @@ class Diagnosis:
     """For each named cause the probability of it and of each that could stand in its place."""
     idle: dict[str, frozenset[str]]
     """Those of these that explain nothing."""
-    of_a_bent_spring: frozenset[str]
-    """Named causes that explain no more than a named spring would whose line is bent."""
+    of_a_freer_form: dict[str, type[FreerForm]]
+    """Named causes that explain no more than another of them would in a freer form, and which form."""
     standing: Standing
     floor: Floor
     unsteady: bool
@@ -150,7 +152,7 @@ class Diagnosis:
     def chance(self, label: str) -> float:
         """Return how likely a named cause is among its rivals, with those that cannot be told from it."""
         among_rivals = min(sum(self.alike(label).values()), 1.0)
-        return OR_A_BENT_SPRING * among_rivals if label in self.of_a_bent_spring else among_rivals
+        return OR_A_FREER_FORM * among_rivals if label in self.of_a_freer_form else among_rivals
 
     def alike(self, label: str) -> dict[str, float]:
         """Return a named cause and those that cannot be told from it, with their probabilities."""
@@ -242,14 +244,15 @@ def _look(
     named = choice.named.labels
     status = "unknown_cause" if spoilt else status_of(standing, bool(named), examined.unsteady)
     diluted = dilution(choice, bank) if named else 1.0
+    scorer = Scorer(bank, choice.independent, evidence)
     sure = uncertainty(choice.named.fit, bank.runs, baseline, imperfection(bank.runs))
     frame, covariance = tables.parameters(choice.named.fit, baseline, sure)
     return Diagnosis(
         baseline=baseline, bank=bank, choice=choice, status=status, before=before, after=after,
         without=examined.without,
-        likely={label: probabilities(rivals(choice, bank, label), diluted) for label in named},
+        likely={label: probabilities(rivals(choice, scorer, empty, label), diluted) for label in named},
         idle={label: idle(choice, label) for label in named},
-        of_a_bent_spring=of_a_bent_spring(choice, bank, evidence, empty),
+        of_a_freer_form=of_a_freer_form(choice, scorer, empty),
         standing=standing, floor=floor, unsteady=examined.unsteady,
         perceived=examined.sure, sure=sure, parameters=frame, covariance=covariance,
         residuals=tables.residual_table(validate, {"baseline": before.residuals, "extended": after.residuals}),
@@ -304,7 +307,9 @@ def _strayed(made: Fit, validate: Sequence[Run], baseline: Baseline) -> NDArray 
             # Causes that the forward dynamics cannot hold together, or a mass matrix that no leg has: the torque
             # error stands all the same.
             return None
-        squares = squares + np.sum(result.error**2, axis=(0, 1))
+        # A model that runs away tells no error.
+        with np.errstate(over="ignore"):
+            squares = squares + np.sum(result.error**2, axis=(0, 1))
         count += result.error.shape[0] * result.error.shape[1]
     with np.errstate(invalid="ignore"):
         rms = np.sqrt(squares / max(count, 1))

@@ -28,6 +28,8 @@ BEYOND = 5.0
 """Times what is typical, from which an amplitude is doubted."""
 MOST_OF_ALL = 0.5
 """Share of all of a joint's torque above which such an amplitude only stands because something else takes it away."""
+UNGROUNDED = 0.25
+"""Share of an excess of friction by which the level below it may come out negative, as its form's misfit lets it."""
 NEWTON_STEPS = 3
 """Of Gauss and Newton along what bends each run in its own way, which the torque is nearly linear in."""
 STEP = 0.01
@@ -60,13 +62,18 @@ class Fit:
         """Tell whether some cause is larger than on any machine or person, and carries most of a joint's torque.
 
         It imitates what it is not, with others that take most of it away again. Where a joint's torques are large
-        themselves, an amplitude beyond what is typical means little.
+        themselves, an amplitude beyond what is typical means little. So does an excess of friction over a level that
+        gives energy: another law of the speed bends like both together.
         """
         most = self.shares.max(axis=0)
-        for column, (_, parameter) in enumerate(self.amplitudes(), start=baseline.size):
-            beyond = abs(self.values[column]) > BEYOND * max(map(abs, parameter.typical))
-            if beyond and most[column] > MOST_OF_ALL:
+        for column, (effect, parameter) in enumerate(self.amplitudes(), start=baseline.size):
+            amplitude = abs(self.values[column])
+            if amplitude > BEYOND * max(map(abs, parameter.typical)) and most[column] > MOST_OF_ALL:
                 return True
+            if effect.excess_over:
+                level = self.values[baseline.names.index(f"{effect.joint} {effect.excess_over}")]
+                if level < -UNGROUNDED * amplitude:
+                    return True
         return False
 
     def amplitudes(self) -> Iterator[tuple[Effect, Parameter]]:

@@ -190,11 +190,8 @@ def _evidence(d: Diagnosis, label: str, effect: Effect, worth: float, joint: str
         sentences.append(doubt[1])
     if effect.each_run:
         sentences.append(_set_anew(d, label, effect))
-    if label in d.of_a_bent_spring:
-        sentences.append(
-            "without it a spring that hardens, softens or goes slack would explain as much: hold the joint at several "
-            "angles and see whether the torque lies on a straight line"
-        )
+    if form := d.of_a_freer_form.get(label):
+        sentences.append(f"without it {form.instead}")
     if label in d.perceived:
         sentences.append(PERCEIVED[effect.name])
     others = {k: p for k, p in d.likely[label].items() if k not in alike}

@@ -24,6 +24,7 @@ class StribeckFriction(Effect):
     )
     parity = Parity.ODD
     dissipative = True
+    excess_over = "coulomb"
 
     @reaction
     def reaction(at, state, values, geometry, joint, out):

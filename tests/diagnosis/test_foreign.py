@@ -39,18 +39,32 @@ def off_by_a_little(t, q, dq, ddq, own):
     return -0.03 * own * (own / np.abs(own).max()) ** 2
 
 
-def damped_beyond_a_speed(t, q, dq, ddq, own):
-    """A damper with a dead zone: friction that is no line in speed, as Stribeck's is none, but of another form."""
-    return 3.0 * np.sign(dq) * np.maximum(np.abs(dq) - 1.2, 0.0)
+def gripped_beyond_a_speed(t, q, dq, ddq, own):
+    """A damper with a dead zone. Over a Coulomb friction that gives energy Stribeck's law bends so, too."""
+    return 3.0 * np.sign(dq) * np.maximum(np.abs(dq) - 0.6, 0.0)
+
+
+def steeper_than_squared(t, q, dq, ddq, own):
+    """A drag that rises with the fifth power of speed, where the catalogue's is of the second."""
+    return 0.5 * np.sign(dq) * np.abs(dq) ** 5
 
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])
 def test_what_a_cause_of_another_form_leaves_is_told_with_what_it_goes_with(kind):
-    said = told(kind, damped_beyond_a_speed)
+    said = told(kind, steeper_than_squared)
     (joint,) = said["unexplained"]
     assert said["status"] == "explained" and said["extended_rmse_nm"][joint] > 1.1 * said["noise_floor_nm"][joint]
     assert said["residual"]["depends_on"][0]["variable"] == "speed"
     assert f"of what is left at the {joint} goes with the {joint}'s speed" in said["summary"]
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_no_friction_is_an_excess_over_one_that_gives_energy(kind):
+    said = told(kind, gripped_beyond_a_speed)
+    named = {cause["effect"] for cause in said["causes"]}
+    tied = {tie["effect"] for cause in said["causes"] for tie in cause["indistinguishable_from"]}
+    assert "stribeck_friction" not in named | tied
+    assert named == {"quadratic_drag"}
 
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])

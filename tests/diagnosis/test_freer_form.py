@@ -1,4 +1,4 @@
-"""A spring that is no straight line is a spring, and nothing is named for its bend."""
+"""A spring that is no straight line is a spring, a drag that is no square a drag, and nothing is named for the bend."""
 
 from dataclasses import replace
 
@@ -58,3 +58,9 @@ def test_what_a_bent_spring_would_explain_as_well_is_as_likely_there_as_not():
 def test_what_no_bent_spring_explains_keeps_its_probability():
     causes = verdict(diagnosed(lambda t, q, dq, ddq, torque: 5.0 * q + 0.9 * np.sin(11.0 * q)))["causes"]
     assert {c["effect"]: c["probability"] > 0.9 for c in causes} == {"parallel_spring": True, "cogging": True}
+
+
+@pytest.mark.parametrize("power", [1.6, 2.6])
+def test_a_drag_of_any_power_of_speed_is_named_alone(power):
+    found = diagnosed(lambda t, q, dq, ddq, torque: 0.25 * np.sign(dq) * np.abs(dq) ** power)
+    assert found.causes == ("quadratic_drag@arm",)
