@@ -29,7 +29,7 @@ class FreerForm(Effect):
     instead: ClassVar[str]
     """That the cause it belongs to may be of this form, and how to see whether it is."""
     imitates: ClassVar[bool] = False
-    """True where it is so free that it could be nearly anything at its joint: then it makes its cause nobody's rival."""
+    """True where it could be nearly anything at its joint: then its cause is nobody's rival in this form."""
 
 
 class BentSpring(FreerForm):
