@@ -11,7 +11,7 @@ from pipelines.diagnosis.bank import Bank
 from pipelines.diagnosis.candidates import Candidate
 from pipelines.diagnosis.fit import Fit, fit, refined, residuals_on
 from pipelines.diagnosis.floor import MOST_INDEPENDENT, Floor, independent_share
-from pipelines.diagnosis.freer_form import OF, FreerForm, freed
+from pipelines.diagnosis.freer_form import AS_RIVAL, FreerForm, freed, in_form
 from pipelines.diagnosis.perceived import heard_in
 from pipelines.diagnosis.rhythm import shadows_motion
 from pipelines.diagnosis.search import Scored, Scorer, cost, known_besides, log_likelihood, search
@@ -62,6 +62,8 @@ class Choice:
     """
     freer: Fit | None = None
     """The named set in the best of its freer forms, a cause in two shapes or bent, where one was tried."""
+    twice: float = -np.inf
+    """Log likelihood of the named set with one of its causes in two shapes at once, where that was tried."""
     refuted: frozenset[tuple[str, ...]] = frozenset()
     """Sets that explain the training runs and fail on others."""
     impostors: frozenset[tuple[str, ...]] = frozenset()
@@ -101,7 +103,7 @@ class Choice:
     def _instead(self, named: Ranked) -> "Choice":
         """Return the choice of another set, the one named so far refuted unless it is of the same causes."""
         refuted = self.refuted | ({self.named.labels} - {named.labels})
-        return replace(self, named=named, standby=(), freer=None, refuted=refuted)
+        return replace(self, named=named, standby=(), freer=None, twice=-np.inf, refuted=refuted)
 
     def alone(self, cause: str) -> float:
         """Return what a cause gains in log likelihood with no other beside it."""
@@ -165,7 +167,8 @@ def choose(bank: Bank, floor: Floor, evidence: Mapping[str, float]) -> Choice:
         freer, standby = [], [r for r in others if r.score > named.score - NEEDED]
     _, *others = itertools.chain.from_iterable(_and_anew(r, scorer, empty) for r in (named, *standby))
     best = max(freer, key=lambda r: r.score).fit if freer else None
-    return Choice(named, levels, ranked, independent, tuple(others), best, impostors=frozenset(impostors))
+    twice = max((r.score for r in freer if len(set(r.labels)) < len(r.labels)), default=-np.inf)
+    return Choice(named, levels, ranked, independent, tuple(others), best, twice, impostors=frozenset(impostors))
 
 
 def _and_anew(ranked: Ranked, scorer: Scorer, empty: Fit) -> Iterator[Ranked]:
@@ -316,13 +319,14 @@ def _freed_behind(
 ) -> float:
     """Return the log likelihood of a set behind the named one if a rival at the cause's joint is of a freer form."""
     cause, rival = (effect_labelled(label) for label in places)
-    form = OF.get(type(rival))
-    if rival == cause or rival.joint != cause.joint or form is None or form.imitates:
+    form = AS_RIVAL.get((type(cause), type(rival)))
+    if rival.joint != cause.joint or form is None:
         return np.inf
     chosen = [scorer.bank.candidates[i] for i in choice.levels[len(labels) - 1][labels].chosen]
-    ((freer, _),) = freed(chosen, rival.label)
-    made = _ranked(scorer, freer, empty)
-    return np.inf if made.fit.is_absurd(scorer.bank.baseline) else choice.named.score - made.score
+    made = _ranked(scorer, in_form(chosen, rival.label, form), empty)
+    # The cause has as much freedom: two waves at once are a ripple, too.
+    own = max(choice.named.score, choice.twice)
+    return np.inf if made.fit.is_absurd(scorer.bank.baseline) else own - made.score
 
 
 def idle(choice: Choice, cause: str) -> frozenset[str]:

@@ -97,7 +97,7 @@ class Examined:
         hums = standing.hums(before.tone, after.tone, noise_floor(validate, after.whole).rms[:J])
         wanders = bool(np.any(slow_scatter(validate, after.whole)[:J] > WANDERING))
         effects = [cause.effect for cause in made.causes]
-        doubtful = hums and not standing.is_minor(after.tone)
+        doubtful = hums and not (standing.is_minor(after.tone) or standing.leaves_nothing)
         foreign = (doubtful or (wanders and not any(e.goes_with_time for e in effects))) and not standing.rings(effects)
         # Play rings on as it likes, and a wearer pushes at will: what no model follows there is no reason to doubt
         # what was heard and felt in these runs too.

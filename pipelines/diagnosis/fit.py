@@ -28,7 +28,7 @@ BEYOND = 5.0
 """Times what is typical, from which an amplitude is doubted."""
 MOST_OF_ALL = 0.5
 """Share of all of a joint's torque above which such an amplitude only stands because something else takes it away."""
-UNGROUNDED = 0.25
+UNGROUNDED = 0.1
 """Share of an excess of friction by which the level below it may come out negative, as its form's misfit lets it."""
 NEWTON_STEPS = 3
 """Of Gauss and Newton along what bends each run in its own way, which the torque is nearly linear in."""

@@ -1,8 +1,9 @@
-"""Causes in a freer form: a spring that hardens, softens or goes slack, a drag of other powers of speed.
+"""Causes in a freer form: a spring that hardens or goes slack, a drag of other powers, a few waves of any shape.
 
 Their torque is linear in what is fitted, and two of them are one. So beside a spring a ripple or a mass off the axis
 would be named for what a real spring, or a cable that only pulls, has beyond a straight line, and beside a drag a
-Stribeck peak for what it has beyond a square.
+Stribeck peak for what it has beyond a square. A ripple of few waves, and what makes gravity of another phase, are
+together such a spring, too.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,15 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates import Candidate
-from pipelines.effects import Effect, ParallelSpring, Parameter, Parity, QuadraticDrag, Side
+from pipelines.effects import Cogging, Effect, ParallelSpring, Parameter, Parity, QuadraticDrag, Side, StribeckFriction
 from pipelines.mechanics.motion import Motion
 
 ANY = (-1e6, 1e6)
 """Amplitudes of which none is absurd."""
-OF_ANGLE = (2, 3, 4)
-"""Powers beside the straight line and the preload that a spring has itself."""
-OF_SPEED = (3.0,)
-"""Powers above a drag's own; below it is viscous friction's."""
+BENDS, LAW = (2, 3, 4), (0, 1, 2, 3, 4, 5, 6)
+"""Powers of the angle: beside the straight line and the preload that a spring has itself, and of any law."""
+STEEPER = 3
+"""Power of speed above a drag's own; those below are viscous friction's."""
 
 
 class FreerForm(Effect):
@@ -28,8 +29,20 @@ class FreerForm(Effect):
 
     instead: ClassVar[str]
     """That the cause it belongs to may be of this form, and how to see whether it is."""
-    imitates: ClassVar[bool] = False
-    """True where it could be nearly anything at its joint: then its cause is nobody's rival in this form."""
+    alone: ClassVar[bool] = False
+    """True where it stands in its cause's place, and not beside it."""
+
+
+def _powers_of_angle(effect: Effect, motion: Motion, powers: Sequence[int]) -> NDArray:
+    """Return powers of the angle, in travels of an exoskeleton's joint, (n, J, p)."""
+    j = effect.column(motion)
+    columns = np.zeros((*motion.q.shape, len(powers)))
+    columns[:, j] = (motion.q[:, j] / effect.scale.travel)[:, np.newaxis] ** np.array(powers)
+    return columns
+
+
+def _amplitudes(powers: Sequence[int]) -> tuple[Parameter, ...]:
+    return tuple(Parameter(f"power_{n}", "N·m", f"torque per angle to the power {n}", f"k{n}", ANY) for n in powers)
 
 
 class BentSpring(FreerForm):
@@ -39,32 +52,43 @@ class BentSpring(FreerForm):
     title = "Bent spring"
     side = Side.STRUCTURE
     equation = "tau = k2 (q / s)^2 + k3 (q / s)^3 + k4 (q / s)^4, s the joint's travel beside an exoskeleton's"
-    linear = tuple(Parameter(f"bend_{n}", "N·m", f"torque per angle to the power {n}", f"k{n}", ANY) for n in OF_ANGLE)
+    linear = _amplitudes(BENDS)
     parity = Parity.EVEN
-    imitates = True
     instead = (
         "a spring that hardens, softens or goes slack would explain as much: hold the joint at several angles and see "
         "whether the torque lies on a straight line"
     )
 
     def columns(self, motion: Motion, shape: NDArray | tuple[float, ...] = ()) -> NDArray:
-        """Return powers of the angle, in travels of an exoskeleton's joint, (n, J, p)."""
-        j = self.column(motion)
-        columns = np.zeros((*motion.q.shape, len(OF_ANGLE)))
-        columns[:, j] = (motion.q[:, j] / self.scale.travel)[:, np.newaxis] ** np.array(OF_ANGLE)
-        return columns
+        """Return the powers that bend, (n, J, p)."""
+        return _powers_of_angle(self, motion, BENDS)
+
+
+class LawOfAngle(FreerForm):
+    """Any smooth torque that goes with the angle alone: what a ripple of few waves is no more than."""
+
+    name = "law_of_angle"
+    title = "Law of the angle"
+    side = Side.STRUCTURE
+    equation = "tau = k0 + k1 (q / s) + ... + k6 (q / s)^6, s the joint's travel beside an exoskeleton's"
+    linear = _amplitudes(LAW)
+    parity = Parity.EVEN
+    instead = BentSpring.instead
+    alone = True
+
+    def columns(self, motion: Motion, shape: NDArray | tuple[float, ...] = ()) -> NDArray:
+        """Return all powers, (n, J, p)."""
+        return _powers_of_angle(self, motion, LAW)
 
 
 class BentDrag(FreerForm):
-    """What makes a drag of another power of speed than the second."""
+    """What makes a drag steeper than the square of speed."""
 
     name = "bent_drag"
     title = "Bent drag"
     side = Side.DRIVE
     equation = "tau = c3 abs(v / s)^3 sgn(v), s the joint's speed beside an exoskeleton's"
-    linear = tuple(
-        Parameter(f"bend_{n:g}", "N·m", f"torque per speed to the power {n:g}", f"c{n:g}", ANY) for n in OF_SPEED
-    )
+    linear = (Parameter("bend", "N·m", "torque per speed to the third power", "c3", ANY),)
     parity = Parity.ODD
     instead = (
         "a drag of another power of speed would explain as much: move the joint at several constant speeds and see how "
@@ -72,21 +96,31 @@ class BentDrag(FreerForm):
     )
 
     def columns(self, motion: Motion, shape: NDArray | tuple[float, ...] = ()) -> NDArray:
-        """Return powers of the speed, in speeds of an exoskeleton's joint, (n, J, p)."""
+        """Return the power of speed, in speeds of an exoskeleton's joint, (n, J, 1)."""
         j = self.column(motion)
         speed = motion.dq[:, j] / self.scale.speed
-        columns = np.zeros((*motion.q.shape, len(OF_SPEED)))
-        columns[:, j] = np.sign(speed)[:, np.newaxis] * np.abs(speed)[:, np.newaxis] ** np.array(OF_SPEED)
+        columns = np.zeros((*motion.q.shape, 1))
+        columns[:, j, 0] = np.sign(speed) * np.abs(speed) ** STEEPER
         return columns
 
 
-OF: dict[type[Effect], type[FreerForm]] = {ParallelSpring: BentSpring, QuadraticDrag: BentDrag}
+OF: dict[type[Effect], type[FreerForm]] = {ParallelSpring: BentSpring, QuadraticDrag: BentDrag, Cogging: LawOfAngle}
+AS_RIVAL: dict[tuple[type[Effect], type[Effect]], type[FreerForm]] = {
+    (StribeckFriction, QuadraticDrag): BentDrag,
+    (Cogging, ParallelSpring): LawOfAngle,
+}
+"""By cause and rival at its joint: in which form the rival is held against it; others could be nearly anything so."""
 
 
-def freed(causes: Sequence[Candidate], label: str | None = None) -> Iterator[tuple[list[Candidate], type[FreerForm]]]:
-    """Yield the causes with one of them in a freer form, that of a ``label`` if one is given, and that form."""
+def freed(causes: Sequence[Candidate]) -> Iterator[tuple[list[Candidate], type[FreerForm]]]:
+    """Yield the causes with one of them in a freer form, and that form."""
     for cause in causes:
-        form = OF.get(type(cause.effect))
-        if form is not None and label in (None, cause.label):
-            free = form(cause.effect.joint, on=cause.effect.on)
-            yield [*causes, Candidate(free, ((),) * len(cause.shapes))], form
+        if form := OF.get(type(cause.effect)):
+            yield in_form(causes, cause.label, form), form
+
+
+def in_form(causes: Sequence[Candidate], label: str, form: type[FreerForm]) -> list[Candidate]:
+    """Return the causes with that of a label in a form."""
+    (cause,) = (cause for cause in causes if cause.label == label)
+    rest = [c for c in causes if c is not cause or not form.alone]
+    return [*rest, Candidate(form(cause.effect.joint, on=cause.effect.on), ((),) * len(cause.shapes))]

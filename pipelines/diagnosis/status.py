@@ -23,6 +23,8 @@ Three causes together can imitate nearly anything: of them a third of that.
 """
 WORSE = 1.03
 """Ratio of a joint's errors from which causes do harm there."""
+NEXT_TO_NOTHING = 0.05
+"""Share of the systematic power below which nothing is left that a cause should have explained."""
 RINGING = 0.5
 """Share of the systematic power below which what is left beside a soft transmission may be its ringing."""
 PLAIN = 6.0
@@ -68,6 +70,11 @@ class Standing:
         worse = self.extended > WORSE * self.baseline
         together = np.sum((self.extended / self.floor) ** 2) <= np.sum((self.baseline / self.floor) ** 2)
         return self._share_left <= 1.0 - HELD_UP and bool(together) and not bool(worse.any())
+
+    @property
+    def leaves_nothing(self) -> bool:
+        """Whether the named causes take all slow error, and there was some: what hums beside it is another matter."""
+        return bool(np.any(self.systematic(self.slow_before))) and self._share_left < NEXT_TO_NOTHING
 
     @property
     def drowns(self) -> bool:
