@@ -123,10 +123,15 @@ def _judged(d: Diagnosis, labels: tuple[str, ...], score: float, more: float | N
         return "named", "it earned its place: nothing smaller explains as much, nothing larger enough more"
     if labels in d.choice.refuted:
         return "rejected", "it explains the train runs about as well as anything does, and fails on validation runs"
-    if labels in d.choice.impostors:
+    if labels in d.choice.absurd:
         return "rejected", (
-            "it could only explain these data as on no machine or person: with an amplitude beyond any, as an excess "
-            "over friction that gives energy, or by a rhythm of the motion's own"
+            "as it was fitted no machine or person has it: an amplitude is beyond any, or an excess stands over "
+            "friction that gives energy"
+        )
+    if labels in d.choice.shadows:
+        return (
+            "rejected",
+            "its rhythm is a multiple of the motion's own, and takes what its other causes leave or little",
         )
     if not d.causes:
         return "rejected", (

@@ -1,7 +1,7 @@
 """Which set of causes is named, how likely each is, and what cannot be told from it."""
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,6 +25,8 @@ MATERIAL, MATERIAL_IN_CUFFS = 0.02, 0.1
 """Share of a drive's error, or else of that of the cuffs' torque, that one more cause must take away."""
 FINALISTS = 3
 """Sets of each size whose shapes are refined before they are compared."""
+LOOKS = 3
+"""How often others are taken where none of the finalists can be."""
 BEHIND, BEHIND_SHARE = 30.0, 0.2
 """Log likelihood behind the best, or share of the best's, at which a set is no finalist: shapes are coarse yet."""
 SOFTENING = 0.25
@@ -66,9 +68,10 @@ class Choice:
     """Log likelihood of the named set with one of its causes in two shapes at once, where that was tried."""
     refuted: frozenset[tuple[str, ...]] = frozenset()
     """Sets that explain the training runs and fail on others."""
-    impostors: frozenset[tuple[str, ...]] = frozenset()
-    """Sets in which a rhythm of the motion's own takes what other causes leave, or little of all, and sets that no
-    machine can have."""
+    shadows: frozenset[tuple[str, ...]] = frozenset()
+    """Sets in which a rhythm of the motion's own takes what other causes leave, or little of all."""
+    absurd: frozenset[tuple[str, ...]] = frozenset()
+    """Sets that no machine or person can have as they were fitted. Some other form of them may be there."""
 
     def next_best(self) -> "Choice | None":
         """Return the choice with the named set refuted and the next of those as good; None where there is none.
@@ -147,15 +150,18 @@ def choose(bank: Bank, floor: Floor, evidence: Mapping[str, float]) -> Choice:
     ranked = [{named.labels: named}]
     freer: list[Ranked] = []
     standby: list[Ranked] = []
-    impostors: set[tuple[str, ...]] = set()
+    shadows: set[tuple[str, ...]] = set()
+    absurd: set[tuple[str, ...]] = set()
     for level in levels:
-        finalists = [_rank(scorer, s, empty) for s in _finalists(level, named, scorer)]
-        impostors |= {
-            r.labels
-            for r in finalists
-            if r.fit.is_absurd(bank.baseline) or shadows_motion(r.fit, empty.rms, floor.rms, bank.runs)
-        }
-        finalists = [r for r in finalists if r.labels not in impostors]
+        finalists: list[Ranked] = []
+        for _ in range(LOOKS):
+            near = _finalists(level, named, scorer, shadows | absurd)
+            finalists = [_rank(scorer, s, empty) for s in near]
+            shadows |= {r.labels for r in finalists if shadows_motion(r.fit, empty.rms, floor.rms, bank.runs)}
+            absurd |= {r.labels for r in finalists if r.fit.is_absurd(bank.baseline)}
+            finalists = [r for r in finalists if r.labels not in shadows | absurd]
+            if finalists:
+                break
         ranked.append({r.labels: r for r in finalists})
         if not finalists:
             break
@@ -168,7 +174,8 @@ def choose(bank: Bank, floor: Floor, evidence: Mapping[str, float]) -> Choice:
     _, *others = itertools.chain.from_iterable(_and_anew(r, scorer, empty) for r in (named, *standby))
     best = max(freer, key=lambda r: r.score).fit if freer else None
     twice = max((r.score for r in freer if len(set(r.labels)) < len(r.labels)), default=-np.inf)
-    return Choice(named, levels, ranked, independent, tuple(others), best, twice, impostors=frozenset(impostors))
+    barred = {"shadows": frozenset(shadows), "absurd": frozenset(absurd)}
+    return Choice(named, levels, ranked, independent, tuple(others), best, twice, **barred)
 
 
 def _and_anew(ranked: Ranked, scorer: Scorer, empty: Fit) -> Iterator[Ranked]:
@@ -193,8 +200,10 @@ def _freer(level: dict[tuple[str, ...], Scored], named: Ranked, scorer: Scorer, 
     return twice + [_ranked(scorer, causes, empty) for causes, _ in freed(named.fit.causes)]
 
 
-def _finalists(level: dict[tuple[str, ...], Scored], named: Ranked, scorer: Scorer) -> list[Scored]:
-    """Return the sets that may be best once refined, those that would show at all first.
+def _finalists(
+    level: dict[tuple[str, ...], Scored], named: Ranked, scorer: Scorer, barred: Collection[tuple[str, ...]]
+) -> list[Scored]:
+    """Return the sets that may be best once refined, those that would show at all first; none of those ``barred``.
 
     Beside the best ones stands the best that extends what is named so far.
     """
@@ -206,7 +215,11 @@ def _finalists(level: dict[tuple[str, ...], Scored], named: Ranked, scorer: Scor
         return seen_otherwise or bool(np.any(_material(s.error, named.fit.rms, scorer.imperfect)))
 
     ordered = sorted(
-        ((labels, s) for labels, s in level.items() if len(set(labels)) == len(labels) and s.admissible),
+        (
+            (labels, s)
+            for labels, s in level.items()
+            if len(set(labels)) == len(labels) and s.admissible and labels not in barred
+        ),
         key=lambda e: (not shows(e[1]), -e[1].score),
     )
     if not ordered:
@@ -287,7 +300,7 @@ def rivals(choice: Choice, scorer: Scorer, empty: Fit, cause: str) -> dict[str, 
     size = len(choice.named.labels)
     behind: dict[str, float] = {}
     for labels in choice.levels[size - 1]:
-        if labels in choice.refuted | choice.impostors:
+        if labels in choice.refuted | choice.shadows:
             continue
         if set(others) <= set(labels) and len(set(labels)) == len(labels) == size:
             rival = next(iter(set(labels) - set(others)))
