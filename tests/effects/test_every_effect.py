@@ -1,5 +1,6 @@
 """What holds for every effect that is registered."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -201,3 +202,8 @@ def test_a_payload_is_a_point_mass(with_human):
     late = with_human.time >= 5.0
     assert not found[~late].any()
     assert_allclose(found[late], RigidBody().torque(with_human, X)[late], atol=1e-12)
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_how_to_make_sure_of_it_is_told_in_no_unit_of_one_kind_and_size_of_machine(effect):
+    assert not re.search(r"\brad|\bN·m", effect.confirm)
