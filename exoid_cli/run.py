@@ -1,5 +1,6 @@
 """``exoid run``: an experiment brought up to date, without make."""
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Annotated
 
@@ -9,7 +10,7 @@ from exoid_cli import completion
 from exoid_cli.confirm import YesOption, ask_before
 from exoid_cli.console import console
 from exoid_cli.place import ConfigOption, OutOption, Place, place_of, why_absent
-from exoid_cli.steps import bring_up_to_date
+from exoid_cli.steps import LeftOut, bring_up_to_date
 
 
 def run(
@@ -50,9 +51,20 @@ def run(
         console.say("Everything is up to date.")
         return
     split(place.experiment, place.out / ".settings")  # so that make, called next, finds nothing to do
-    done = bring_up_to_date(context, place, wanted, before=partial(ask_before, place.experiment, yes=yes))
+    done, left_out = bring_up_to_date(context, place, wanted, before=partial(ask_before, place.experiment, yes=yes))
     console.emit([one.as_json() for one in done])
-    console.say(f"\n{len(done)} of {len(wanted)} steps done in {sum(one.seconds for one in done):.0f} s")
+    kept = len(wanted) - len(done) - len(left_out)
+    up_to_date = f"; {kept} {'was' if kept == 1 else 'were'} up to date" if kept else ""
+    console.say(f"\n{len(done)} of {len(wanted)} steps done in {sum(one.seconds for one in done):.0f} s{up_to_date}")
+    _say_what_is_left_out(left_out)
+
+
+def _say_what_is_left_out(left_out: Sequence[LeftOut]) -> None:
+    """Say once more at the end, where it is read, which steps could not be done, those of one reason together."""
+    for why in dict.fromkeys(one.why for one in left_out):
+        targets = [one.step.target.as_posix() for one in left_out if one.why == why]
+        are = "is" if len(targets) == 1 else "are"
+        console.say(f"{len(targets)} could not be done and {are} left out, {', '.join(targets)}: {why}")
 
 
 def _known(stages: list[str], place: Place) -> list[str]:

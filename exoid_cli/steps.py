@@ -41,6 +41,14 @@ class Done:
         }
 
 
+@dataclass(frozen=True)
+class LeftOut:
+    """A step that could not be done, though it may be that what needs it does without."""
+
+    step: "Step"
+    why: str
+
+
 def bring_up_to_date(
     context: typer.Context,
     place: Place,
@@ -48,14 +56,14 @@ def bring_up_to_date(
     *,
     again: bool = False,
     before: Before = lambda step: (),
-) -> list[Done]:
-    """Do the wanted steps that are not done, or all ``again``, each after those before it; return what was done.
+) -> tuple[list[Done], list[LeftOut]]:
+    """Do the wanted steps that are not done, or all ``again``, each after those before it; return what became of them.
 
     All steps of the experiment are judged, for a step is stale where one it needs is.
     """
     from pipelines.workflow.freshness import Judge
 
-    judge, done = Judge(place.out), list[Done]()
+    judge, done, left_out = Judge(place.out), list[Done](), list[LeftOut]()
     for step in place.steps:
         judged = judge.judge(step)
         if step in wanted and (again or not judged.done):
@@ -66,9 +74,10 @@ def bring_up_to_date(
             except InputError as error:
                 if not step.may_fail:
                     raise
-                console.warn(f"{error}; {step.target.name} is left out")
+                left_out.append(LeftOut(step, str(error)))
+                console.warn(f"{error}; {step.target.as_posix()} is left out")
             judge.judge(step)
-    return done
+    return done, left_out
 
 
 def only(
@@ -77,10 +86,11 @@ def only(
     """Do what a command does that was told nothing: bring the steps of its own stages up to date, and no others."""
     wanted = place.of_stage(*stages) or [place.step(stages[0])]  # which says why there is none
     _look_before(place, wanted)
-    done = bring_up_to_date(context, place, wanted, again=again, before=before)
+    done, left_out = bring_up_to_date(context, place, wanted, again=again, before=before)
     console.emit([one.as_json() for one in done])
+    tried = [one.step for one in done] + [one.step for one in left_out]
     for step in wanted:
-        if step not in [one.step for one in done]:
+        if step not in tried:
             console.say(f"{step.target.as_posix()}: up to date; --again makes it anew")
 
 

@@ -44,7 +44,7 @@ def show_verdict(said: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
             console.note(_in_words(parameter))
     for cause in said["causes"]:
         _show_cause(cause)
-    if said["causes"]:
+    if said["causes"] and tuple(joints) == HIP_AND_KNEE:  # the gait that would be followed is a leg's
         _show_control(said["control"])
 
 

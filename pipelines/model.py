@@ -178,6 +178,12 @@ def _effect_of_rows(rows: pd.DataFrame, machine: Machine) -> Effect:
     """Return the effect that a parameters table tells of in some rows, all of one cause."""
     first = rows.iloc[0]
     joint, of = first["joint"] if isinstance(first["joint"], str) else None, effect_named(str(first["effect"]))
+    if joint not in ([None] if of.whole_leg else machine.names):
+        expected = "none: it is the whole machine's" if of.whole_leg else " or ".join(machine.names)
+        raise InputError(
+            f"the parameters table: {of.name} has the joint {joint or 'none'}, expected {expected}; correct its column "
+            "joint, or the joints in its metadata"
+        )
     each_run = bool(of.may_differ and "each_run" in rows and rows["each_run"].any())
     return of(joint=joint, on=machine, each_run=each_run)
 

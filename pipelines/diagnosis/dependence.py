@@ -15,6 +15,7 @@ from pipelines.contracts.joints import either, the
 from pipelines.diagnosis.floor import Floor
 from pipelines.diagnosis.observations import FOLDS, Run
 from pipelines.diagnosis.spline import Curve, fold_products, held_out_error
+from pipelines.diagnosis.tone import HARMONICS, _band_hz
 from pipelines.mechanics.machine import Machine
 
 LONGEST_S = 2.0
@@ -25,6 +26,8 @@ PADDING = 4
 """Of the spectrum in which a tone is sought."""
 LOWEST_HZ = 0.2
 """Below, a tone and a drift are the same."""
+MOST = 0.5
+"""Share that a tone in step with the motion must hold: a law of the motion has many lines there."""
 IMITATES = 0.5
 """Weight of the phase in the ranking: it can imitate whatever repeats, so others go first."""
 LITTLE = 0.05
@@ -151,8 +154,12 @@ def dependences(runs: Sequence[Run], residuals: Sequence[NDArray]) -> list[Depen
     for j, joint in enumerate(machine.names):
         shares = {v: variable_share(v, runs, residuals, j) for v in VARIABLES if knows(v, runs, j)}
         made = [Dependence(joint, v.name, s, _sentence(joint, machine, v.words, s)) for v, s in shares.items()]
-        frequency, share = tone(runs, [run.with_fast(r) for run, r in zip(runs, residuals, strict=True)], j)
-        words = f"a tone of {frequency:.2f} Hz that is no harmonic of the motion"
+        fast = [run.with_fast(r) for run, r in zip(runs, residuals, strict=True)]
+        frequency, share, in_step = _free_or_in_step(runs, fast, j)
+        kind = (
+            "above the motion's own band, in step with its period" if in_step else "that is no harmonic of the motion"
+        )
+        words = f"a tone of {frequency:.2f} Hz {kind}"
         made.append(Dependence(joint, "tone", share, _sentence(joint, machine, words, share)))
         found += sorted(made, key=_rank, reverse=True)
     return found
@@ -227,15 +234,38 @@ def pooled(runs: Sequence[Run], values: Sequence[NDArray], j: int) -> NDArray:
 def tone(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> tuple[float, float]:
     """Return the strongest frequency (Hz) that no period of the motion explains, and the share it foretells.
 
-    The frequency is shared by all runs' residuals (m, O), amplitude and phase are each run's own. Both are found on
-    all folds but one and judged on that one.
+    Where a harmonic of the motion's period above twice the motion's own band holds most, it is that one: a motor that
+    hums while it is recorded may do so in step.
+    """
+    return _free_or_in_step(runs, residuals, j)[:2]
+
+
+def _free_or_in_step(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> tuple[float, float, bool]:
+    """Return frequency and share of ``tone``, and whether it is in step with the motion's period."""
+    free = _tone_in(_unrepeated, LOWEST_HZ, runs, residuals, j)
+    if not any(run.motion.period_s for run in runs):
+        return (*free, False)
+    above = max(LOWEST_HZ, *(HARMONICS * _band_hz(run) for run in runs))
+    in_step = _tone_in(_repeated, above, runs, residuals, j)
+    return (*in_step, True) if in_step[1] > max(MOST, free[1]) else (*free, False)
+
+
+def _tone_in(
+    part: Callable[[Run, NDArray, NDArray], NDArray], above: float, runs: Sequence[Run], residuals: Sequence[NDArray],
+    j: int,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the strongest frequency (Hz) of a part of the residuals (m, O), and the share of all that it foretells.
+
+    The frequency is shared by all runs, amplitude and phase are each run's own. Both are found on all folds but one
+    and judged on that one.
     """
     total = error = 0.0
     found = []
     for held in range(FOLDS):
         rest = [run.usable[:, j] & (run.fold != held) for run in runs]
-        unrepeated = [_unrepeated(run, e[:, j], r) for run, e, r in zip(runs, residuals, rest, strict=True)]
-        frequency = _strongest(runs, unrepeated)
+        frequency = _strongest(
+            runs, [part(run, e[:, j], r) for run, e, r in zip(runs, residuals, rest, strict=True)], above
+        )
         found.append(frequency)
         for run, learnt, residual in zip(runs, rest, residuals, strict=True):
             judged = run.usable[:, j] & (run.fold == held)
@@ -261,8 +291,13 @@ def _unrepeated(run: Run, residual: NDArray, learnt: NDArray) -> NDArray:
     return np.where(learnt, kept - mean[place], 0.0)
 
 
-def _strongest(runs: Sequence[Run], residuals: Sequence[NDArray]) -> float:
-    """Return the frequency of the highest peak of the summed spectra."""
+def _repeated(run: Run, residual: NDArray, learnt: NDArray) -> NDArray:
+    """Return what of a residual (m,) repeats with the excitation, nought where it is not ``learnt``."""
+    return np.where(learnt, residual, 0.0) - _unrepeated(run, residual, learnt)
+
+
+def _strongest(runs: Sequence[Run], residuals: Sequence[NDArray], above: float) -> float:
+    """Return the frequency of the highest peak of the summed spectra above one, Hz."""
     width = runs[0].block.decimation / runs[0].motion.sample_rate_hz
     places = [np.round((run.time - run.time[0]) / width).astype(int) for run in runs]
     length = PADDING * (max(int(p[-1]) for p in places) + 1)
@@ -272,7 +307,7 @@ def _strongest(runs: Sequence[Run], residuals: Sequence[NDArray]) -> float:
         series[place] = residual
         power += np.abs(np.fft.rfft(series)) ** 2
     frequency = np.fft.rfftfreq(length, width)
-    return float(frequency[np.argmax(np.where(frequency > LOWEST_HZ, power, 0.0))])
+    return float(frequency[np.argmax(np.where(frequency > above, power, 0.0))])
 
 
 def excesses(runs: Sequence[Run], residuals: Sequence[NDArray], floor: Floor) -> list[Excess]:
@@ -306,7 +341,8 @@ def describe(
     if own[0].share < LITTLE:
         return (
             f"What is left at {the(joint)}{where}{',' * bool(where)} depends on nothing that was measured: neither "
-            f"motion, load and time nor a steady tone above {LOWEST_HZ:g} Hz foretells {100 * LITTLE:.0f} % of it."
+            f"motion, load and time nor a steady tone above {LOWEST_HZ:g} Hz that is no harmonic of the motion "
+            f"foretells {100 * LITTLE:.0f} % of it."
         )
     second = next((d for d in own[1:] if d.variable != "phase" and d.share > max(0.5 * own[0].share, LITTLE)), None)
     return own[0].sentence + where + "." + (f" Nearly as much: {second.sentence}." if second else "")

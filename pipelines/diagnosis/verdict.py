@@ -182,8 +182,9 @@ def _evidence(d: Diagnosis, label: str, effect: Effect, worth: float, joint: str
     before = d.without[label].errors.rms[d.baseline.joints.index(joint)]
     machine = d.baseline.machine
     others_leave = " that the other causes leave" if len(d.causes) > 1 else ""
+    taken = number(machine, worth) if worth > 0.0 else "nothing"
     sentences = [
-        f"it takes {number(machine, worth)} of {amount(machine, joint, before)} of {machine.joint(joint).effort} error "
+        f"it takes {taken} of {amount(machine, joint, before)} of {machine.joint(joint).effort} error "
         f"at {the(joint)}{others_leave} on runs no fit has seen"
     ]
     if doubt := _doubt(d, label):

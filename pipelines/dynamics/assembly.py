@@ -131,7 +131,7 @@ def _motor_inertia(effect: Effect, model: Model, geometry: Geometry) -> float:
     if isinstance(effect, Backlash):
         raise InputError(
             f"{effect.label}: the teeth that a simulation has are those of an exoskeleton's gear, too hard for a "
-            "machine of another size; leave the play out"
+            "machine of another size; simulate the model without it, as `exoid identify` writes it"
         )
     mechanism = effect.on.mechanism
     X = np.sum([term.values for term in model if isinstance(term.effect, RigidBody)], axis=0)

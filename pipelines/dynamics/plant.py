@@ -55,7 +55,7 @@ def make_plant(model: Model, geometry: Geometry, joints: tuple[Joint, ...], run:
     """Return the plant of a kind of run, or refuse a machine that cannot exist."""
     model = model.for_run(run)
     assembly = assemble(model, geometry, [joint.name for joint in joints])
-    lightest = np.linalg.eigvalsh(masses(assembly)[0]).min()
+    lightest = _lightest(assembly)
     if lightest <= 0:
         X = sum(term.values for term in model if isinstance(term.effect, RigidBody))
         mechanism = machine_of(joints, geometry).mechanism
@@ -70,6 +70,14 @@ def make_plant(model: Model, geometry: Geometry, joints: tuple[Joint, ...], run:
             f"identify again {mend}, or choose another --run"
         )
     return Plant(model, geometry, joints, run, assembly)
+
+
+def _lightest(assembly: Assembly) -> float:
+    """Return the least eigenvalue of the mass matrix at any pose, kg·m²; 0 where there is no mass to divide by."""
+    try:
+        return float(np.linalg.eigvalsh(masses(assembly)[0]).min())
+    except ZeroDivisionError:
+        return 0.0
 
 
 def plant_from_table(

@@ -18,7 +18,7 @@ class Cogging(Effect):
     equation = "tau = A sin(n q) + B cos(n q)"
     source = "Holtz, Springob (1996), IEEE Trans. Industrial Electronics 43(2); Tuttle, Seering (1996), T-RA 12(3)"
     looks_like = "residual against angle: a wave that is the same forward and backward"
-    confirm = "turn the joint slowly and evenly, plot torque against angle, and count the waves in a turn"
+    confirm = "move the joint slowly and evenly, plot torque against where it is, and count the waves"
     linear = (
         Parameter("sine", "N·m", "amplitude of sin(n q)", "A", (-4.0, 4.0)),
         Parameter("cosine", "N·m", "amplitude of cos(n q)", "B", (-4.0, 4.0)),

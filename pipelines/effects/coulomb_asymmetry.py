@@ -15,7 +15,7 @@ class CoulombAsymmetry(Effect):
     source = "Janot, Vandanjon, Gautier (2014), IEEE Trans. Control Systems Technology 22(1): the drive chain's offset"
     looks_like = "a constant while the joint moves, whichever way; at standstill it is gone"
     confirm = (
-        "move the empty joint slowly both ways through the same angles: the mean torque less gravity is the asymmetry"
+        "move the empty joint slowly both ways through the same range: the mean torque less gravity is the asymmetry"
     )
     linear = (
         Parameter("asymmetry", "N·m", "half of forward less backward Coulomb friction", "a", (-3.0, 3.0)),

@@ -15,6 +15,11 @@ CONFIRM_A_SLIDES = (
     "grows evenly along the way, where a weight's is the same everywhere"
 )
 
+CONFIRM_WITHOUT_GRAVITY = (
+    "put a spirit level on the axis first: about one that leans, gravity does nearly what a spring does; then switch "
+    "the drive off and hold the joint at several angles"
+)
+
 
 class ParallelSpring(Effect):
     """A torque in proportion to the joint's angle: a balancing spring, a cable, a cover."""
@@ -56,6 +61,8 @@ class ParallelSpring(Effect):
             return
         if self.on.joint(self.joint).kind == "prismatic":
             object.__setattr__(self, "confirm", CONFIRM_A_SLIDES)
+        elif self.on.mechanism.has_gravity is False:
+            object.__setattr__(self, "confirm", CONFIRM_WITHOUT_GRAVITY)
         if TorqueOffset.name in self.on.mechanism.absorbs:
             assert self.reported is not None
             stiffness, rest = self.reported

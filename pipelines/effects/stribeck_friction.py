@@ -16,7 +16,7 @@ class StribeckFriction(Effect):
     equation = "tau = F exp(-abs(v / vs)^d) sgn(v), d = 2 unless said"
     source = "Stribeck (1902); Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), eq. 3"
     looks_like = "a narrow peak of friction on both sides of zero speed"
-    confirm = "creep the empty joint through 0.01 to 0.3 rad/s and plot torque against speed"
+    confirm = "creep the empty joint at several speeds up to a tenth of its fastest and plot torque against speed"
     linear = (Parameter("stribeck_torque", "N·m", "friction above the Coulomb level at standstill", "F", (0.3, 6.0)),)
     shape = (
         Parameter("stribeck_velocity", "rad/s", "speed at which the excess has fallen to 1/e", "vs", (0.03, 0.8)),

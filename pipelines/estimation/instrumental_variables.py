@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pipelines.dynamics.closed_loop import closed_loop
 from pipelines.estimation.durbin_wu_hausman import DurbinWuHausman, durbin_wu_hausman
-from pipelines.estimation.estimator import Estimator, Fit, carry_of
+from pipelines.estimation.estimator import Estimator, Fit, carry_of, estimated
 from pipelines.estimation.least_squares import LEAST_NM, WeightedLeastSquares
 from pipelines.estimation.long_run import Scores
 from pipelines.estimation.normal_matrix import inverse
@@ -26,6 +26,13 @@ from pipelines.estimation.regression import Regression, by_segment, regressions,
 ITERATIONS = 20
 SETTLED = 0.01
 """Largest change of a value, in standard errors of independent blocks, at which iterations end."""
+
+SLIGHT = 0.1
+"""Of the half-width of a parameter's 95 % interval, within which a bias does not matter: the two estimates share their
+noise, so the test sees much less, but the interval about either still covers the truth 94.5 times of 100."""
+
+SLIGHT_SHARE = 0.001
+"""Of a parameter itself, likewise: no scale of a torque is known any better, however long the recording."""
 
 
 class InstrumentalVariables(Estimator):
@@ -56,7 +63,7 @@ class InstrumentalVariables(Estimator):
         test = durbin_wu_hausman(_solved(problem, itself, found.weights), found)
         settled = () if change.max() < SETTLED else (f"did not settle in {ITERATIONS} iterations; distrust its values",)
         told = {"iterations": iteration, "durbin_wu_hausman": test.as_json()}
-        return replace(found, told=told, remarks=(*settled, _sentence(test, problem.names, found.values)))
+        return replace(found, told=told, remarks=(*settled, _sentence(test, problem.names, found)))
 
 
 @dataclass(frozen=True)
@@ -118,15 +125,30 @@ def _scores(problem: Problem, rows: Sequence[_Rows], values: NDArray, weights: N
     return go_through
 
 
-def _sentence(test: DurbinWuHausman, names: Sequence[str], values: NDArray) -> str:
+def _sentence(test: DurbinWuHausman, names: Sequence[str], fit: Fit) -> str:
     among, rest = test.freedom
     numbers = f"Durbin-Wu-Hausman F({among:.0f}, {rest:.0f}) = {test.statistic:.2f}, p = {test.p_value:.2g}"
     if not test.rejects:
         return (
             f"no sign that noise in the angles biases least squares ({numbers}): weighted_least_squares serves as well"
         )
-    worst = int(np.argmax(np.abs(test.difference / test.std_error)))
+    matters = _matters(test, fit)
+    if not matters.any():
+        return (
+            f"noise in the angles shows in least squares ({numbers}) but does not matter: it moves no parameter by "
+            f"more than {100 * SLIGHT:g} % of its interval or {100 * SLIGHT_SHARE:g} % of itself; "
+            "weighted_least_squares serves as well"
+        )
+    worst = int(np.argmax(np.where(matters, np.abs(test.difference / test.std_error), 0.0)))
     return (
         f"noise in the angles biases least squares ({numbers}), {names[worst]} most: least squares has it "
-        f"{100 * test.difference[worst] / abs(values[worst]):+.1f} % off these values"
+        f"{100 * test.difference[worst] / abs(fit.values[worst]):+.1f} % off these values"
     )
+
+
+def _matters(test: DurbinWuHausman, fit: Fit) -> NDArray:
+    """Tell of each parameter whether least squares is off by enough for anybody to mind, (k,) bool."""
+    found = estimated(fit)
+    reach = found.critical * np.sqrt(np.diag(found.covariance))
+    off = np.abs(test.difference)
+    return np.asarray((off > SLIGHT * reach) & (off > SLIGHT_SHARE * np.abs(fit.values)))

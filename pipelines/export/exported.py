@@ -154,8 +154,18 @@ def exported(table: Table, run: str | None = None, default_geometry: Geometry | 
         for term in whole:
             why = _why_absent(term, run, cuffed([term.effect for term in whole]))
             (absent.append((term, left_out(why))) if why else present.append(term))
-        made = make_plant(Model(tuple(present)), geometry, machine.joints, "with_human" if run == HUMAN else run)
-    return Exported(made.model, tuple(absent), run, geometry, machine, table)
+        kind = "with_human" if run == HUMAN else run
+        acting = Model(tuple(present)).for_run(kind)
+        make_plant(_rigid(acting), geometry, machine.joints, kind)  # which refuses what cannot be
+    return Exported(acting, tuple(absent), run, geometry, machine, table)
+
+
+def _rigid(model: Model) -> Model:
+    """Return the model with rigid joints: what only a simulation cannot lay out is listed by each format, not refused.
+
+    Cuffs stay, for behind them the limb has a body of its own.
+    """
+    return Model(tuple(term for term in model if term.effect.spring is None or term.effect.at_cuff))
 
 
 def _why_absent(term: Term, run: str, has_cuffs: bool) -> str:

@@ -2,8 +2,8 @@
 
 import pytest
 
-from exoid_cli.verdict_view import _in_words, show_verdict
-from pipelines.contracts import HIP_AND_KNEE
+from exoid_cli.verdict_view import ERRORS, _in_words, show_verdict
+from pipelines.contracts import HIP_AND_KNEE, Joint
 from tests.report.sessions import verdict_of
 
 
@@ -33,3 +33,13 @@ def test_an_error_stands_beside_the_torque_that_it_is_of_and_older_files_lack_it
     knee, older = [line.split() for line in capsys.readouterr().out.splitlines() if line.startswith("knee ")][::2]
     assert knee[:3] == ["knee", "12.250", "0.272"]
     assert older[:2] == ["knee", "0.272"]
+
+
+def test_a_gait_is_told_of_a_leg_alone(capsys):
+    slide = [Joint("axis", "prismatic")]
+    errors = {key: {"axis": 0.5} for key in (*ERRORS, "unexplained")}
+    control = verdict_of()["control"] | {"reason": "the reference case is a leg's gait, with its gains and limits"}
+    show_verdict(verdict_of(**errors, control=control), slide)
+    assert "adaptive control" not in capsys.readouterr().out
+    show_verdict(verdict_of(), HIP_AND_KNEE)
+    assert "adaptive control" in capsys.readouterr().out

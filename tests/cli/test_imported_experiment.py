@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from pipelines.contracts import PARAMETERS, RECORDING
+from pipelines.errors import InputError
 
 RATE_HZ = 200.0
 
@@ -79,6 +80,23 @@ def test_a_machine_that_is_no_leg_is_not_asked_to_follow_a_gait(exoid, folder):
         2, "exoid: simulate: `exoid simulate` follows a leg's gait, and the recordings are of another machine; "
         "leave it out\n",
     )  # fmt: skip
+
+
+def test_steps_that_cannot_be_done_are_told_with_the_reason_after_the_count_of_those_that_were(
+    exoid, folder, monkeypatch
+):
+    def refuse(*words, **named):
+        raise InputError("backlash@arm: no simulation holds it; simulate the model without it")
+
+    monkeypatch.setattr("pipelines.dynamics.plant.plant_from_table", refuse)
+    outcome = exoid("run", "replay")
+    assert outcome.code == 0
+    assert outcome.out.splitlines()[-2].startswith("3 of 4 steps done in ")
+    assert outcome.out.splitlines()[-1] == (
+        "1 could not be done and is left out, simulated/replay-Monday-2.parquet: backlash@arm: no simulation holds it; "
+        "simulate the model without it"
+    )
+    assert "0 of 4 steps done in 0 s; 3 were up to date" in exoid("run", "replay").out
 
 
 def test_where_exoid_toml_is_lacking_it_is_said_that_an_empty_one_is_enough(exoid, folder):

@@ -96,6 +96,22 @@ def test_a_tone_beside_the_harmonics_is_found_with_its_frequency(runs):
     assert "3.14 Hz" in first.sentence
 
 
+def test_a_tone_in_step_with_the_motion_and_faster_than_it_is_told_as_such(runs):
+    residuals = noise(runs, np.random.default_rng(1))
+    for residual, run in zip(residuals, runs, strict=True):
+        residual[:, 0] += np.sin(2 * np.pi * 3.3 * run.time)
+    found = dependences(runs, residuals)
+    assert (found[0].joint, found[0].variable) == ("hip", "tone")
+    assert "3.30 Hz above the motion's own band, in step with its period" in found[0].sentence
+    assert "depends on nothing" not in describe(THE_LEG, found, excesses(runs, residuals, FLOOR))
+
+
+def test_a_law_of_the_motion_is_told_as_no_tone_in_step_with_it(runs):
+    for law in LAWS.values():
+        found = dependences(runs, with_law(runs, np.random.default_rng(0), law))
+        assert not any("in step with" in d.sentence for d in found)
+
+
 def test_the_description_names_joint_variable_and_kind_of_run(runs):
     residuals = with_law(runs, np.random.default_rng(2), LAWS["angle"], kinds=("with_human",))
     text = describe(THE_LEG, dependences(runs, residuals), excesses(runs, residuals, FLOOR))
@@ -105,9 +121,10 @@ def test_the_description_names_joint_variable_and_kind_of_run(runs):
 
 def test_of_noise_it_is_said_that_nothing_foretells_it(runs):
     residuals = noise(runs, np.random.default_rng(3))
-    assert "depends on nothing that was measured" in describe(
-        THE_LEG, dependences(runs, residuals), excesses(runs, residuals, FLOOR)
-    )
+    text = describe(THE_LEG, dependences(runs, residuals), excesses(runs, residuals, FLOOR))
+    assert "depends on nothing that was measured" in text
+    # Others are not looked for, so nothing is said of them.
+    assert "nor a steady tone above 0.2 Hz that is no harmonic of the motion foretells" in text
 
 
 def test_a_law_learnt_on_one_excitation_lowers_the_error_on_another(runs, fresh):

@@ -169,6 +169,7 @@ def test_a_gain_that_is_plainly_negative_is_not_called_chance(stuck):
     assert told["causes"][0]["gain"]["ci95"][1] < 0.0
     assert "which gains nothing on runs no fit has seen. With it" in told["summary"]
     assert "that is no gain: its 95 % interval lies below nought" in told["causes"][0]["evidence"]
+    assert told["causes"][0]["evidence"][0].startswith("it takes nothing of ")
     assert not any("chance" in said for said in (told["summary"], *told["causes"][0]["evidence"]))
 
 

@@ -1,17 +1,22 @@
 """What holds for every effect that is registered."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from pipelines.contracts import Joint
 from pipelines.dynamics.assembly import assemble
 from pipelines.dynamics.forward import DQ, DTHETA, accelerations, workspace
 from pipelines.effects import EFFECTS, Side
 from pipelines.effects.friction import Friction
 from pipelines.effects.outside import STATED
+from pipelines.effects.parallel_spring import ParallelSpring
 from pipelines.effects.rigid_body import RigidBody
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.machine import machine_of
 from pipelines.model import Model, Term
 from tests.effects.catalogue import SIZES, TERMS
 
@@ -201,3 +206,15 @@ def test_a_payload_is_a_point_mass(with_human):
     late = with_human.time >= 5.0
     assert not found[~late].any()
     assert_allclose(found[late], RigidBody().torque(with_human, X)[late], atol=1e-12)
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_how_to_make_sure_of_it_is_told_in_no_unit_of_one_kind_and_size_of_machine(effect):
+    assert not re.search(r"\brad|\bN·m", effect.confirm)
+
+
+def test_of_a_spring_where_gravity_is_out_a_level_is_asked_for_and_nothing_laid_on_its_side():
+    """An axis that leans lets gravity do nearly what a spring does."""
+    turntable, pendulum = (machine_of([Joint("axis")], Geometry(gravity_m_s2=g)) for g in (0.0, 9.81))
+    assert ParallelSpring("axis", on=turntable).confirm.startswith("put a spirit level on the axis first")
+    assert ParallelSpring("axis", on=pendulum).confirm == ParallelSpring.confirm

@@ -9,9 +9,10 @@ from scipy.stats import binom
 
 from pipelines.errors import InputError
 from pipelines.estimation import output_error
+from pipelines.estimation.durbin_wu_hausman import DurbinWuHausman
 from pipelines.estimation.estimator import estimated
 from pipelines.estimation.estimators import ESTIMATORS, estimator_named
-from pipelines.estimation.instrumental_variables import InstrumentalVariables
+from pipelines.estimation.instrumental_variables import InstrumentalVariables, _sentence
 from pipelines.estimation.iteratively_reweighted import IterativelyReweighted
 from pipelines.estimation.least_squares import OrdinaryLeastSquares, WeightedLeastSquares
 from pipelines.estimation.output_error import OutputError
@@ -100,6 +101,16 @@ def test_noise_in_the_angles_biases_least_squares_and_not_instrumental_variables
     (sentence,) = instruments.remarks
     assert sentence.startswith("noise in the angles biases least squares (Durbin-Wu-Hausman F(4, ")
     assert "X1 most: least squares has it -" in sentence
+
+
+@pytest.mark.parametrize(("size", "begins"), [(1e-3, "noise in the angles shows"), (1.0, "noise in the angles biases")])
+def test_a_bias_that_is_sure_and_slight_is_said_not_to_matter(noisy, size, begins):
+    """As in a long recording by a good encoder: the test sees what no interval shows."""
+    fit = InstrumentalVariables().fit(noisy)
+    off = size * np.abs(fit.values)
+    test = DurbinWuHausman(off, off / 10.0, 30.0, (4.0, 300.0), 1e-9)
+    sentence = _sentence(test, noisy.names, fit)
+    assert sentence.startswith(begins) and ("does not matter" in sentence) == (size < 1.0)
 
 
 def test_output_error_does_without_the_acceleration_that_noise_spoils(noisy):

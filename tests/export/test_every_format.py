@@ -121,6 +121,21 @@ def test_an_unknown_run_is_refused_with_those_there_are():
         exported(table_of(*LEG), "human")
 
 
+@pytest.mark.parametrize("joint", ["elbow", None])
+def test_a_joint_that_the_machine_does_not_have_is_refused_with_those_it_has(joint):
+    table = table_of(*LEG)
+    table.frame.loc[table.frame["joint"] == "knee", "joint"] = joint
+    with pytest.raises(InputError, match=rf"friction has the joint {joint or 'none'}, expected hip or knee; correct"):
+        exported(table)
+
+
+def test_two_transmissions_of_one_joint_are_listed_though_no_simulation_holds_both():
+    made = machine(*LEG, named("backlash@knee"), named("joint_elasticity@knee"))
+    degrees = {term.effect.label: holding.degree for term, holding in made.holdings(MJCF)}
+    assert (degrees["backlash@knee"], degrees["joint_elasticity@knee"]) == (Degree.NOT, Degree.EXACT)
+    assert {holding.degree for _, holding in made.holdings(JSON)} == {Degree.EXACT}
+
+
 def test_a_leg_that_cannot_be_is_refused_with_the_reason():
     body = type(LEG[0])(LEG[0].effect, np.array([1.0, 0.9, 2.0, 5.0]))
     with pytest.raises(InputError, match=r"no real leg: X2 \(X1 - X2\) = 0\.09 is not above"):

@@ -136,3 +136,19 @@ def test_a_cause_that_such_a_machine_cannot_have_is_said_to_be_left_out():
 def test_a_body_of_negative_inertia_is_refused_as_no_machine_of_its_kind(kind):
     with pytest.raises(InputError, match=r"are no real machine: X1 = -.* with the signs of torque and angle as they"):
         single(kind, times=-1.0)
+
+
+def test_play_is_held_by_json_and_listed_by_what_has_no_element_for_it():
+    """Only a simulation needs teeth: no format but MuJoCo's simulates, and that has no play."""
+    made = single("pendulum", causes={"friction": CAUSES["friction"], "backlash": {"play": 0.012}})
+    for format in FORMATS:
+        ((_, holding),) = [(t, h) for t, h in made.holdings(format) if t.effect.name == "backlash"]
+        text = "\n".join(format.write(made, "arm").values())
+        assert (holding.degree == "exactly") == (format is JSON)
+        assert "0.012" in text and (format is JSON or f"left out ({holding.how})" in text)
+
+
+@pytest.mark.parametrize(("kind", "times"), [*((kind, 0.0) for kind in SINGLES), ("pendulum", 1e-300)])
+def test_a_body_without_mass_is_refused_in_a_line(kind, times):
+    with pytest.raises(InputError, match=r"exo_alone parameters are no real machine: .* identify again"):
+        single(kind, times=times)
