@@ -429,6 +429,59 @@ def test_a_drives_log_of_a_motor_before_its_gear_leads_to_the_joint(imported, gu
     assert "integrates to" not in outcome.told
 
 
+COUNTED = {
+    "revolute": ({"counts_per_turn": "counts_per_turn = 4096", "torque_constant_nm_a": "torque_constant_nm_a = 0.1"},
+                 ("joint_reference_rad", "joint_angle_rad", 2.0 * np.pi / 4096)),
+    "prismatic": ({"counts_per_turn": "counts_per_m = 50000", "torque_constant_nm_a": "force_constant_n_a = 2.0"},
+                  ("joint_reference_m", "joint_position_m", 1.0 / 50000)),
+}  # fmt: skip
+"""What is filled in of a joint of each kind, its columns and what a count is in them."""
+
+
+@pytest.mark.parametrize("kind", COUNTED)
+def test_a_map_of_counts_imports_once_all_that_was_asked_for_is_filled_in(imported, guessed, pendulum, write_csv, kind):
+    """Set-point and speed come from the same encoder as the angle, and need what it needs."""
+    columns, (answers, (reference, angle, count)) = swinging(pendulum), COUNTED[kind]
+    counts = np.round(columns["angle"] / (2.0 * np.pi) * 4096).astype(int)
+    path = write_csv(
+        {
+            "time_us": np.round(1e6 * pendulum.time).astype(int),
+            "pos_counts": counts,
+            "ref_counts": counts + 3,
+            "speed [counts/s]": columns["velocity"] / (2.0 * np.pi) * 4096,
+            "iq_mA": np.round(1e4 * columns["torque"]),
+        }
+    )
+    text, doubts = guessed(path)
+    of = ("angle", "velocity", "reference")
+    assert {f"joint[0].{one}.{key}" for one in of for key in ("counts_per_turn", "gear_ratio")} <= doubts.keys()
+    assert "counts_per_m where it slides" in doubts["joint[0].reference.counts_per_turn"]
+    filled = text.replace('"revolute"', f'"{kind}"')
+    for key, answer in answers.items():
+        filled = filled.replace(f"# {key} =", f"{answer} #")
+    outcome = imported(path, map_text=filled)
+    assert (outcome.code, outcome.err) == (0, "")
+    frame = outcome.recording("log_train").frame
+    assert_allclose(frame[reference] - frame[angle], 3 * count, atol=1e-9)
+
+
+def test_a_set_point_in_counts_beside_an_angle_in_mm_asks_for_those_in_a_metre(guessed, pendulum, write_csv):
+    place = 40.0 * pendulum.angle
+    columns = {"t_s": pendulum.time, "pos_mm": place, "ref_counts": np.round(1e3 * place), "force_N": pendulum.torque}
+    text, doubts = guessed(write_csv(columns))
+    assert tomllib.loads(text)["joint"][0]["reference"]["unit"] == "counts"
+    assert "joint[0].reference.counts_per_m" in doubts
+
+
+def test_a_slides_current_asks_for_the_force_of_its_motor(imported, guessed, pendulum, write_csv):
+    columns = {"t_s": pendulum.time, "pos_mm": 40.0 * pendulum.angle, "motor_mA": np.round(1e3 * pendulum.torque)}
+    path = write_csv(columns)
+    text, doubts = guessed(path)
+    assert "lead_m where it turns a screw" in doubts["joint[0].torque.force_constant_n_a"]
+    filled = text.replace("# force_constant_n_a =", "force_constant_n_a = 24.0 #")
+    assert imported(path, map_text=filled).code == 0
+
+
 def test_a_motors_speed_beside_a_joints_angle_tells_the_gear(imported, guessed, pendulum, write_csv):
     columns = swinging(pendulum)
     path = write_csv(
