@@ -1,6 +1,7 @@
 """Propose a map for logs, and say what is doubtful about it."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 
 from pipelines.errors import InputError, about
 from pipelines.importing import clock
+from pipelines.importing.guess.counting import countings
 from pipelines.importing.guess.joint_table import write_joint
 from pipelines.importing.guess.joints import JointColumns, group_joints
 from pipelines.importing.guess.names import meanings
@@ -22,6 +24,8 @@ from pipelines.settings.units import UNITS
 
 TRAIN = 0.7
 """Share of a run, or of the files, to fit to."""
+MOTION = ("angle", "reference")
+"""What tells how a joint moves."""
 
 
 def propose(paths: Sequence[Path]) -> Proposal:
@@ -120,16 +124,24 @@ def _write_geometry(proposal: Proposal, joints: int) -> None:
 
 def _period(path: Path, time: TimeGuess, joints: Sequence[JointColumns]) -> float | None:
     """Return the period, s, of the motion that a file holds: as it was asked for, where that was logged."""
-    motion = [(joint.columns.get("reference") or joint.columns["angle"]).column for joint in joints]
+    names = {m.column for joint in joints for quantity, m in joint.columns.items() if quantity in MOTION}
     with about(path):
-        columns = open_source(path, SourceSettings()).load([time.column, *motion])
-    moved = [_numeric(columns[name]) for name in motion]
+        columns = open_source(path, SourceSettings()).load([time.column, *names])
+    moved = {name: _numeric(columns[name]) for name in names}
     logged = columns[time.column]
     stamps = time.stamps(whole_nanoseconds(logged) if time.unit == "iso8601" else _numeric(logged))
-    if any(values.dtype.kind not in "iuf" or len(values) != len(stamps) for values in (stamps, *moved)):
+    if any(values.dtype.kind not in "iuf" or len(values) != len(stamps) for values in (stamps, *moved.values())):
         return None
     run = _longest_run(stamps, time.unit)
-    return repeats_after(run.time_s, np.column_stack([values[run.rows].astype(float) for values in moved]))
+    here = {name: values[run.rows] for name, values in moved.items()}
+    return repeats_after(run.time_s, np.column_stack([_motion(joint, here) for joint in joints]))
+
+
+def _motion(joint: JointColumns, columns: Mapping[str, NDArray]) -> NDArray:
+    """Return how a joint was to move, or did, (n,): as its counter would tell that was never full."""
+    joint = replace(joint, columns={quantity: m for quantity, m in joint.columns.items() if quantity in MOTION})
+    quantity = "reference" if "reference" in joint.columns else "angle"
+    return countings(joint, columns)[quantity].undone(columns[joint.columns[quantity].column])
 
 
 def _write_recordings(proposal: Proposal, paths: Sequence[Path], periods: Sequence[float | None]) -> None:

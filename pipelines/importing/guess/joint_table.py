@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
 from pipelines.contracts.joints import Kind
-from pipelines.importing.counter import full_at, signed, unwrapped
+from pipelines.importing.guess.counting import Counting, countings
 from pipelines.importing.guess.joints import JointColumns
 from pipelines.importing.guess.motion import TURNS, Units, counts_in_a_turn, guess_units
 from pipelines.importing.guess.proposal import Proposal
-from pipelines.importing.guess.register import are_whole, lost_sign
+from pipelines.importing.guess.register import are_whole
 from pipelines.importing.guess.torque import TorqueFit, fit_torque
 from pipelines.importing.plausible import STRONGEST
 from pipelines.importing.sources.source import Columns
@@ -46,15 +46,9 @@ def write_joint(
     own motion tell what its torque does: others throw it about.
     """
     where = f"joint[{number}]"
-    logged = {quantity: columns[m.column].astype(float) for quantity, m in joint.columns.items()}
-    bits = {quantity: lost_sign(values) for quantity, values in logged.items()}
-    for quantity, width in bits.items():
-        if width is not None:
-            logged[quantity] = signed(logged[quantity], width, quantity, [])
-    angle, velocity = joint.columns["angle"], joint.columns.get("velocity")
-    full = full_at(logged["angle"], [turn for unit, turn in TURNS.items() if angle.unit in (None, unit)])
-    if full is not None:
-        logged["angle"] = unwrapped(logged["angle"], full, "angle", [])
+    counted = countings(joint, columns)
+    logged = {quantity: counted[quantity].undone(columns[m.column]) for quantity, m in joint.columns.items()}
+    angle, velocity, full = joint.columns["angle"], joint.columns.get("velocity"), counted["angle"].full
     round_in = next((unit for unit, turn in TURNS.items() if turn == full), None)
     units = guess_units(
         time_s, logged["angle"], angle.unit or round_in, logged.get("velocity"), velocity.unit if velocity else None
@@ -73,19 +67,15 @@ def write_joint(
         angle_rad = logged["angle"] * UNITS[units.angle].factor
         fit = fit_torque(time_s, angle_rad, logged[joint.drive]) if joint.drive else None
     of_a_motor = _write_angle(proposal, where, joint, units, logged, time_s)
-    if bits["angle"]:
-        why = f"whole numbers up to 2^{bits['angle']}, none in the middle: its sign was lost"
-        proposal.key("signed_bits", bits["angle"], why)
+    _write_counting(proposal, counted["angle"])
     _write_zero(proposal, fit if alone else None, units)
     used = [angle.column]
-    if full is not None:
-        proposal.key("wraps_at", full, "steps by so much from one row to the next: its counter was full")
     if velocity is not None:
         used.append(_write_velocity(proposal, where, joint, kind, units, of_a_motor))
     used.append(
-        _write_torque(proposal, where, joint, kind, bits, logged, fit if alone else None, constants, units.gear)
+        _write_torque(proposal, where, joint, kind, counted, logged, fit if alone else None, constants, units.gear)
     )
-    used += _write_others(proposal, where, joint, kind, units, of_a_motor)
+    used += _write_others(proposal, where, joint, kind, counted, units, of_a_motor)
     return [*used, joint.enabled] if joint.enabled else used
 
 
@@ -134,6 +124,14 @@ def _write_angle(
     if of_a_motor:
         _write_gear(proposal, "where the encoder sits on the motor")
     return of_a_motor
+
+
+def _write_counting(proposal: Proposal, counted: Counting) -> None:
+    if counted.bits is not None:
+        why = f"whole numbers up to 2^{counted.bits}, none in the middle: its sign was lost"
+        proposal.key("signed_bits", counted.bits, why)
+    if counted.full is not None:
+        proposal.key("wraps_at", counted.full, "steps by so much from one row to the next: its counter was full")
 
 
 def _write_counts(proposal: Proposal, kind: Kind, hint: str = "") -> None:
@@ -185,7 +183,7 @@ def _write_torque(
     where: str,
     joint: JointColumns,
     kind: Kind,
-    bits: Mapping[str, int | None],
+    counted: Mapping[str, Counting],
     logged: Mapping[str, NDArray],
     fit: TorqueFit | None,
     constants: Mapping[str, float],
@@ -202,9 +200,8 @@ def _write_torque(
     proposal.key(
         "column", found.column, _what_torque(found.commanded, rather), not found.commanded and "no name" not in rather
     )
-    if bits[drive]:
-        proposal.key("signed_bits", bits[drive], f"whole numbers up to 2^{bits[drive]}: its sign was lost")
-    whole = are_whole(logged[drive]) if drive == "current" else bits[drive] is not None
+    _write_counting(proposal, counted[drive])
+    whole = are_whole(logged[drive]) if drive == "current" else counted[drive].bits is not None
     _write_torque_unit(proposal, drive, found.unit, kind, logged[drive], whole, constants, gear)
     _write_torque_sign(proposal, fit)
     return found.column
@@ -298,7 +295,13 @@ def _write_torque_sign(proposal: Proposal, fit: TorqueFit | None) -> None:
 
 
 def _write_others(
-    proposal: Proposal, where: str, joint: JointColumns, kind: Kind, units: Units, of_a_motor: bool
+    proposal: Proposal,
+    where: str,
+    joint: JointColumns,
+    kind: Kind,
+    counted: Mapping[str, Counting],
+    units: Units,
+    of_a_motor: bool,
 ) -> list[str]:
     used = []
     for quantity, usual in (("reference", units.angle), ("temperature", "°C")):
@@ -315,5 +318,6 @@ def _write_others(
             # A drive is told where to go in the counts of its own encoder, and in turns of what that sits on.
             if quantity == "reference" and of_a_motor and unit == units.angle:
                 _write_gear(proposal, "where it is the motor's")
+            _write_counting(proposal, counted[quantity])
             used.append(found.column)
     return used
