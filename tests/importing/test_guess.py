@@ -284,6 +284,9 @@ def test_a_log_in_which_nothing_moves_gets_no_guess(pendulum, write_csv, capsys)
         ("motor_torque_pct", "torque", "", "%"),
         ("encoder_ticks", "angle", "", "counts"),
         ("sys_ticks", "", "", None),
+        ("xref_mm", "reference", "x", "mm"),
+        ("qdes", "reference", "", None),
+        ("reset", "", "reset", None),
         ("T_C", "temperature", "", "°C"),
         ("theta_m", "angle", "", None),
         ("q_min", "angle", "min", None),
@@ -297,6 +300,41 @@ def test_names_tell_quantity_joint_and_unit(name, quantity, joint, unit):
     assert (found.quantity, found.unit) == (quantity, unit)
     if quantity:
         assert found.joint == joint
+
+
+@pytest.mark.parametrize(
+    ("name", "joint"),
+    [("x_counts", "x"), ("motor_counts", "joint"), ("ticks", "joint"), ("Ist Inkremente", "joint"),
+     ("impulsions moteur", "joint"), ("knee_ticks", "knee"), ("points", "joint")],
+)  # fmt: skip
+def test_counts_are_an_angle_where_nothing_else_is(guessed, pendulum, write_csv, name, joint):
+    counts = np.round(1000.0 * pendulum.angle).astype(int) + 2000
+    columns = {"time_us": pendulum.time * 1e6, name: counts, "cmd_counts": counts + 1, "iq_mA": pendulum.torque}
+    text, doubts = guessed(write_csv(columns))
+    (found,) = tomllib.loads(text)["joint"]
+    assert (found["name"], found["angle"]["column"], found["angle"]["unit"]) == (joint, name, "counts")
+    assert (found["reference"]["column"], found["torque"]["column"]) == ("cmd_counts", "iq_mA")
+    assert doubts["joint[0].angle.column"] == "no name says angle, but this one is in counts"
+
+
+@pytest.mark.parametrize("name", ["adc_counts", "torque_counts", "error_counts", "loop_ticks", "sample_count"])
+def test_counts_of_something_else_are_no_angle(pendulum, write_csv, capsys, name):
+    path = write_csv({"t_s": pendulum.time, name: np.round(1000.0 * pendulum.angle), "iq_mA": pendulum.torque})
+    assert run(["import", str(path), "--guess"]) == 2
+    assert "no name of a column that changes says angle" in capsys.readouterr().err
+
+
+def test_counts_that_never_go_back_are_no_angle(pendulum, write_csv, capsys):
+    ticks = np.arange(len(pendulum.time)) * 3
+    path = write_csv({"t_s": pendulum.time, "ticks": ticks, "iq_mA": pendulum.torque})
+    assert run(["import", str(path), "--guess"]) == 2
+    assert "no name of a column that changes says angle" in capsys.readouterr().err
+
+
+def test_counts_give_way_to_a_column_that_is_called_an_angle(guessed, pendulum, write_csv):
+    counts = np.round(1000.0 * pendulum.angle).astype(int)
+    text, _ = guessed(write_csv(swinging(pendulum) | {"ticks": counts}))
+    assert tomllib.loads(text)["joint"][0]["angle"]["column"] == "angle"
 
 
 def test_a_register_without_its_sign_is_known_by_the_hole_in_its_middle():

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.importing.consistency import integral_agreement
-from pipelines.importing.guess.names import TWIN, Meaning
+from pipelines.importing.guess.names import TWIN, Meaning, in_counts
+from pipelines.importing.guess.register import are_whole
 from pipelines.importing.guess.torque import fit_torque
 from pipelines.settings.units import UNITS
 
@@ -15,6 +16,8 @@ TURNING, SLIDING = ("torque", "current", "force", "voltage"), ("force", "torque"
 """What may tell what the drive of a joint delivers, the best first."""
 OBVIOUS = 0.9
 """Share of the variance by which a velocity is known whatever its name."""
+MANY = 100.0
+"""So many counts a column goes over that is an encoder's, and no queue's."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,9 @@ def group_joints(
         if m.column != clock and m.quantity != "enabled" and _moves(columns[m.column], len(time_s))
     ]  # fmt: skip
     switches = [m for m in meanings if m.quantity == "enabled" and _switches(columns[m.column], len(time_s))]
+    told = any(found.quantity == "angle" and not found.commanded for found in usable)
+    if not told:
+        usable = [_counted(found, columns[found.column]) for found in usable]
     by_joint: dict[str, list[Meaning]] = {}
     for found in usable:
         if found.quantity == "angle" and not found.commanded:
@@ -59,10 +65,24 @@ def group_joints(
             owner = next(iter(by_joint))
         if owner is not None:
             by_joint[owner].append(found)
-    return [
+    joints = [
         replace(_joint(name, members, number, len(by_joint)), enabled=_switch(switches, name, len(by_joint) == 1))
         for number, (name, members) in enumerate(by_joint.items(), 1)
     ]
+    return joints if told else [_told_by_counts(joint) for joint in joints]
+
+
+def _counted(found: Meaning, values: NDArray) -> Meaning:
+    """Return a column as an angle where that is what it may count; what never goes back counts events, or time."""
+    known = values[np.isfinite(values)].astype(float)
+    swings = are_whole(known) and np.ptp(known) > MANY and np.any(np.diff(known) < 0.0)
+    return (in_counts(found) or found) if swings else found
+
+
+def _told_by_counts(joint: JointColumns) -> JointColumns:
+    rather = joint.why.get("angle")
+    why = "no name says angle, but this one is in counts" + (f", {rather}" if rather else "")
+    return replace(joint, why={**joint.why, "angle": why})
 
 
 def _switches(values: NDArray, rows: int) -> bool:
