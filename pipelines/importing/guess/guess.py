@@ -97,6 +97,8 @@ def _numeric(values: NDArray) -> NDArray:
     """Return a column as numbers where it holds some, whatever stands between them; infinite ones are missing."""
     if values.dtype.kind in "biu":
         return values
+    if values.dtype.kind == "m":
+        return whole_nanoseconds(values)
     found = numbers(values, "", [])
     finite = np.isfinite(found)
     return np.where(finite, found, np.nan) if finite.any() or values.dtype.kind == "f" else values
@@ -104,7 +106,7 @@ def _numeric(values: NDArray) -> NDArray:
 
 def _dates(values: NDArray) -> NDArray | None:
     """Return a column of dates as nanoseconds; None of one that is not so written."""
-    if values.dtype.kind in "biufM" or not len(values) or np.isnan(whole_nanoseconds(values[:1])).any():
+    if values.dtype.kind in "biuf" or not len(values) or np.isnan(whole_nanoseconds(values[:1])).any():
         return None
     stamps = whole_nanoseconds(values)
     return stamps if np.isfinite(stamps).all() else None
