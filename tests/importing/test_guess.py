@@ -3,6 +3,7 @@
 import json
 import re
 import tomllib
+from unittest.mock import Mock
 
 import numpy as np
 import pandas as pd
@@ -11,6 +12,7 @@ from numpy.testing import assert_allclose
 from scipy.io import savemat
 
 from exoid_cli.app import run
+from pipelines.importing.consistency import integral_agreement
 from pipelines.importing.guess.names import meaning
 from pipelines.importing.guess.register import lost_sign
 
@@ -644,3 +646,29 @@ def test_the_sign_of_a_torque_is_seen_in_any_unit_of_angle(guessed, pendulum, wr
     path = write_csv({"t": columns["time"], f"q [{unit}]": factor * columns["angle"], "tau [Nm]": -columns["torque"]})
     text, doubts = guessed(path)
     assert tomllib.loads(text)["joint"][0]["torque"]["sign"] == -1 and "joint[0].torque.sign" not in doubts
+
+
+def test_angle_and_velocity_are_found_among_hundreds_of_columns_without_names_and_soon(
+    guessed, pendulum, tmp_path, monkeypatch
+):
+    looked_at = Mock(side_effect=integral_agreement)
+    monkeypatch.setattr("pipelines.importing.guess.joints.integral_agreement", looked_at)
+    rng = np.random.default_rng(1)
+    noise = {f"c{k}": rng.normal(size=len(pendulum.time)).cumsum() for k in range(200)}
+    columns = {"time": pendulum.time} | noise | {"c77": pendulum.velocity, "c133": pendulum.angle}
+    gappy = np.where(rng.random(len(pendulum.time)) < 0.05, np.nan, pendulum.angle)
+    for number, angle in enumerate((pendulum.angle, gappy)):
+        path = tmp_path / f"log{number}.parquet"
+        pd.DataFrame(columns | {"c133": angle}).to_parquet(path)
+        joint = tomllib.loads(guessed(path)[0])["joint"][0]
+        (tmp_path / "guess.toml").unlink()
+        assert (joint["angle"]["column"], joint["velocity"]["column"]) == ("c133", "c77")
+    assert looked_at.call_count <= 2 * 100
+
+
+def test_a_refusal_of_a_log_of_thousands_of_columns_names_the_first(tmp_path, capsys):
+    path = tmp_path / "wide.csv"
+    row = ",".join(["1.5"] * 3000)
+    path.write_text(",".join(f"c{k}" for k in range(3000)) + f"\n{row}" * 40, encoding="utf-8")
+    assert run(["import", str(path), "--guess"]) == 2
+    assert "c18, c19 and 2980 more goes forward" in capsys.readouterr().err

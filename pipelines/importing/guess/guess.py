@@ -24,6 +24,8 @@ from pipelines.settings.units import UNITS
 
 TRAIN = 0.7
 """Share of a run, or of the files, to fit to."""
+MOST_NAMES = 20
+"""Columns that a refusal names."""
 MOTION = ("angle", "reference")
 """What tells how a joint moves."""
 
@@ -48,7 +50,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
             if back:
                 raise InputError(f"its clock, {back[0]!r}, runs backwards; turn the order of its rows round")
             raise InputError(
-                f"none of {', '.join(source.names)} goes forward as a clock does, over ten rows or more and at "
+                f"none of {_in_short(source.names)} goes forward as a clock does, over ten rows or more and at "
                 f"{clock.SLOWEST_HZ:g} to {clock.FASTEST_HZ:g} Hz; write the map by hand, with time.rate_hz where rows "
                 "are uniform: docs/import.md tells how"
             )
@@ -68,7 +70,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
         if not joints:
             raise InputError(
                 "no name of a column that changes says angle or position, and no column integrates to another among "
-                f"{', '.join(source.names)}; write the map by hand, docs/import.md tells how"
+                f"{_in_short(source.names)}; write the map by hand, docs/import.md tells how"
             )
     single = {name: float(v[0]) for name, v in columns.items() if len(v) == 1 and v.dtype.kind in "iuf"}
     used = {time.column}
@@ -87,6 +89,11 @@ def _refuse_other_columns(path: Path, first: Source) -> None:
             raise InputError(
                 f"has no column {', '.join(sorted(lacking))}, which {first} has; guess a map for each of both kinds"
             )
+
+
+def _in_short(names: Sequence[str]) -> str:
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return ", ".join(names[:MOST_NAMES]) + more
 
 
 def _goes_back(values: NDArray) -> bool:
