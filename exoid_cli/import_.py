@@ -69,6 +69,7 @@ def _import(files: list[Path], map_: Path, output: Path) -> None:
     from pipelines.importing.aftermath import unused
     from pipelines.settings.import_map import load_map
 
+    _refuse_the_name_of_a_recording(output)
     settings = load_map(map_)
     for left in leftovers(output) if output.is_dir() else []:
         console.warn(f"{left}: left by an import that was killed, or of one that goes on; remove it once none does")
@@ -83,6 +84,14 @@ def _import(files: list[Path], map_: Path, output: Path) -> None:
             _say(one)
     console.emit(told)
     _say_what_follows(output, [made["path"].stem for one in told for made in one["recordings"]], map_)
+
+
+def _refuse_the_name_of_a_recording(output: Path) -> None:
+    if output.suffix == ".parquet":
+        raise InputError(
+            f"-o {output}: ends as a recording's file does, expected the folder for all of them, such as "
+            f'-o {output.parent}; name = "{output.stem}" at [[recording]] in the map names one'
+        )
 
 
 def _made(files: list[Path], settings: "ImportMap", map_: Path, output: Path) -> list[dict[str, Any]]:

@@ -59,7 +59,12 @@ def closest(word: str, known: Sequence[str]) -> str | None:
 
 
 def similar_file(path: Path) -> str:
-    """Return ``did you mean ...?`` where a file of nearly that name stands in the place of one that does not exist."""
+    """Return ``did you mean ...?`` where a file of nearly that name stands in the place of one that does not exist.
+
+    Of a symbolic link that points to nothing it says that.
+    """
+    if path.is_symlink():
+        return f"it is a symbolic link to {path.readlink()}, which is not there; link it anew"
     names = [file.name for file in path.parent.iterdir()] if path.parent.is_dir() else []
     near = difflib.get_close_matches(path.name, names, 1, cutoff=0.85)  # runs of one kind are no slips of each other
     return f"did you mean {path.parent / near[0]}?" if near else ""

@@ -5,13 +5,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from pipelines.errors import InputError
+from pipelines.errors import InputError, SettingsError
 from pipelines.importing.finding import Finding, counted
 from pipelines.importing.numbers import numbers, whole_nanoseconds
 from pipelines.settings.import_map import TimeSettings
-from pipelines.settings.units import unit_named
+from pipelines.settings.units import UNITS, unit_named
 
 RESTART_S, RESTART_PERIODS, RESTART_ROWS = 1.0, 20, 20
 """A clock that steps back by more than the longer of the first two starts over, and one that stays behind for more rows
@@ -20,6 +21,10 @@ LEAD_ROWS, LEAD_PERIODS, LEAD_S = 5, 20, 0.2
 """So few rows, so long before the rest, are no part of the run."""
 REGISTERS = (2.0**16, 2.0**31, 2.0**32)
 """Where counters are full."""
+FEW = 100
+"""Stamps by which a column of text is known for one of dates."""
+LONGEST = 29
+"""Letters of a stamp that are shown: a date to the nanosecond."""
 NEAR = 0.01
 BACKWARDS = 0.9
 SLOWEST_HZ, FASTEST_HZ = 10.0, 1e4
@@ -43,11 +48,54 @@ class Run:
         return len(self.rows)
 
 
+def usual_units(step: float) -> list[str]:
+    """Return the units in which a step from one stamp to the next makes a rate that machines are sampled at."""
+    return [unit for unit in ("s", "ms", "us", "ns") if SLOWEST_HZ <= 1.0 / (step * UNITS[unit].factor) <= FASTEST_HZ]
+
+
+def refuse_another_unit(raw: NDArray, column: str, unit: str) -> None:
+    """Refuse dates (n,) whose unit is one of numbers, and numbers whose unit is that of dates.
+
+    Raises
+    ------
+    SettingsError
+        Where that is so, with the unit to set.
+    """
+    holds = _held(raw)
+    # Dates and durations that a file tells as such are whole nanoseconds too.
+    fits = {"dates": unit == "iso8601", "durations": False, "plain numbers": unit != "iso8601", "": True}[holds]
+    if fits or (raw.dtype.kind in "mM" and unit == "ns"):
+        return
+    known = raw[~pd.isna(raw)]
+    right = {"dates": ["iso8601"], "durations": ["ns"]}.get(holds) or _usual(numbers(known, column, []))
+    raise SettingsError(
+        f"{column!r} holds {holds}, the first {str(known[0])[:LONGEST]!r}, and time.unit = {unit!r} in the map says "
+        f"otherwise; set it to {' or '.join(right)}"
+    )
+
+
+def _usual(known: NDArray) -> list[str]:
+    """Return the units in which stamps (n,) that are numbers make a usual rate; all of them where in none."""
+    steps = np.diff(known)
+    steps = steps[steps > 0.0]
+    return (usual_units(float(np.median(steps))) if len(steps) else []) or ["s", "ms", "us", "ns"]
+
+
+def _held(raw: NDArray) -> str:
+    """Return what a column (n,) of stamps holds: dates, durations or plain numbers; nothing where it does not say."""
+    if raw.dtype.kind in "biufmM":
+        return {"M": "dates", "m": "durations"}.get(raw.dtype.kind, "plain numbers")
+    some = raw[~pd.isna(raw)][:FEW]
+    if np.isfinite(numbers(some, "", [])).any():
+        return "plain numbers"
+    return "dates" if np.isfinite(whole_nanoseconds(some)).any() else ""
+
+
 def stamps(raw: NDArray, settings: TimeSettings, findings: list[Finding]) -> NDArray:
     """Return time stamps (n,) as numbers in the map's unit; whole numbers stay whole, for nanoseconds since 1970 are
     more than a float64 can tell apart.
     """
-    found = whole_nanoseconds(raw) if settings.unit == "iso8601" else raw
+    found = whole_nanoseconds(raw) if settings.unit == "iso8601" or raw.dtype.kind in "mM" else raw
     return found if found.dtype.kind in "iu" else numbers(found, "time", findings)
 
 

@@ -157,6 +157,8 @@ def read_log(source: Source, settings: ImportMap, map_path: Path) -> Log:
         columns = _as_numbers(columns, set(), findings)
         return Log(source, settings.time, channels, columns, 0.0, rows, (run,), findings)
     clocks = {channel.reading.time for channel in channels} | {settings.time.column}
+    for stamped in clocks - {None}:
+        clock.refuse_another_unit(columns[str(stamped)], str(stamped), settings.time.unit)
     columns = _as_numbers(columns, clocks, findings)
     stamps = clock.stamps(columns[settings.time.column], settings.time, findings)
     origin = clock.first_stamp(stamps)

@@ -20,7 +20,8 @@ def numbers(values: NDArray, where: str, findings: list[Finding]) -> NDArray:
     """Return the values (n,) as float64, NaN where there is no number."""
     if values.dtype.kind in "biuf":
         return values.astype(float, copy=False)
-    text = pd.Series(values)
+    # As text: to pandas a date is a number of nanoseconds, and to nobody who named its column for an angle.
+    text = pd.Series(values.astype(str).astype(object) if values.dtype.kind in "mM" else values)
     if _have_thousands(text):
         findings.append(Finding(where, "commas between thousands", "read without them"))
         text = text.str.replace(",", "")
@@ -48,10 +49,13 @@ def _have_thousands(text: pd.Series) -> bool:
 def whole_nanoseconds(values: NDArray) -> NDArray:
     """Return dates written out, ``2026-01-31 12:00:00.125``, as nanoseconds (n,) int64; NaN where there is none.
 
-    Times of day without a date are those of one day.
+    Times of day without a date are those of one day, and durations are since its beginning.
     """
     if values.dtype.kind in "iuf":
         return values
+    if values.dtype.kind in "mM":
+        whole = values.astype(f"{values.dtype.kind}8[ns]").astype(np.int64)
+        return np.where(np.isnat(values), np.nan, whole) if np.isnat(values).any() else whole
     text = pd.Series(values)
     dates = pd.to_datetime(text, errors="coerce", format="ISO8601", utc=True)
     if dates.isna().all():

@@ -320,13 +320,16 @@ def load_map(path: Path) -> ImportMap:
     Raises
     ------
     SettingsError
-        Where there is no such file.
+        Where there is no such file, or it is none of a map.
     """
     if not path.exists():
         raise SettingsError(
             f"{path}: no such file; "
             + (similar_file(path) or f"`exoid import FILE... --guess --map {path}` proposes one")
         )
+    if not path.is_file():  # it is read again for its hash
+        kind = "a folder" if path.is_dir() else "a pipe or a device"
+        raise SettingsError(f"{path}: is {kind}, expected the file of a map; name that")
     return load_toml(path, ImportMap)
 
 

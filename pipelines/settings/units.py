@@ -46,6 +46,7 @@ ALIASES = {
     "degrees": "deg", "Grad": "deg", "radians": "rad", "turn": "rev", "turns": "rev", "count": "counts",
     "cnt": "counts", "cts": "counts", "ticks": "counts", "inc": "counts", "Inkr": "counts", "Inkr.": "counts",
     "Inkremente": "counts", "points": "counts", "pts": "counts", "counts/sec": "counts/s", "cnt/s": "counts/s",
+    "pulses": "counts", "Impulse": "counts", "impulsions": "counts",
     "ticks/s": "counts/s", "inc/s": "counts/s", "Inkr/s": "counts/s", "Inkr./s": "counts/s", "rps": "rev/s",
     "U/s": "rev/s", "tr/s": "rev/s", "RPM": "rpm", "1/min": "rpm", "min^-1": "rpm", "min-1": "rpm", "min⁻¹": "rpm",
     "U/min": "rpm", "tr/min": "rpm", "rev/min": "rpm", "rad/sec": "rad/s", "radps": "rad/s", "°/s": "deg/s",

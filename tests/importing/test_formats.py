@@ -2,6 +2,7 @@
 
 import json
 import sys
+import tomllib
 
 import numpy as np
 import pandas as pd
@@ -9,6 +10,7 @@ import pytest
 import scipy.io
 from numpy.testing import assert_allclose
 
+from exoid_cli.app import run
 from tests.importing.conftest import MAP
 
 
@@ -222,3 +224,71 @@ def test_a_line_of_nul_bytes_costs_its_row_wherever_it_stands(imported, pendulum
     assert (outcome.code, len(outcome.recording().frame)) == (0, 1999)
     assert r"time: 1 row with text, the first '\x00" in outcome.told
     assert f"in row {row}; taken for missing" in outcome.told
+
+
+def as_parquet(pendulum, tmp_path, time):
+    path = tmp_path / "log.parquet"
+    pd.DataFrame(pendulum.columns() | {"time": time}).to_parquet(path)
+    return path
+
+
+@pytest.mark.parametrize("zone", [None, "Europe/Rome"])
+@pytest.mark.parametrize("unit", ["iso8601", "ns"])
+def test_dates_and_durations_of_parquet_are_time(imported, pendulum, tmp_path, zone, unit):
+    since = pd.to_timedelta(pendulum.time, unit="s")
+    dates = pd.Timestamp("2025-03-30 01:59:58.000123", tz=zone) + since
+    map_text = MAP.replace('unit = "s"', f'unit = "{unit}"')
+    assert_is_the_pendulum(imported(as_parquet(pendulum, tmp_path, dates), map_text=map_text), pendulum)
+    if unit == "ns":
+        assert_is_the_pendulum(imported(as_parquet(pendulum, tmp_path, since), map_text=map_text), pendulum)
+
+
+@pytest.mark.parametrize("form", ["parquet", "csv"])
+@pytest.mark.parametrize("unit", ["s", "ms", "us"])
+def test_dates_whose_unit_is_one_of_numbers_are_refused_with_the_right_one(
+    imported, pendulum, tmp_path, write_csv, form, unit
+):
+    dates = pd.Timestamp("2025-03-30 01:59:58.000123") + pd.to_timedelta(pendulum.time, unit="s")
+    if form == "csv":
+        path = write_csv(pendulum.columns() | {"time": dates.strftime("%Y-%m-%dT%H:%M:%S.%f")})
+    else:
+        path = as_parquet(pendulum, tmp_path, dates)
+    outcome = imported(path, map_text=MAP.replace('unit = "s"', f'unit = "{unit}"'))
+    assert (outcome.code, len(outcome.err.splitlines())) == (2, 1)
+    assert "'time' holds dates, the first '2025-03-30T01:59:58.000123" in outcome.err
+    assert f"and time.unit = '{unit}' in the map says otherwise; set it to iso8601" in outcome.err
+
+
+def test_durations_whose_unit_is_another_are_refused_with_the_right_one(imported, pendulum, tmp_path):
+    outcome = imported(as_parquet(pendulum, tmp_path, pd.to_timedelta(pendulum.time, unit="s")))
+    assert outcome.code == 2 and "'time' holds durations, the first" in outcome.err
+    assert outcome.err.endswith("set it to ns\n")
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("s", 1), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
+def test_numbers_whose_unit_is_that_of_dates_are_refused_with_the_unit_of_a_usual_rate(
+    imported, pendulum, write_csv, unit, factor
+):
+    path = write_csv(pendulum.columns() | {"time": factor * pendulum.time})
+    outcome = imported(path, map_text=MAP.replace('unit = "s"', 'unit = "iso8601"'))
+    assert (outcome.code, len(outcome.err.splitlines())) == (2, 1)
+    assert "'time' holds plain numbers, the first '0.0', and time.unit = 'iso8601'" in outcome.err
+    assert outcome.err.endswith(f"set it to {unit}\n")
+
+
+def test_dates_where_an_angle_should_be_are_no_numbers(imported, pendulum, tmp_path):
+    path = tmp_path / "log.parquet"
+    dates = pd.Timestamp("2025-03-30") + pd.to_timedelta(pendulum.time, unit="s")
+    pd.DataFrame(pendulum.columns() | {"angle": dates}).to_parquet(path)
+    outcome = imported(path)
+    assert outcome.code == 2 and "with text, the first '2025-03-30" in outcome.err
+
+
+def test_a_guess_takes_dates_of_parquet_for_dates(imported, pendulum, tmp_path, capsys):
+    dates = pd.Timestamp("2025-03-30 01:59:58.000123") + pd.to_timedelta(pendulum.time, unit="s")
+    path = as_parquet(pendulum, tmp_path, dates)
+    assert run(["import", str(path), "--guess"]) == 0
+    text = capsys.readouterr().out
+    assert tomllib.loads(text)["time"] == {"column": "time", "unit": "iso8601"}
+    frame = imported(path, map_text=text).recording("log_train").frame
+    assert_allclose(np.diff(frame["time_s"]), 0.005, atol=1e-9)

@@ -3,6 +3,7 @@
 import json
 import re
 import tomllib
+from unittest.mock import Mock
 
 import numpy as np
 import pandas as pd
@@ -11,6 +12,7 @@ from numpy.testing import assert_allclose
 from scipy.io import savemat
 
 from exoid_cli.app import run
+from pipelines.importing.consistency import integral_agreement
 from pipelines.importing.guess.names import meaning
 from pipelines.importing.guess.register import lost_sign
 
@@ -284,6 +286,9 @@ def test_a_log_in_which_nothing_moves_gets_no_guess(pendulum, write_csv, capsys)
         ("motor_torque_pct", "torque", "", "%"),
         ("encoder_ticks", "angle", "", "counts"),
         ("sys_ticks", "", "", None),
+        ("xref_mm", "reference", "x", "mm"),
+        ("qdes", "reference", "", None),
+        ("reset", "", "reset", None),
         ("T_C", "temperature", "", "°C"),
         ("theta_m", "angle", "", None),
         ("q_min", "angle", "min", None),
@@ -297,6 +302,41 @@ def test_names_tell_quantity_joint_and_unit(name, quantity, joint, unit):
     assert (found.quantity, found.unit) == (quantity, unit)
     if quantity:
         assert found.joint == joint
+
+
+@pytest.mark.parametrize(
+    ("name", "joint"),
+    [("x_counts", "x"), ("motor_counts", "joint"), ("ticks", "joint"), ("Ist Inkremente", "joint"),
+     ("impulsions moteur", "joint"), ("knee_ticks", "knee"), ("points", "joint")],
+)  # fmt: skip
+def test_counts_are_an_angle_where_nothing_else_is(guessed, pendulum, write_csv, name, joint):
+    counts = np.round(1000.0 * pendulum.angle).astype(int) + 2000
+    columns = {"time_us": pendulum.time * 1e6, name: counts, "cmd_counts": counts + 1, "iq_mA": pendulum.torque}
+    text, doubts = guessed(write_csv(columns))
+    (found,) = tomllib.loads(text)["joint"]
+    assert (found["name"], found["angle"]["column"], found["angle"]["unit"]) == (joint, name, "counts")
+    assert (found["reference"]["column"], found["torque"]["column"]) == ("cmd_counts", "iq_mA")
+    assert doubts["joint[0].angle.column"] == "no name says angle, but this one is in counts"
+
+
+@pytest.mark.parametrize("name", ["adc_counts", "torque_counts", "error_counts", "loop_ticks", "sample_count"])
+def test_counts_of_something_else_are_no_angle(pendulum, write_csv, capsys, name):
+    path = write_csv({"t_s": pendulum.time, name: np.round(1000.0 * pendulum.angle), "iq_mA": pendulum.torque})
+    assert run(["import", str(path), "--guess"]) == 2
+    assert "no name of a column that changes says angle" in capsys.readouterr().err
+
+
+def test_counts_that_never_go_back_are_no_angle(pendulum, write_csv, capsys):
+    ticks = np.arange(len(pendulum.time)) * 3
+    path = write_csv({"t_s": pendulum.time, "ticks": ticks, "iq_mA": pendulum.torque})
+    assert run(["import", str(path), "--guess"]) == 2
+    assert "no name of a column that changes says angle" in capsys.readouterr().err
+
+
+def test_counts_give_way_to_a_column_that_is_called_an_angle(guessed, pendulum, write_csv):
+    counts = np.round(1000.0 * pendulum.angle).astype(int)
+    text, _ = guessed(write_csv(swinging(pendulum) | {"ticks": counts}))
+    assert tomllib.loads(text)["joint"][0]["angle"]["column"] == "angle"
 
 
 def test_a_register_without_its_sign_is_known_by_the_hole_in_its_middle():
@@ -429,6 +469,59 @@ def test_a_drives_log_of_a_motor_before_its_gear_leads_to_the_joint(imported, gu
     assert "integrates to" not in outcome.told
 
 
+COUNTED = {
+    "revolute": ({"counts_per_turn": "counts_per_turn = 4096", "torque_constant_nm_a": "torque_constant_nm_a = 0.1"},
+                 ("joint_reference_rad", "joint_angle_rad", 2.0 * np.pi / 4096)),
+    "prismatic": ({"counts_per_turn": "counts_per_m = 50000", "torque_constant_nm_a": "force_constant_n_a = 2.0"},
+                  ("joint_reference_m", "joint_position_m", 1.0 / 50000)),
+}  # fmt: skip
+"""What is filled in of a joint of each kind, its columns and what a count is in them."""
+
+
+@pytest.mark.parametrize("kind", COUNTED)
+def test_a_map_of_counts_imports_once_all_that_was_asked_for_is_filled_in(imported, guessed, pendulum, write_csv, kind):
+    """Set-point and speed come from the same encoder as the angle, and need what it needs."""
+    columns, (answers, (reference, angle, count)) = swinging(pendulum), COUNTED[kind]
+    counts = np.round(columns["angle"] / (2.0 * np.pi) * 4096).astype(int)
+    path = write_csv(
+        {
+            "time_us": np.round(1e6 * pendulum.time).astype(int),
+            "pos_counts": counts,
+            "ref_counts": counts + 3,
+            "speed [counts/s]": columns["velocity"] / (2.0 * np.pi) * 4096,
+            "iq_mA": np.round(1e4 * columns["torque"]),
+        }
+    )
+    text, doubts = guessed(path)
+    of = ("angle", "velocity", "reference")
+    assert {f"joint[0].{one}.{key}" for one in of for key in ("counts_per_turn", "gear_ratio")} <= doubts.keys()
+    assert "counts_per_m where it slides" in doubts["joint[0].reference.counts_per_turn"]
+    filled = text.replace('"revolute"', f'"{kind}"')
+    for key, answer in answers.items():
+        filled = filled.replace(f"# {key} =", f"{answer} #")
+    outcome = imported(path, map_text=filled)
+    assert (outcome.code, outcome.err) == (0, "")
+    frame = outcome.recording("log_train").frame
+    assert_allclose(frame[reference] - frame[angle], 3 * count, atol=1e-9)
+
+
+def test_a_set_point_in_counts_beside_an_angle_in_mm_asks_for_those_in_a_metre(guessed, pendulum, write_csv):
+    place = 40.0 * pendulum.angle
+    columns = {"t_s": pendulum.time, "pos_mm": place, "ref_counts": np.round(1e3 * place), "force_N": pendulum.torque}
+    text, doubts = guessed(write_csv(columns))
+    assert tomllib.loads(text)["joint"][0]["reference"]["unit"] == "counts"
+    assert "joint[0].reference.counts_per_m" in doubts
+
+
+def test_a_slides_current_asks_for_the_force_of_its_motor(imported, guessed, pendulum, write_csv):
+    columns = {"t_s": pendulum.time, "pos_mm": 40.0 * pendulum.angle, "motor_mA": np.round(1e3 * pendulum.torque)}
+    path = write_csv(columns)
+    text, doubts = guessed(path)
+    assert "lead_m where it turns a screw" in doubts["joint[0].torque.force_constant_n_a"]
+    filled = text.replace("# force_constant_n_a =", "force_constant_n_a = 24.0 #")
+    assert imported(path, map_text=filled).code == 0
+
+
 def test_a_motors_speed_beside_a_joints_angle_tells_the_gear(imported, guessed, pendulum, write_csv):
     columns = swinging(pendulum)
     path = write_csv(
@@ -553,3 +646,29 @@ def test_the_sign_of_a_torque_is_seen_in_any_unit_of_angle(guessed, pendulum, wr
     path = write_csv({"t": columns["time"], f"q [{unit}]": factor * columns["angle"], "tau [Nm]": -columns["torque"]})
     text, doubts = guessed(path)
     assert tomllib.loads(text)["joint"][0]["torque"]["sign"] == -1 and "joint[0].torque.sign" not in doubts
+
+
+def test_angle_and_velocity_are_found_among_hundreds_of_columns_without_names_and_soon(
+    guessed, pendulum, tmp_path, monkeypatch
+):
+    looked_at = Mock(side_effect=integral_agreement)
+    monkeypatch.setattr("pipelines.importing.guess.joints.integral_agreement", looked_at)
+    rng = np.random.default_rng(1)
+    noise = {f"c{k}": rng.normal(size=len(pendulum.time)).cumsum() for k in range(200)}
+    columns = {"time": pendulum.time} | noise | {"c77": pendulum.velocity, "c133": pendulum.angle}
+    gappy = np.where(rng.random(len(pendulum.time)) < 0.05, np.nan, pendulum.angle)
+    for number, angle in enumerate((pendulum.angle, gappy)):
+        path = tmp_path / f"log{number}.parquet"
+        pd.DataFrame(columns | {"c133": angle}).to_parquet(path)
+        joint = tomllib.loads(guessed(path)[0])["joint"][0]
+        (tmp_path / "guess.toml").unlink()
+        assert (joint["angle"]["column"], joint["velocity"]["column"]) == ("c133", "c77")
+    assert looked_at.call_count <= 2 * 100
+
+
+def test_a_refusal_of_a_log_of_thousands_of_columns_names_the_first(tmp_path, capsys):
+    path = tmp_path / "wide.csv"
+    row = ",".join(["1.5"] * 3000)
+    path.write_text(",".join(f"c{k}" for k in range(3000)) + f"\n{row}" * 40, encoding="utf-8")
+    assert run(["import", str(path), "--guess"]) == 2
+    assert "c18, c19 and 2980 more goes forward" in capsys.readouterr().err

@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from exoid_cli.app import run
 from pipelines.contracts import RECORDING
 from pipelines.settings.map_reference import reference
 from pipelines.settings.transmission import gain
@@ -90,6 +91,39 @@ def test_a_file_that_is_no_log_is_refused(imported, tmp_path, content, line):
 def test_a_file_that_is_not_there_is_refused(imported, tmp_path):
     assert imported(tmp_path / "log.csv").err.endswith("log.csv: no such file; check the name\n")
     assert "is a folder, expected a log or the folder of a ROS 2 bag" in imported(tmp_path).err
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="without named pipes")
+def test_a_pipe_is_refused_and_not_waited_for(imported, pendulum, write_csv, tmp_path, capsys):
+    os.mkfifo(tmp_path / "pipe.csv")
+    outcome = imported(tmp_path / "pipe.csv")
+    assert outcome.code == 2
+    assert "pipe.csv: is a pipe or a device, expected a file; write what comes out of it to one" in outcome.err
+    log, folder = str(write_csv(pendulum.columns())), str(tmp_path / "recordings")
+    assert run(["import", log, "--map", str(tmp_path / "pipe.csv"), "-o", folder]) == 2
+    assert "pipe.csv: is a pipe or a device, expected the file of a map" in capsys.readouterr().err
+
+
+def test_a_link_to_nothing_says_to_what(imported, pendulum, write_csv, tmp_path, capsys):
+    for name in ("log.csv", "map.toml.csv"):
+        (tmp_path / name).symlink_to("nowhere.csv")
+    told = "no such file; it is a symbolic link to nowhere.csv, which is not there; link it anew"
+    assert f"log.csv: {told}" in imported(tmp_path / "log.csv").err
+    log = str(write_csv(pendulum.columns(), name="other.csv"))
+    assert run(["import", log, "--map", str(tmp_path / "map.toml.csv"), "-o", str(tmp_path / "recordings")]) == 2
+    assert told in capsys.readouterr().err
+
+
+def test_a_folder_that_is_called_as_a_recordings_file_is_refused_with_what_is_meant(
+    pendulum, write_csv, tmp_path, capsys
+):
+    (tmp_path / "map.toml").write_text(MAP, encoding="utf-8")
+    where = ["--map", str(tmp_path / "map.toml"), "-o", str(tmp_path / "made" / "x.parquet")]
+    assert run(["import", str(write_csv(pendulum.columns())), *where]) == 2
+    err = capsys.readouterr().err
+    assert "x.parquet: ends as a recording's file does, expected the folder for all of them, such as -o" in err
+    assert 'name = "x" at [[recording]] in the map' in err and len(err.splitlines()) == 1
+    assert not (tmp_path / "made").exists()
 
 
 SLIPS = [

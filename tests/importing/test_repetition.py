@@ -1,5 +1,8 @@
 """A motion that repeats is known to, with its period; one that does not is taken for none."""
 
+import re
+import tomllib
+
 import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
@@ -85,6 +88,33 @@ def test_a_guess_tells_the_period_of_each_file(tmp_path, write_csv, capsys):
     told = capsys.readouterr().out.split("[[recording]]")
     assert "period_s = 8.0 " in told[1]
     assert "# period_s: no motion repeats here" in told[2]
+
+
+@pytest.mark.parametrize("wrap", [lambda counts: counts % 65536, lambda counts: (counts + 3900) % 4096])
+@pytest.mark.parametrize("name", ["angle_counts", "ref_counts"])
+def test_a_guess_looks_for_the_period_in_a_counter_that_is_counted_on(write_csv, capsys, wrap, name):
+    """With its sign lost, or full on the way, it steps where the motion does not, and by noise not in every period."""
+    rng = np.random.default_rng(5)
+    log = repeated(rng)
+    noisy = log.pop("angle_rad") + 0.003 * rng.normal(size=len(log["time"]))
+    log["angle_counts"] = log[name] = wrap(np.round(4096 / (2.0 * np.pi) * noisy).astype(int))
+    path = write_csv(log)
+    assert run(["import", str(path), "--guess"]) == 0
+    period = re.search(r"^period_s = (\S+)", capsys.readouterr().out, re.MULTILINE)
+    assert float(period[1]) == pytest.approx(8.0, rel=5e-4)
+
+
+def test_a_set_point_is_counted_on_where_its_angle_is_and_not_where_it_steps_by_a_turn(write_csv, capsys):
+    log = repeated(np.random.default_rng(6))
+    degrees = np.degrees(log.pop("angle_rad"))
+    wraps = {"angle_deg": degrees % 360.0, "ref_deg": (degrees + 1.0) % 360.0}
+    steps = {"angle_deg": degrees, "ref_deg": 360.0 * (log["time"] > 20.0)}
+    for name, columns in (("wraps.csv", wraps), ("steps.csv", steps)):
+        assert run(["import", str(write_csv(log | columns, name)), "--guess"]) == 0
+        joint = tomllib.loads(capsys.readouterr().out)["joint"][0]
+        assert [joint[quantity].get("wraps_at") for quantity in ("angle", "reference")] == (
+            [360.0, 360.0] if name == "wraps.csv" else [None, None]
+        )
 
 
 def test_an_import_whose_map_tells_no_period_says_that_the_motion_repeats(imported, write_csv):

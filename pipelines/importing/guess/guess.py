@@ -1,6 +1,7 @@
 """Propose a map for logs, and say what is doubtful about it."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 
 from pipelines.errors import InputError, about
 from pipelines.importing import clock
+from pipelines.importing.guess.counting import countings
 from pipelines.importing.guess.joint_table import write_joint
 from pipelines.importing.guess.joints import JointColumns, group_joints
 from pipelines.importing.guess.names import meanings
@@ -22,6 +24,10 @@ from pipelines.settings.units import UNITS
 
 TRAIN = 0.7
 """Share of a run, or of the files, to fit to."""
+MOST_NAMES = 20
+"""Columns that a refusal names."""
+MOTION = ("angle", "reference")
+"""What tells how a joint moves."""
 
 
 def propose(paths: Sequence[Path]) -> Proposal:
@@ -44,7 +50,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
             if back:
                 raise InputError(f"its clock, {back[0]!r}, runs backwards; turn the order of its rows round")
             raise InputError(
-                f"none of {', '.join(source.names)} goes forward as a clock does, over ten rows or more and at "
+                f"none of {_in_short(source.names)} goes forward as a clock does, over ten rows or more and at "
                 f"{clock.SLOWEST_HZ:g} to {clock.FASTEST_HZ:g} Hz; write the map by hand, with time.rate_hz where rows "
                 "are uniform: docs/import.md tells how"
             )
@@ -64,7 +70,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
         if not joints:
             raise InputError(
                 "no name of a column that changes says angle or position, and no column integrates to another among "
-                f"{', '.join(source.names)}; write the map by hand, docs/import.md tells how"
+                f"{_in_short(source.names)}; write the map by hand, docs/import.md tells how"
             )
     single = {name: float(v[0]) for name, v in columns.items() if len(v) == 1 and v.dtype.kind in "iuf"}
     used = {time.column}
@@ -85,6 +91,11 @@ def _refuse_other_columns(path: Path, first: Source) -> None:
             )
 
 
+def _in_short(names: Sequence[str]) -> str:
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return ", ".join(names[:MOST_NAMES]) + more
+
+
 def _goes_back(values: NDArray) -> bool:
     return values.dtype.kind in "iuf" and clock.runs_backwards(values.astype(float))
 
@@ -93,6 +104,8 @@ def _numeric(values: NDArray) -> NDArray:
     """Return a column as numbers where it holds some, whatever stands between them; infinite ones are missing."""
     if values.dtype.kind in "biu":
         return values
+    if values.dtype.kind == "m":
+        return whole_nanoseconds(values)
     found = numbers(values, "", [])
     finite = np.isfinite(found)
     return np.where(finite, found, np.nan) if finite.any() or values.dtype.kind == "f" else values
@@ -100,7 +113,7 @@ def _numeric(values: NDArray) -> NDArray:
 
 def _dates(values: NDArray) -> NDArray | None:
     """Return a column of dates as nanoseconds; None of one that is not so written."""
-    if values.dtype.kind in "biufM" or not len(values) or np.isnan(whole_nanoseconds(values[:1])).any():
+    if values.dtype.kind in "biuf" or not len(values) or np.isnan(whole_nanoseconds(values[:1])).any():
         return None
     stamps = whole_nanoseconds(values)
     return stamps if np.isfinite(stamps).all() else None
@@ -120,16 +133,24 @@ def _write_geometry(proposal: Proposal, joints: int) -> None:
 
 def _period(path: Path, time: TimeGuess, joints: Sequence[JointColumns]) -> float | None:
     """Return the period, s, of the motion that a file holds: as it was asked for, where that was logged."""
-    motion = [(joint.columns.get("reference") or joint.columns["angle"]).column for joint in joints]
+    names = {m.column for joint in joints for quantity, m in joint.columns.items() if quantity in MOTION}
     with about(path):
-        columns = open_source(path, SourceSettings()).load([time.column, *motion])
-    moved = [_numeric(columns[name]) for name in motion]
+        columns = open_source(path, SourceSettings()).load([time.column, *names])
+    moved = {name: _numeric(columns[name]) for name in names}
     logged = columns[time.column]
     stamps = time.stamps(whole_nanoseconds(logged) if time.unit == "iso8601" else _numeric(logged))
-    if any(values.dtype.kind not in "iuf" or len(values) != len(stamps) for values in (stamps, *moved)):
+    if any(values.dtype.kind not in "iuf" or len(values) != len(stamps) for values in (stamps, *moved.values())):
         return None
     run = _longest_run(stamps, time.unit)
-    return repeats_after(run.time_s, np.column_stack([values[run.rows].astype(float) for values in moved]))
+    here = {name: values[run.rows] for name, values in moved.items()}
+    return repeats_after(run.time_s, np.column_stack([_motion(joint, here) for joint in joints]))
+
+
+def _motion(joint: JointColumns, columns: Mapping[str, NDArray]) -> NDArray:
+    """Return how a joint was to move, or did, (n,): as its counter would tell that was never full."""
+    joint = replace(joint, columns={quantity: m for quantity, m in joint.columns.items() if quantity in MOTION})
+    quantity = "reference" if "reference" in joint.columns else "angle"
+    return countings(joint, columns)[quantity].undone(columns[joint.columns[quantity].column])
 
 
 def _write_recordings(proposal: Proposal, paths: Sequence[Path], periods: Sequence[float | None]) -> None:

@@ -9,14 +9,15 @@ from numpy.typing import NDArray
 
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
 from pipelines.contracts.joints import Kind
-from pipelines.importing.counter import full_at, signed, unwrapped
+from pipelines.importing.guess.counting import Counting, countings
 from pipelines.importing.guess.joints import JointColumns
 from pipelines.importing.guess.motion import TURNS, Units, counts_in_a_turn, guess_units
 from pipelines.importing.guess.proposal import Proposal
-from pipelines.importing.guess.register import are_whole, lost_sign
+from pipelines.importing.guess.register import are_whole
 from pipelines.importing.guess.torque import TorqueFit, fit_torque
 from pipelines.importing.plausible import STRONGEST
 from pipelines.importing.sources.source import Columns
+from pipelines.settings.transmission import TARGETS
 from pipelines.settings.units import UNITS
 
 FOLLOWS = 0.7
@@ -45,15 +46,9 @@ def write_joint(
     own motion tell what its torque does: others throw it about.
     """
     where = f"joint[{number}]"
-    logged = {quantity: columns[m.column].astype(float) for quantity, m in joint.columns.items()}
-    bits = {quantity: lost_sign(values) for quantity, values in logged.items()}
-    for quantity, width in bits.items():
-        if width is not None:
-            logged[quantity] = signed(logged[quantity], width, quantity, [])
-    angle, velocity = joint.columns["angle"], joint.columns.get("velocity")
-    full = full_at(logged["angle"], [turn for unit, turn in TURNS.items() if angle.unit in (None, unit)])
-    if full is not None:
-        logged["angle"] = unwrapped(logged["angle"], full, "angle", [])
+    counted = countings(joint, columns)
+    logged = {quantity: counted[quantity].undone(columns[m.column]) for quantity, m in joint.columns.items()}
+    angle, velocity, full = joint.columns["angle"], joint.columns.get("velocity"), counted["angle"].full
     round_in = next((unit for unit, turn in TURNS.items() if turn == full), None)
     units = guess_units(
         time_s, logged["angle"], angle.unit or round_in, logged.get("velocity"), velocity.unit if velocity else None
@@ -72,19 +67,15 @@ def write_joint(
         angle_rad = logged["angle"] * UNITS[units.angle].factor
         fit = fit_torque(time_s, angle_rad, logged[joint.drive]) if joint.drive else None
     of_a_motor = _write_angle(proposal, where, joint, units, logged, time_s)
-    if bits["angle"]:
-        why = f"whole numbers up to 2^{bits['angle']}, none in the middle: its sign was lost"
-        proposal.key("signed_bits", bits["angle"], why)
+    _write_counting(proposal, counted["angle"])
     _write_zero(proposal, fit if alone else None, units)
     used = [angle.column]
-    if full is not None:
-        proposal.key("wraps_at", full, "steps by so much from one row to the next: its counter was full")
     if velocity is not None:
-        used.append(_write_velocity(proposal, where, joint, units, of_a_motor))
+        used.append(_write_velocity(proposal, where, joint, kind, units, of_a_motor))
     used.append(
-        _write_torque(proposal, where, joint, kind, bits, logged, fit if alone else None, constants, units.gear)
+        _write_torque(proposal, where, joint, kind, counted, logged, fit if alone else None, constants, units.gear)
     )
-    used += _write_others(proposal, where, joint, units)
+    used += _write_others(proposal, where, joint, kind, counted, units, of_a_motor)
     return [*used, joint.enabled] if joint.enabled else used
 
 
@@ -128,12 +119,28 @@ def _write_angle(
     proposal.key("unit", units.angle, f"{units.why}; {far}" if too_far else units.why, units.sure and not too_far)
     if units.angle == "counts":
         of = units.velocity and counts_in_a_turn(time_s, logged["angle"], logged["velocity"], units.velocity)
-        hint = f"; by the velocity {of:.4g} in a turn of what that is of" if of else ""
-        proposal.unknown("counts_per_turn", f"counts in a turn of what the encoder sits on, from its data sheet{hint}")
+        _write_counts(proposal, "revolute", f"; by the velocity {of:.4g} in a turn of what that is of" if of else "")
     of_a_motor = units.angle == "counts" or too_far
     if of_a_motor:
         _write_gear(proposal, "where the encoder sits on the motor")
     return of_a_motor
+
+
+def _write_counting(proposal: Proposal, counted: Counting) -> None:
+    if counted.bits is not None:
+        why = f"whole numbers up to 2^{counted.bits}, none in the middle: its sign was lost"
+        proposal.key("signed_bits", counted.bits, why)
+    if counted.full is not None:
+        proposal.key("wraps_at", counted.full, "steps by so much from one row to the next: its counter was full")
+
+
+def _write_counts(proposal: Proposal, kind: Kind, hint: str = "") -> None:
+    """Ask for what leads from counts to a joint."""
+    if kind == "prismatic":
+        proposal.unknown("counts_per_m", "counts in a metre, from the encoder's data sheet")
+        return
+    why = "counts in a turn of what the encoder sits on, from its data sheet"
+    proposal.unknown("counts_per_turn", f"{why}{hint}; counts_per_m where it slides")
 
 
 def _write_gear(proposal: Proposal, where: str = "from its data sheet", ratio: float = 1.0) -> None:
@@ -155,11 +162,15 @@ def _write_zero(proposal: Proposal, fit: TorqueFit | None, units: Units) -> None
         )
 
 
-def _write_velocity(proposal: Proposal, where: str, joint: JointColumns, units: Units, of_a_motor: bool) -> str:
+def _write_velocity(
+    proposal: Proposal, where: str, joint: JointColumns, kind: Kind, units: Units, of_a_motor: bool
+) -> str:
     column = joint.columns["velocity"].column
     proposal.table("[joint.velocity]", f"{where}.velocity")
     proposal.key("column", column, joint.why.get("velocity", ""), "no name" not in joint.why.get("velocity", ""))
     proposal.key("unit", units.velocity, units.velocity_why, units.velocity_sure)
+    if UNITS[units.velocity].dimension == "counts per second":
+        _write_counts(proposal, kind)
     if units.velocity_sign < 0:
         proposal.key("sign", -1, "it counts the other way than the angle", sure=False)
     if of_a_motor or units.gear != 1.0:
@@ -172,7 +183,7 @@ def _write_torque(
     where: str,
     joint: JointColumns,
     kind: Kind,
-    bits: Mapping[str, int | None],
+    counted: Mapping[str, Counting],
     logged: Mapping[str, NDArray],
     fit: TorqueFit | None,
     constants: Mapping[str, float],
@@ -189,9 +200,8 @@ def _write_torque(
     proposal.key(
         "column", found.column, _what_torque(found.commanded, rather), not found.commanded and "no name" not in rather
     )
-    if bits[drive]:
-        proposal.key("signed_bits", bits[drive], f"whole numbers up to 2^{bits[drive]}: its sign was lost")
-    whole = are_whole(logged[drive]) if drive == "current" else bits[drive] is not None
+    _write_counting(proposal, counted[drive])
+    whole = are_whole(logged[drive]) if drive == "current" else counted[drive].bits is not None
     _write_torque_unit(proposal, drive, found.unit, kind, logged[drive], whole, constants, gear)
     _write_torque_sign(proposal, fit)
     return found.column
@@ -226,7 +236,7 @@ def _write_torque_unit(
         proposal.unknown("gain_n_v" if kind == "prismatic" else "gain_nm_v", _what_a_volt_does(kind, constants))
     elif dimension == "current" or (not named and (drive == "current" or whole)):
         proposal.key("unit", *((named, "its name says so") if named else _unit_of_current(whole)))
-        proposal.unknown("torque_constant_nm_a", "of the motor, from its data sheet")
+        _write_motor_constant(proposal, kind)
         _write_gear(proposal, ratio=gear)
     elif dimension == "force" and kind == "revolute":
         proposal.unknown("unit", f"{named} are of a force, and what turns a joint is a torque: is it another column?")
@@ -234,6 +244,15 @@ def _write_torque_unit(
         proposal.key("unit", *_unit_of_torque(named, kind, values))
         if dimension == "torque" and kind == "prismatic":
             proposal.unknown("lead_m", "travel for a turn of the screw, from its data sheet")
+
+
+def _write_motor_constant(proposal: Proposal, kind: Kind) -> None:
+    """Ask for what leads from a motor's current to its joint."""
+    why = "of the motor, from its data sheet"
+    if kind == "prismatic":
+        proposal.unknown("force_constant_n_a", f"{why}; torque_constant_nm_a and lead_m where it turns a screw")
+    else:
+        proposal.unknown("torque_constant_nm_a", f"{why}; force_constant_n_a where it slides")
 
 
 def _unit_of_current(whole: bool) -> tuple[str, str, bool]:
@@ -275,14 +294,30 @@ def _write_torque_sign(proposal: Proposal, fit: TorqueFit | None) -> None:
         proposal.key("sign", 1, "inertia and friction disagree about it", sure=False)
 
 
-def _write_others(proposal: Proposal, where: str, joint: JointColumns, units: Units) -> list[str]:
+def _write_others(
+    proposal: Proposal,
+    where: str,
+    joint: JointColumns,
+    kind: Kind,
+    counted: Mapping[str, Counting],
+    units: Units,
+    of_a_motor: bool,
+) -> list[str]:
     used = []
-    for quantity, unit in (("reference", units.angle), ("temperature", "°C")):
+    for quantity, usual in (("reference", units.angle), ("temperature", "°C")):
         if quantity in joint.columns:
             found = joint.columns[quantity]
             proposal.table(f"[joint.{quantity}]", f"{where}.{quantity}")
             proposal.key("column", found.column, joint.why.get(quantity, ""))
-            named = found.unit is not None and UNITS[found.unit].dimension == UNITS[unit].dimension
-            proposal.key("unit", found.unit if named else unit, "its name says so" if named else "as is usual", named)
+            fits = (TARGETS[quantity][kind], "counts")
+            named = found.unit is not None and UNITS[found.unit].dimension in fits
+            unit = found.unit if found.unit is not None and named else usual
+            proposal.key("unit", unit, "its name says so" if named else "as is usual", named)
+            if unit == "counts":
+                _write_counts(proposal, kind)
+            # A drive is told where to go in the counts of its own encoder, and in turns of what that sits on.
+            if quantity == "reference" and of_a_motor and unit == units.angle:
+                _write_gear(proposal, "where it is the motor's")
+            _write_counting(proposal, counted[quantity])
             used.append(found.column)
     return used

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.importing.consistency import integral_agreement
-from pipelines.importing.guess.names import TWIN, Meaning
+from pipelines.importing.consistency import integral_agreement, likeliest_integrals
+from pipelines.importing.guess.names import TWIN, Meaning, in_counts
+from pipelines.importing.guess.register import are_whole
 from pipelines.importing.guess.torque import fit_torque
 from pipelines.settings.units import UNITS
 
@@ -15,6 +16,10 @@ TURNING, SLIDING = ("torque", "current", "force", "voltage"), ("force", "torque"
 """What may tell what the drive of a joint delivers, the best first."""
 OBVIOUS = 0.9
 """Share of the variance by which a velocity is known whatever its name."""
+FEW_PAIRS = 400
+"""So many pairs of columns are looked at one by one: twenty columns, each with each."""
+MANY = 100.0
+"""So many counts a column goes over that is an encoder's, and no queue's."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,9 @@ def group_joints(
         if m.column != clock and m.quantity != "enabled" and _moves(columns[m.column], len(time_s))
     ]  # fmt: skip
     switches = [m for m in meanings if m.quantity == "enabled" and _switches(columns[m.column], len(time_s))]
+    told = any(found.quantity == "angle" and not found.commanded for found in usable)
+    if not told:
+        usable = [_counted(found, columns[found.column]) for found in usable]
     by_joint: dict[str, list[Meaning]] = {}
     for found in usable:
         if found.quantity == "angle" and not found.commanded:
@@ -59,10 +67,24 @@ def group_joints(
             owner = next(iter(by_joint))
         if owner is not None:
             by_joint[owner].append(found)
-    return [
+    joints = [
         replace(_joint(name, members, number, len(by_joint)), enabled=_switch(switches, name, len(by_joint) == 1))
         for number, (name, members) in enumerate(by_joint.items(), 1)
     ]
+    return joints if told else [_told_by_counts(joint) for joint in joints]
+
+
+def _counted(found: Meaning, values: NDArray) -> Meaning:
+    """Return a column as an angle where that is what it may count; what never goes back counts events, or time."""
+    known = values[np.isfinite(values)].astype(float)
+    swings = are_whole(known) and np.ptp(known) > MANY and np.any(np.diff(known) < 0.0)
+    return (in_counts(found) or found) if swings else found
+
+
+def _told_by_counts(joint: JointColumns) -> JointColumns:
+    rather = joint.why.get("angle")
+    why = "no name says angle, but this one is in counts" + (f", {rather}" if rather else "")
+    return replace(joint, why={**joint.why, "angle": why})
 
 
 def _switches(values: NDArray, rows: int) -> bool:
@@ -110,12 +132,8 @@ def _by_behaviour(usable: Sequence[Meaning], columns: Mapping[str, NDArray], tim
     # Of a single sine the angle integrates to the velocity too, but with the other sign.
     pairs = [
         (agreement.explained, angle, velocity)
-        for angle in usable
-        for velocity in usable
-        if angle is not velocity
-        and not angle.quantity
-        and velocity.quantity in ("", "velocity")
-        and (agreement := integral_agreement(time_s, _float(columns, angle), _float(columns, velocity))) is not None
+        for angle, velocity in _pairs(usable, columns, time_s)
+        if (agreement := integral_agreement(time_s, _float(columns, angle), _float(columns, velocity))) is not None
         and agreement.slope > 0.0
     ]
     best = max(pairs, key=lambda pair: pair[0], default=None)
@@ -130,6 +148,18 @@ def _by_behaviour(usable: Sequence[Meaning], columns: Mapping[str, NDArray], tim
     }
     joint = replace(found, columns={**found.columns, "angle": angle, "velocity": velocity}, why={**found.why, **why})
     return [joint if joint.drive else _with_a_torque(joint, [m for m in rest if not m.quantity], columns, time_s)]
+
+
+def _pairs(usable: Sequence[Meaning], columns: Mapping[str, NDArray], time_s: NDArray) -> list[tuple[Meaning, Meaning]]:
+    """Return every pair of columns that may be angle and velocity; of many columns the likeliest pairs."""
+    angles = [m for m in usable if not m.quantity]
+    velocities = [m for m in usable if m.quantity in ("", "velocity")]
+    if len(angles) * len(velocities) <= FEW_PAIRS:
+        found = [(angle, velocity) for angle in angles for velocity in velocities]
+    else:
+        logged = ([_float(columns, m) for m in members] for members in (angles, velocities))
+        found = [(angles[i], velocities[j]) for i, j in likeliest_integrals(time_s, *logged)]
+    return [(angle, velocity) for angle, velocity in found if angle is not velocity]
 
 
 def _with_a_torque(

@@ -3,7 +3,7 @@
 import re
 import unicodedata
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pipelines.importing.guess.unit_in_name import BRACKETS, QUANTITIES, UnitInName, unit_in
 from pipelines.settings.units import UNITS
@@ -47,6 +47,11 @@ SOMETHING_ELSE = _words(
     "batterie versorgung ecart erreur etat"
 )
 """Words that make of a torque or a position something else."""
+TALLIES = _words(
+    "adc dac pwm tick cycle loop step sample frame packet message msg rx tx timer sys system cpu index fifo buffer "
+    "queue missed lost dropped crc zyklus takt"
+)
+"""Words of what is counted, or told in counts, and is no angle."""
 NOISE = _words(
     "joint joints axis motor drive epos j m data value values log state states of in raw abs absolute wrapped "
     "present averaged rms arms aeff gelenk achse antrieb abtrieb wert mot moteur axe articulation de du la le en"
@@ -61,6 +66,7 @@ TWIN = re.compile(r"#\d+$")
 UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"})
 SYMBOLS = _words("q qm th phi")
 """Of an angle, but also of an axis of a motor's current, ``i_q``."""
+AXES = _words("x y z")
 SIGNS = _words("n v w s f")
 """Formula signs, which are no joint's name where a unit says what they stand for: ``n (1/min)``."""
 DIMENSIONS = {
@@ -119,8 +125,23 @@ def meaning(name: str) -> Meaning:
     elif commanded and quantity in ("angle", ""):
         quantity = "reference"
     unit = told.unit if told and told.unit and UNITS[told.unit].dimension in DIMENSIONS.get(quantity, ()) else None
-    joint = "_".join(JOINTS.get(word, word) for word in words if word not in KNOWN)
-    return Meaning(name, quantity, joint, unit, commanded, bool(said & FILTERED), bool(said & MEASURED))
+    return Meaning(name, quantity, _joint(words), unit, commanded, bool(said & FILTERED), bool(said & MEASURED))
+
+
+def in_counts(found: Meaning) -> Meaning | None:
+    """Return a column as an angle where its name says nothing but that it is in counts; None where it says else."""
+    told = unit_in(TWIN.sub("", found.column))
+    if found.quantity or told is None or told.unit != "counts":
+        return None
+    words = [word for word in _split(told.rest) if word not in SIGNS]
+    if set(words) & (SOMETHING_ELSE | TALLIES) or _quantity(set(words)):
+        return None
+    return replace(found, quantity="angle", joint=_joint(words), unit="counts")
+
+
+def _joint(words: Iterable[str]) -> str:
+    """Return what words leave of a name that others know all of: the joint's."""
+    return "_".join(JOINTS.get(word, word) for word in words if word not in KNOWN)
 
 
 def _quantity(words: set[str]) -> str:
@@ -165,6 +186,8 @@ def _words_in(bracket: re.Match[str]) -> str:
 
 def _apart(word: str) -> list[str]:
     """Return the parts of a compound whose last is known, and whose first is or leaves no doubt about the last."""
+    if word not in KNOWN and word[:-3] in SYMBOLS | AXES and word[-3:] in COMMANDED:
+        return [word[:-3], word[-3:]]  # xref
     if word in KNOWN or len(word) < 6:
         return [word]
     if word.endswith("s") and word[:-1] in KNOWN:

@@ -44,9 +44,7 @@ def guess_time(meanings: Sequence[Meaning], columns: Mapping[str, NDArray], date
     for found in sorted(candidates, key=lambda meaning: meaning.unit is None):
         values = columns[found.column].astype(float)
         step = _step(values, found in coarse)
-        fitting = [
-            u for u in ("s", "ms", "us", "ns") if clock.SLOWEST_HZ <= 1.0 / (step * UNITS[u].factor) <= clock.FASTEST_HZ
-        ]
+        fitting = clock.usual_units(step)
         unit = found.unit if found.unit and UNITS[found.unit].dimension == "time" else None
         unit = "iso8601" if found.column in dates else unit
         if unit is None and not fitting:

@@ -54,8 +54,8 @@ def fit_torque(time_s: NDArray, angle_rad: NDArray, torque: NDArray) -> TorqueFi
     Y = np.column_stack([ddq, np.tanh(dq / slow), np.sin(at), np.cos(at), np.ones_like(at)])[regular]
     tau = mean[regular]
     # Little motion makes cos q a constant: the shortest of all solutions then shares it between both.
-    a, b, c, d, _ = np.linalg.lstsq(Y, tau, rcond=1e-8)[0]
-    residual = tau - Y @ np.linalg.lstsq(Y, tau, rcond=1e-8)[0]
+    a, b, c, d, e = np.linalg.lstsq(Y, tau, rcond=1e-8)[0]
+    residual = tau - Y @ np.array([a, b, c, d, e])
     gravity = Y[:, 2:4] @ np.array([c, d])
     return TorqueFit(
         explained=1.0 - float(np.var(residual) / np.var(tau)),

@@ -37,6 +37,8 @@ def open_source(path: Path, settings: SourceSettings) -> Source:
         if not (path / "metadata.yaml").exists():
             raise InputError("is a folder, expected a log or the folder of a ROS 2 bag; name a file in it")
         return _with_columns(open_rosbag(path, settings))
+    if not path.is_file():  # it is read more than once, and what nobody writes to is waited for without end
+        raise InputError("is a pipe or a device, expected a file; write what comes out of it to one, and name that")
     with open(path, "rb") as file:
         start = file.read(64)
     if not start:

@@ -73,9 +73,9 @@ def _unnested(table: pa.Table) -> pa.Table:
 
 
 def _numpy(column: pa.ChunkedArray) -> NDArray:
-    """Return the values; instants and durations as whole nanoseconds."""
+    """Return the values; instants and durations to the nanosecond."""
     if pa.types.is_timestamp(column.type):
-        column = column.cast(pa.timestamp("ns", column.type.tz)).cast(pa.int64())
+        column = column.cast(pa.timestamp("ns", column.type.tz))
     elif pa.types.is_duration(column.type):
-        column = column.cast(pa.duration("ns")).cast(pa.int64())
+        column = column.cast(pa.duration("ns"))
     return column.to_numpy()
