@@ -92,7 +92,7 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
     effects = [term.effect for term in terms]
     joint = np.array([joints.index(e.joint) if e.joint else -1 for e in effects], dtype=np.int64)
     sprung = np.full(len(joints), -1, dtype=np.int64)
-    motor_inertia = np.zeros(len(joints))
+    inertias = np.zeros(len(joints))
     for i, effect in enumerate(effects):
         if effect.spring is None:
             continue
@@ -103,7 +103,7 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
             )
         if sprung[joint[i]] >= 0:
             raise InputError(f"{effect.joint}: {effect.name} is a second transmission; a joint has one at most")
-        sprung[joint[i]], motor_inertia[joint[i]] = i, _motor_inertia(effect, model, geometry)
+        sprung[joint[i]], inertias[joint[i]] = i, motor_inertia(effect, model, geometry)
     return Assembly(
         joints=len(joints),
         bounds=np.searchsorted([_group(e, cuffed(effects)) for e in effects], np.arange(5)).astype(np.int64),
@@ -118,13 +118,13 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
         state_at=_offsets([e.states for e in effects]),
         sensed_at=_offsets([e.reading_states for e in effects]),
         sprung=sprung,
-        motor_inertia=motor_inertia,
+        motor_inertia=inertias,
         cuffed=cuffed(effects),
         geometry=geometry.array(),
     )
 
 
-def _motor_inertia(effect: Effect, model: Model, geometry: Geometry) -> float:
+def motor_inertia(effect: Effect, model: Model, geometry: Geometry) -> float:
     """Return what stays with the motor where its joint is not rigid, kg·m²; kg at a prismatic joint."""
     if effect.on.is_exoskeleton:
         return effect.motor_inertia

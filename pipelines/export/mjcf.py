@@ -10,6 +10,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from pipelines.contracts import Joint
+from pipelines.dynamics.assembly import motor_inertia
 from pipelines.effects.joint_elasticity import DAMPING_RATIO
 from pipelines.export.bodies import Body, bodies
 from pipelines.export.exported import Exported
@@ -19,6 +20,7 @@ from pipelines.export.language import one_line, unique
 from pipelines.export.xml_text import document, number, numbers
 from pipelines.model import Term
 
+OFF_CENTRE_M = 0.01
 TIMESTEP_S = 0.001
 
 
@@ -76,7 +78,10 @@ def _body(parent: ET.Element, name: str, twist: str, body: Body, exported: Expor
     if soft:
         ET.SubElement(made, "joint", {"name": twist} | hinge | soft)
     inertia = numbers(*[body.inertia] * 3)
-    centre = numbers(body.forward, 0.0, -body.down)
+    # Two slides of a body that is centred at their frame MuJoCo takes for independent. Where a slide's centre is, its
+    # motion does not ask.
+    aside = OFF_CENTRE_M if soft and body.joint.kind == "prismatic" else 0.0
+    centre = numbers(body.forward + aside, 0.0, -body.down)
     ET.SubElement(made, "inertial", pos=centre, mass=number(body.mass), diaginertia=inertia)
     end = numbers(0.0, 0.0, 0.0, 0.0, 0.0, -exported.geometry.thigh_length_m)
     ET.SubElement(made, "geom", type="capsule", size="0.03", fromto=end, contype="0", conaffinity="0")
@@ -108,7 +113,9 @@ def _joint(body: Body, exported: Exported) -> dict[str, str]:
     if any(damping):
         says["damping"] = numbers(*damping) if damping[1] else number(damping[0])
     rotor, soft = exported.of("rotor_inertia", name), exported.of("joint_elasticity", name)
-    armature = (rotor.values[0] if rotor else 0.0) + (soft.effect.motor_inertia if soft else 0.0)
+    armature = rotor.values[0] if rotor else 0.0
+    if soft:
+        armature += motor_inertia(soft.effect, exported.model, exported.geometry)
     return says | ({"armature": number(armature)} if armature else {})
 
 

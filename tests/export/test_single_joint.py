@@ -67,6 +67,19 @@ def test_every_mechanism_is_tried():
 
 
 @each
+def test_mujoco_swings_its_link_behind_a_soft_joint_as_ours_does(kind, instants):
+    """What stays with the motor goes with the machine's own inertia, not with an exoskeleton's."""
+    soft = {"friction": {"coulomb": 0.0, "viscous": 0.3}, "joint_elasticity": {"stiffness": 90.0, "hardening": 0.0}}
+    made = single(kind, causes=soft)
+    random = np.random.default_rng(5)
+    twist, drive = random.uniform(-0.05, 0.05, (30, 1)), random.uniform(-3.0, 3.0, (30, 1))
+    motor, link = acceleration(made, instants, drive, twist)
+    found = simulated(made, instants, drive, [(f"{NAME}_twist", -twist[:, 0])])
+    agree(found[:, :1], motor, 1e-6)
+    agree(found.sum(axis=1, keepdims=True), link, 1e-6)
+
+
+@each
 def test_mujoco_moves_it_as_ours_does(kind, instants):
     made = single(kind)
     drive = torque(made, instants)
