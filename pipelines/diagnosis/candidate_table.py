@@ -117,24 +117,23 @@ def _too_little(extra: str, more: float) -> str:
     return f"{extra} adds too little beside what is named: {why}"
 
 
+def _barred(d: Diagnosis, labels: tuple[str, ...]) -> str:
+    """Return why a set could not be named whatever it explains; empty where it could."""
+    if why := d.choice.absurd.get(labels):
+        return f"no machine or person has it as it was fitted: {why}"
+    if labels in d.choice.shadows:
+        return "its rhythm is a multiple of the motion's own, and takes what its other causes leave or little"
+    return ""
+
+
 def _judged(d: Diagnosis, labels: tuple[str, ...], score: float, more: float | None) -> tuple[str, str]:
     best = d.choice.named
     if d.causes and labels == best.labels:
         return "named", "it earned its place: nothing smaller explains as much, nothing larger enough more"
     if labels in d.choice.refuted:
         return "rejected", "it explains the train runs about as well as anything does, and fails on validation runs"
-    if labels in d.choice.absurd:
-        return "rejected", (
-            "as it was fitted no machine or person has it: an amplitude is beyond any, or an excess stands over "
-            "friction that gives energy"
-        )
-    if labels in d.choice.shadows:
-        return (
-            "rejected",
-            "its rhythm is a multiple of the motion's own, and takes what its other causes leave or little",
-        )
     if not d.causes:
-        return "rejected", (
+        return "rejected", _barred(d, labels) or (
             f"it gains {score:.1f} in log likelihood; a cause must gain {NEEDED:g}, take away a material share of a "
             "joint's error, and hold up on validation runs"
         )
@@ -144,6 +143,8 @@ def _judged(d: Diagnosis, labels: tuple[str, ...], score: float, more: float | N
             rivals = set(labels) - rest
             if rest <= set(labels) and len(rivals) == 1 and next(iter(rivals)) in d.alike(label):
                 return "indistinguishable", f"it explains these data as well as {label} does"
+    if barred := _barred(d, labels):
+        return "rejected", barred
     if more is not None:
         return "rejected", _too_little(" and ".join(sorted(set(labels) - set(best.labels))), more)
     return (

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from pipelines.diagnosis.bank import Bank
 from pipelines.diagnosis.candidates import Candidate
 from pipelines.diagnosis.fit import Fit, fit, refined, residuals_on
 from pipelines.diagnosis.floor import MOST_INDEPENDENT, Floor, independent_share
-from pipelines.diagnosis.freer_form import AS_RIVAL, FreerForm, freed, in_form
+from pipelines.diagnosis.freer_form import AS_RIVAL, FreerForm, freeable, in_form
 from pipelines.diagnosis.perceived import heard_in
 from pipelines.diagnosis.rhythm import shadows_motion
 from pipelines.diagnosis.search import Scored, Scorer, cost, known_besides, log_likelihood, search
@@ -64,14 +64,12 @@ class Choice:
     """
     freer: Fit | None = None
     """The named set in the best of its freer forms, a cause in two shapes or bent, where one was tried."""
-    twice: float = -np.inf
-    """Log likelihood of the named set with one of its causes in two shapes at once, where that was tried."""
     refuted: frozenset[tuple[str, ...]] = frozenset()
     """Sets that explain the training runs and fail on others."""
     shadows: frozenset[tuple[str, ...]] = frozenset()
     """Sets in which a rhythm of the motion's own takes what other causes leave, or little of all."""
-    absurd: frozenset[tuple[str, ...]] = frozenset()
-    """Sets that no machine or person can have as they were fitted. Some other form of them may be there."""
+    absurd: Mapping[tuple[str, ...], str] = field(default_factory=dict)
+    """Sets that no machine or person has as they were fitted, and why; some other form of them may be there."""
 
     def next_best(self) -> "Choice | None":
         """Return the choice with the named set refuted and the next of those as good; None where there is none.
@@ -106,7 +104,7 @@ class Choice:
     def _instead(self, named: Ranked) -> "Choice":
         """Return the choice of another set, the one named so far refuted unless it is of the same causes."""
         refuted = self.refuted | ({self.named.labels} - {named.labels})
-        return replace(self, named=named, standby=(), freer=None, twice=-np.inf, refuted=refuted)
+        return replace(self, named=named, standby=(), freer=None, refuted=refuted)
 
     def alone(self, cause: str) -> float:
         """Return what a cause gains in log likelihood with no other beside it."""
@@ -121,13 +119,19 @@ class Choice:
 
 
 def of_a_freer_form(choice: Choice, scorer: Scorer, empty: Fit) -> dict[str, type[FreerForm]]:
-    """Return which named causes the others would do without, if one of those might be of a freer form, and of which."""
-    return {
-        label: form
-        for label in choice.named.labels
-        for causes, form in freed([cause for cause in choice.named.fit.causes if cause.label != label])
-        if _ranked(scorer, causes, empty).score > choice.named.score - NEEDED
-    }
+    """Return which named causes add too little to the others where one of those is of a freer form, and of which."""
+    found: dict[str, type[FreerForm]] = {}
+    for cause in choice.named.fit.causes:
+        rest = [other for other in choice.named.fit.causes if other.label != cause.label]
+        for other, form in freeable(rest):
+            if form.contains(cause.effect, other.effect):
+                continue
+            # The whole set in the same form: what that repairs of its own cause does not pay for the one left out.
+            whole = in_form(choice.named.fit.causes, other.label, form)
+            without_it = in_form(rest, other.label, form)
+            if _ranked(scorer, without_it, empty).score > _ranked(scorer, whole, empty).score - NEEDED:
+                found[cause.label] = form
+    return found
 
 
 def nothing_chosen(empty: Fit) -> Choice:
@@ -151,15 +155,15 @@ def choose(bank: Bank, floor: Floor, evidence: Mapping[str, float]) -> Choice:
     freer: list[Ranked] = []
     standby: list[Ranked] = []
     shadows: set[tuple[str, ...]] = set()
-    absurd: set[tuple[str, ...]] = set()
+    absurd: dict[tuple[str, ...], str] = {}
     for level in levels:
         finalists: list[Ranked] = []
         for _ in range(LOOKS):
-            near = _finalists(level, named, scorer, shadows | absurd)
+            near = _finalists(level, named, scorer, shadows | absurd.keys())
             finalists = [_rank(scorer, s, empty) for s in near]
             shadows |= {r.labels for r in finalists if shadows_motion(r.fit, empty.rms, floor.rms, bank.runs)}
-            absurd |= {r.labels for r in finalists if r.fit.is_absurd(bank.baseline)}
-            finalists = [r for r in finalists if r.labels not in shadows | absurd]
+            absurd |= {r.labels: why for r in finalists if (why := r.fit.absurdity(bank.baseline))}
+            finalists = [r for r in finalists if r.labels not in shadows | absurd.keys()]
             if finalists:
                 break
         ranked.append({r.labels: r for r in finalists})
@@ -173,9 +177,7 @@ def choose(bank: Bank, floor: Floor, evidence: Mapping[str, float]) -> Choice:
         freer, standby = [], [r for r in others if r.score > named.score - NEEDED]
     _, *others = itertools.chain.from_iterable(_and_anew(r, scorer, empty) for r in (named, *standby))
     best = max(freer, key=lambda r: r.score).fit if freer else None
-    twice = max((r.score for r in freer if len(set(r.labels)) < len(r.labels)), default=-np.inf)
-    barred = {"shadows": frozenset(shadows), "absurd": frozenset(absurd)}
-    return Choice(named, levels, ranked, independent, tuple(others), best, twice, **barred)
+    return Choice(named, levels, ranked, independent, tuple(others), best, shadows=frozenset(shadows), absurd=absurd)
 
 
 def _and_anew(ranked: Ranked, scorer: Scorer, empty: Fit) -> Iterator[Ranked]:
@@ -188,7 +190,7 @@ def _and_anew(ranked: Ranked, scorer: Scorer, empty: Fit) -> Iterator[Ranked]:
     if all(ours.effect == theirs.effect for ours, theirs in zip(causes, ranked.fit.causes, strict=True)):
         return
     made = _ranked(scorer, causes, empty)
-    if not made.fit.is_absurd(scorer.bank.baseline):
+    if not made.fit.absurdity(scorer.bank.baseline):
         yield made
 
 
@@ -197,7 +199,8 @@ def _freer(level: dict[tuple[str, ...], Scored], named: Ranked, scorer: Scorer, 
     made = [tuple(sorted((*named.labels, label))) for label in named.labels]
     found = [level[labels] for labels in made if labels in level and level[labels].admissible]
     twice = [_rank(scorer, s, empty) for s in sorted(found, key=lambda s: -s.score)[:1]]
-    return twice + [_ranked(scorer, causes, empty) for causes, _ in freed(named.fit.causes)]
+    causes = named.fit.causes
+    return twice + [_ranked(scorer, in_form(causes, one.label, form), empty) for one, form in freeable(causes)]
 
 
 def _finalists(
@@ -337,9 +340,17 @@ def _freed_behind(
         return np.inf
     chosen = [scorer.bank.candidates[i] for i in choice.levels[len(labels) - 1][labels].chosen]
     made = _ranked(scorer, in_form(chosen, rival.label, form), empty)
-    # The cause has as much freedom: two waves at once are a ripple, too.
-    own = max(choice.named.score, choice.twice)
-    return np.inf if made.fit.is_absurd(scorer.bank.baseline) else own - made.score
+    if made.fit.absurdity(scorer.bank.baseline):
+        return np.inf
+    return max(choice.named.score, _twice(choice, cause.label, scorer, empty)) - made.score
+
+
+def _twice(choice: Choice, label: str, scorer: Scorer, empty: Fit) -> float:
+    """Return the log likelihood of the named set with a cause in two shapes at once: it may be freer, too."""
+    doubled = tuple(sorted((*choice.named.labels, label)))
+    level = choice.levels[len(doubled) - 1] if len(doubled) <= len(choice.levels) else {}
+    scored = level.get(doubled)
+    return _rank(scorer, scored, empty).score if scored and scored.admissible else -np.inf
 
 
 def idle(choice: Choice, cause: str) -> frozenset[str]:

@@ -30,6 +30,8 @@ MOST_OF_ALL = 0.5
 """Share of all of a joint's torque above which such an amplitude only stands because something else takes it away."""
 UNGROUNDED = 0.1
 """Share of an excess of friction by which the level below it may come out negative, as its form's misfit lets it."""
+SURE, ALIKE = 2.0, 6.0
+"""Standard errors by which it must, and blocks that are one piece of news."""
 NEWTON_STEPS = 3
 """Of Gauss and Newton along what bends each run in its own way, which the torque is nearly linear in."""
 STEP = 0.01
@@ -55,26 +57,35 @@ class Fit:
     """The kind of each run fitted."""
     shares: NDArray
     """(O, size + ...) what each column carries, rms, of all that was measured at an output."""
+    normal: NDArray
+    """(size + ..., size + ...) of the fit, outputs weighed by their inverse variances."""
     loads: NDArray | None = None
     """Values (size + ...,) whose bodies the loads in the runs are computed from, where not those the runs came with."""
 
-    def is_absurd(self, baseline: Baseline) -> bool:
-        """Tell whether some cause is larger than on any machine or person, and carries most of a joint's torque.
+    def absurdity(self, baseline: Baseline) -> str:
+        """Return why no machine or person has the causes as they were fitted; empty where one may.
 
-        It imitates what it is not, with others that take most of it away again. Where a joint's torques are large
-        themselves, an amplitude beyond what is typical means little. So does an excess of friction over a level that
-        gives energy: another law of the speed bends like both together.
+        An amplitude beyond any that carries most of a joint's torque imitates what it is not, with others that take
+        most of it away again; where a joint's torques are large themselves it means little. So does an excess of
+        friction over a level that gives energy: another law of the speed bends like both together.
         """
         most = self.shares.max(axis=0)
         for column, (effect, parameter) in enumerate(self.amplitudes(), start=baseline.size):
             amplitude = abs(self.values[column])
             if amplitude > BEYOND * max(map(abs, parameter.typical)) and most[column] > MOST_OF_ALL:
-                return True
-            if effect.excess_over:
-                level = self.values[baseline.names.index(f"{effect.joint} {effect.excess_over}")]
-                if level < -UNGROUNDED * amplitude:
-                    return True
-        return False
+                return f"the {parameter.name} of {effect.label} is beyond any, and others take most of it away again"
+            if effect.excess_over and self._gives_energy(effect, amplitude, baseline):
+                return f"{effect.label} is an excess over friction that gives energy"
+        return ""
+
+    def _gives_energy(self, effect: Effect, amplitude: float, baseline: Baseline) -> bool:
+        """Tell whether the level that an effect is an excess over is plainly negative, with nothing in its place."""
+        others = (cause.effect for cause in self.causes if cause.effect.joint == effect.joint)
+        if any(other.dissipative or other.holds for other in others if other.name != effect.name):
+            return False
+        place = baseline.names.index(f"{effect.joint} {effect.excess_over}")
+        spread = np.sqrt(ALIKE * np.linalg.pinv(self.normal, hermitian=True)[place, place])
+        return bool(self.values[place] < -max(UNGROUNDED * amplitude, SURE * spread))
 
     def amplitudes(self) -> Iterator[tuple[Effect, Parameter]]:
         """Yield effect and parameter that each of the causes' columns is the amplitude of, in their order."""
@@ -111,7 +122,9 @@ def fit(
     gram = gram_of_runs(runs, *zip(*stacked_columns(causes, runs, baseline), strict=True))
     values = solve(gram, weights)
     ordered, kinds = tuple(sorted(causes, key=_last_sensors)), tuple(run.motion.run for run in runs)
-    return Fit(ordered, values, *_errors(gram, values), kinds, _shares(gram, values), loads)
+    found, rms, cost = _errors(gram, values)
+    normal = np.einsum("o,foij->ij", found, gram.columns)
+    return Fit(ordered, values, found, rms, cost, kinds, _shares(gram, values), normal, loads)
 
 
 def _shares(gram: Gram, values: NDArray) -> NDArray:

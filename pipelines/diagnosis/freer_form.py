@@ -16,9 +16,9 @@ from pipelines.diagnosis.candidates import Candidate
 from pipelines.effects import Cogging, Effect, ParallelSpring, Parameter, Parity, QuadraticDrag, Side, StribeckFriction
 from pipelines.mechanics.motion import Motion
 
-ANY = (-1e6, 1e6)
+ANY_SIZE = (-1e6, 1e6)
 """Amplitudes of which none is absurd."""
-BENDS, LAW = (2, 3, 4), (0, 1, 2, 3, 4, 5, 6)
+BENDS, ANY_LAW = (2, 3, 4), (0, 1, 2, 3, 4, 5, 6)
 """Powers of the angle: beside the straight line and the preload that a spring has itself, and of any law."""
 STEEPER = 3
 """Power of speed above a drag's own; those below are viscous friction's."""
@@ -30,7 +30,12 @@ class FreerForm(Effect):
     instead: ClassVar[str]
     """That the cause it belongs to may be of this form, and how to see whether it is."""
     alone: ClassVar[bool] = False
-    """True where it stands in its cause's place, and not beside it."""
+    """True where it stands in its cause's place, and not beside it: then it is a spring at that joint, too."""
+
+    @classmethod
+    def contains(cls, effect: Effect, of: Effect) -> bool:
+        """Tell whether an effect is a part of this form of another."""
+        return cls.alone and isinstance(effect, ParallelSpring) and effect.joint == of.joint
 
 
 def _powers_of_angle(effect: Effect, motion: Motion, powers: Sequence[int]) -> NDArray:
@@ -42,7 +47,9 @@ def _powers_of_angle(effect: Effect, motion: Motion, powers: Sequence[int]) -> N
 
 
 def _amplitudes(powers: Sequence[int]) -> tuple[Parameter, ...]:
-    return tuple(Parameter(f"power_{n}", "N·m", f"torque per angle to the power {n}", f"k{n}", ANY) for n in powers)
+    return tuple(
+        Parameter(f"power_{n}", "N·m", f"torque per angle to the power {n}", f"k{n}", ANY_SIZE) for n in powers
+    )
 
 
 class BentSpring(FreerForm):
@@ -55,7 +62,7 @@ class BentSpring(FreerForm):
     linear = _amplitudes(BENDS)
     parity = Parity.EVEN
     instead = (
-        "a spring that hardens, softens or goes slack would explain as much: hold the joint at several angles and see "
+        "a spring that hardens, softens or goes slack would explain as much: hold the joint at several places and see "
         "whether the torque lies on a straight line"
     )
 
@@ -71,14 +78,14 @@ class LawOfAngle(FreerForm):
     title = "Law of the angle"
     side = Side.STRUCTURE
     equation = "tau = k0 + k1 (q / s) + ... + k6 (q / s)^6, s the joint's travel beside an exoskeleton's"
-    linear = _amplitudes(LAW)
+    linear = _amplitudes(ANY_LAW)
     parity = Parity.EVEN
     instead = BentSpring.instead
     alone = True
 
     def columns(self, motion: Motion, shape: NDArray | tuple[float, ...] = ()) -> NDArray:
         """Return all powers, (n, J, p)."""
-        return _powers_of_angle(self, motion, LAW)
+        return _powers_of_angle(self, motion, ANY_LAW)
 
 
 class BentDrag(FreerForm):
@@ -88,7 +95,7 @@ class BentDrag(FreerForm):
     title = "Bent drag"
     side = Side.DRIVE
     equation = "tau = c3 abs(v / s)^3 sgn(v), s the joint's speed beside an exoskeleton's"
-    linear = (Parameter("bend", "N·m", "torque per speed to the third power", "c3", ANY),)
+    linear = (Parameter("bend", "N·m", "torque per speed to the third power", "c3", ANY_SIZE),)
     parity = Parity.ODD
     instead = (
         "a drag of another power of speed would explain as much: move the joint at several constant speeds and see how "
@@ -104,7 +111,7 @@ class BentDrag(FreerForm):
         return columns
 
 
-OF: dict[type[Effect], type[FreerForm]] = {ParallelSpring: BentSpring, QuadraticDrag: BentDrag, Cogging: LawOfAngle}
+FORMS: dict[type[Effect], type[FreerForm]] = {ParallelSpring: BentSpring, QuadraticDrag: BentDrag, Cogging: LawOfAngle}
 AS_RIVAL: dict[tuple[type[Effect], type[Effect]], type[FreerForm]] = {
     (StribeckFriction, QuadraticDrag): BentDrag,
     (Cogging, ParallelSpring): LawOfAngle,
@@ -112,11 +119,11 @@ AS_RIVAL: dict[tuple[type[Effect], type[Effect]], type[FreerForm]] = {
 """By cause and rival at its joint: in which form the rival is held against it; others could be nearly anything so."""
 
 
-def freed(causes: Sequence[Candidate]) -> Iterator[tuple[list[Candidate], type[FreerForm]]]:
-    """Yield the causes with one of them in a freer form, and that form."""
+def freeable(causes: Sequence[Candidate]) -> Iterator[tuple[Candidate, type[FreerForm]]]:
+    """Yield those of the causes that have a freer form, and that form."""
     for cause in causes:
-        if form := OF.get(type(cause.effect)):
-            yield in_form(causes, cause.label, form), form
+        if form := FORMS.get(type(cause.effect)):
+            yield cause, form
 
 
 def in_form(causes: Sequence[Candidate], label: str, form: type[FreerForm]) -> list[Candidate]:

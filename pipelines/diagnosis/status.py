@@ -73,7 +73,7 @@ class Standing:
 
     @property
     def leaves_nothing(self) -> bool:
-        """Whether the named causes take all slow error, and there was some: what hums beside it is another matter."""
+        """Whether the causes take nearly all power of slow error, and there was some: a hum is another matter then."""
         return bool(np.any(self.systematic(self.slow_before))) and self._share_left < NEXT_TO_NOTHING
 
     @property

@@ -24,7 +24,16 @@ from tests.diagnosis.sessions import session
 
 
 def ranked(effect, score):
-    made = Fit((Candidate(effect, ((),)),), np.zeros(1), np.ones(2), np.ones(2), 0.0, ("exo_alone",), np.zeros((2, 1)))
+    made = Fit(
+        (Candidate(effect, ((),)),),
+        np.zeros(1),
+        np.ones(2),
+        np.ones(2),
+        0.0,
+        ("exo_alone",),
+        np.zeros((2, 1)),
+        np.eye(1),
+    )
     return Ranked(made, score)
 
 

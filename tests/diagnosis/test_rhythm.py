@@ -25,7 +25,7 @@ def explained(runs, frequency_hz, *more, left=1.0):
     """A fit of a rhythm and other causes, and what it is held against: an error of three times the floor."""
     made = [Candidate(effect, (shape,) * len(runs)) for effect, shape in ((PUSH, (frequency_hz,)), *more)]
     rms, kinds = np.array([left, 1.0, 1.0, 1.0]), tuple(run.motion.run for run in runs)
-    fit = Fit(tuple(made), np.zeros(1), np.ones(4), rms, 0.0, kinds, np.zeros((4, 1)))
+    fit = Fit(tuple(made), np.zeros(1), np.ones(4), rms, 0.0, kinds, np.zeros((4, 1)), np.eye(1))
     return fit, np.array([3.0, 1.0, 1.0, 1.0]), np.ones(4), runs
 
 
