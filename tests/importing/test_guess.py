@@ -666,6 +666,18 @@ def test_angle_and_velocity_are_found_among_hundreds_of_columns_without_names_an
     assert looked_at.call_count <= 2 * 100
 
 
+def test_a_column_without_a_number_in_the_middle_of_a_long_log_hides_no_angle(guessed, pendulum, tmp_path, monkeypatch):
+    monkeypatch.setattr("pipelines.importing.consistency.MOST", 1000)
+    rng, rows = np.random.default_rng(1), np.arange(len(pendulum.time))
+    columns = {"time": pendulum.time} | {f"c{k}": rng.normal(size=len(rows)).cumsum() for k in range(25)}
+    columns |= {"c3": pendulum.velocity, "c8": pendulum.angle}
+    columns |= {"c5": np.where(rows < 9, rows**2, np.nan), "c6": np.where(rows % 999 < 2, rows, np.nan)}
+    path = tmp_path / "log.parquet"
+    pd.DataFrame(columns).to_parquet(path)
+    joint = tomllib.loads(guessed(path)[0])["joint"][0]
+    assert (joint["angle"]["column"], joint["velocity"]["column"]) == ("c8", "c3")
+
+
 def test_a_refusal_of_a_log_of_thousands_of_columns_names_the_first(tmp_path, capsys):
     path = tmp_path / "wide.csv"
     row = ",".join(["1.5"] * 3000)
