@@ -505,6 +505,38 @@ def test_a_map_of_counts_imports_once_all_that_was_asked_for_is_filled_in(import
     assert_allclose(frame[reference] - frame[angle], 3 * count, atol=1e-9)
 
 
+SIGNED = {"pos_counts": "angle", "speed [counts/s]": "velocity", "ref_counts": "reference", "iq_mA": "torque"}
+
+
+@pytest.mark.parametrize("unsigned", [[name] for name in SIGNED] + [[*SIGNED]], ids=lambda names: "+".join(names))
+def test_a_sign_that_was_lost_is_found_again_whatever_lost_it(imported, guessed, pendulum, write_csv, unsigned):
+    columns, per_rad = swinging(pendulum), 4096 / (2.0 * np.pi)
+    logged = {
+        "time_us": np.round(1e6 * pendulum.time),
+        "pos_counts": np.round(per_rad * columns["angle"]),
+        "speed [counts/s]": np.round(per_rad * columns["velocity"]),
+        "ref_counts": np.round(per_rad * columns["angle"]) + 3,
+        "iq_mA": np.round(1e3 * columns["torque"]),
+    }
+    logged = {name: values.astype(int) for name, values in logged.items()}
+    path = write_csv({name: values % 65536 if name in unsigned else values for name, values in logged.items()})
+    text, _ = guessed(path)
+    joint = tomllib.loads(text)["joint"][0]
+    assert [quantity for quantity in SIGNED.values() if joint[quantity].get("signed_bits") == 16] == [
+        SIGNED[name] for name in unsigned
+    ]
+    for key, answer in COUNTED["revolute"][0].items():
+        text = text.replace(f"# {key} =", f"{answer} #")
+    frame = imported(path, map_text=text).recording("log_train").frame
+    for name, factor, (column, values) in zip(
+        ("angle_rad", "velocity_rad_s", "reference_rad", "torque_nm"),
+        (per_rad, per_rad, per_rad, 1e4),
+        list(logged.items())[1:],
+        strict=True,
+    ):
+        assert_allclose(frame[f"joint_{name}"], values[: len(frame)] / factor, atol=1e-9, err_msg=column)
+
+
 def test_a_set_point_in_counts_beside_an_angle_in_mm_asks_for_those_in_a_metre(guessed, pendulum, write_csv):
     place = 40.0 * pendulum.angle
     columns = {"t_s": pendulum.time, "pos_mm": place, "ref_counts": np.round(1e3 * place), "force_N": pendulum.torque}
