@@ -11,6 +11,7 @@ import scipy.io
 from numpy.testing import assert_allclose
 
 from exoid_cli.app import run
+from pipelines.importing.numbers import numbers
 from tests.importing.conftest import MAP
 
 
@@ -282,6 +283,13 @@ def test_dates_where_an_angle_should_be_are_no_numbers(imported, pendulum, tmp_p
     pd.DataFrame(pendulum.columns() | {"angle": dates}).to_parquet(path)
     outcome = imported(path)
     assert outcome.code == 2 and "with text, the first '2025-03-30" in outcome.err
+
+
+def test_a_date_that_is_missing_is_no_text():
+    findings = []
+    values = np.array(["2025-03-30", "NaT", "NaT"], dtype="datetime64[ns]")
+    assert np.isnan(numbers(values, "angle", findings)).all()
+    assert [finding.found for finding in findings] == ["1 row with text, the first '2025-03-30T00:00:00.' in row 0"]
 
 
 def test_a_guess_takes_dates_of_parquet_for_dates(imported, pendulum, tmp_path, capsys):
