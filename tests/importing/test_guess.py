@@ -76,6 +76,48 @@ def test_a_clock_too_coarse_for_its_rows_gives_their_rate(imported, guessed, pen
     assert_allclose(frame["time_s"], pendulum.time[: len(frame)], atol=1e-9)
 
 
+def test_a_pause_as_long_as_the_log_changes_no_rate_and_is_told(guessed, pendulum, write_csv):
+    paused = pendulum.time + 10.0 * (pendulum.time >= 5.0)
+    text, doubts = guessed(write_csv(swinging(pendulum) | {"time": np.floor(100.0 * paused) / 100.0}))
+    assert "rate_hz = 200.0" in text
+    assert "none came for 10 s" in doubts["time.rate_hz"]
+
+
+def test_stamps_with_three_and_four_rows_by_turns_give_the_rate_of_both(guessed, pendulum, write_csv):
+    stamps = np.arange(2000) * 3 // 10 / 100.0
+    text, doubts = guessed(write_csv(swinging(pendulum) | {"time": stamps}))
+    assert tomllib.loads(text)["time"]["rate_hz"] == pytest.approx(1000.0 / 3.0, rel=2e-3)
+    assert "none came" not in doubts["time.rate_hz"]
+
+
+def test_a_coarse_clock_whose_stamps_have_few_rows_and_many_by_turns_gives_no_rate(pendulum, write_csv, capsys):
+    stamps = np.repeat(np.arange(400) / 50.0, np.tile([2, 8], 200))
+    path = write_csv(swinging(pendulum) | {"time": stamps})
+    assert run(["import", str(path), "--guess"]) == 2
+    assert "goes forward as a clock does" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("stamps", ["numbers", "dates"])
+def test_a_fine_clock_without_a_name_goes_before_a_coarse_one_of_its_rate_that_has_one(
+    imported, guessed, pendulum, write_csv, stamps
+):
+    coarse = np.floor(pendulum.time)
+    if stamps == "dates":
+        dates = pd.Timestamp("2026-03-01 12:00:00") + pd.to_timedelta(coarse, unit="s")
+        coarse = np.array(dates.strftime("%Y-%m-%d %H:%M:%S"))
+    path = write_csv(swinging(pendulum) | {"time": coarse, "x": 1e6 * pendulum.time})
+    text, doubts = guessed(path)
+    assert tomllib.loads(text)["time"] == {"column": "x", "unit": "us"} and "time.column" in doubts
+    frame = imported(path, map_text=text).recording("log_train").frame
+    assert_allclose(frame["time_s"], pendulum.time[: len(frame)], atol=1e-9)
+
+
+def test_what_rises_at_another_rate_than_a_coarse_clock_does_not_take_its_place(guessed, pendulum, write_csv):
+    others = {"index": 2 * np.arange(2000), "x": 1e3 * pendulum.time**2, "part": 1e6 * pendulum.time % 1e6}
+    text, _ = guessed(write_csv(swinging(pendulum) | {"time": np.floor(100.0 * pendulum.time) / 100.0} | others))
+    assert tomllib.loads(text)["time"] == {"rate_hz": 200.0}
+
+
 def test_what_names_do_not_say_is_unsure(guessed, pendulum, write_csv):
     _, doubts = guessed(write_csv(dict(zip("abcd", swinging(pendulum).values(), strict=True))))
     assert {"joint[0].angle.column", "joint[0].angle.unit", "joint[0].torque.column", "time.column"} <= doubts.keys()
