@@ -35,7 +35,7 @@ POWERS: dict[tuple[str, str], tuple[int, int]] = {
     ("spasticity", "threshold_velocity"): (0, 1),
     ("cuff_compliance", "stiffness"): (1, -1),
 }
-"""Powers of torque and of angle of every parameter that a cause tells; one that is missing is refused, not taken as is."""
+"""Powers of torque and of angle of every parameter that a cause tells; a missing one is refused, not taken as it is."""
 
 
 @dataclass(frozen=True)
