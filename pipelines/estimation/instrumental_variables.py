@@ -28,8 +28,9 @@ SETTLED = 0.01
 """Largest change of a value, in standard errors of independent blocks, at which iterations end."""
 
 SLIGHT = 0.1
-"""Of the half-width of a parameter's 95 % interval, within which a bias does not matter: the two estimates share their
-noise, so the test sees much less, but the interval about either still covers the truth 94.5 times of 100."""
+"""Of the half-width of a parameter's 95 % interval, so a twentieth of the interval, within which a bias does not
+matter: the two estimates share their noise, so the test sees much less, but the interval about either still covers the
+truth 94.5 times of 100."""
 
 SLIGHT_SHARE = 0.001
 """Of a parameter itself, likewise: no scale of a torque is known any better, however long the recording."""
@@ -135,8 +136,8 @@ def _sentence(test: DurbinWuHausman, names: Sequence[str], fit: Fit) -> str:
     matters = _matters(test, fit)
     if not matters.any():
         return (
-            f"noise in the angles shows in least squares ({numbers}) but does not matter: it moves no parameter by "
-            f"more than {100 * SLIGHT:g} % of its interval or {100 * SLIGHT_SHARE:g} % of itself; "
+            f"noise in the angles shows in least squares ({numbers}) but does not matter: every parameter moves by "
+            f"less than a twentieth of its 95 % interval, or by less than {100 * SLIGHT_SHARE:g} % of itself; "
             "weighted_least_squares serves as well"
         )
     worst = int(np.argmax(np.where(matters, np.abs(test.difference / test.std_error), 0.0)))

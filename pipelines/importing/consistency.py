@@ -63,8 +63,11 @@ def likeliest_integrals(
 
 
 def _on_straight_lines(values: NDArray) -> NDArray:
-    """Return values (n,) with what is between two of them where there is none."""
+    """Return values (n,) with what is between two of them where there is none; zeros where no two are known."""
     known = np.isfinite(values)
+    # What moves somewhere in the log may have no number in its middle.
+    if np.count_nonzero(known) < 2:
+        return np.zeros_like(values)
     return values if known.all() else np.interp(np.arange(len(values)), np.flatnonzero(known), values[known])
 
 

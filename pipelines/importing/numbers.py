@@ -10,8 +10,8 @@ from pipelines.importing.finding import Finding, counted
 
 LONGEST = 20
 """Letters of a text that a finding shows."""
-THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})*(?:\.\d+)?")
-"""A number with marks between its thousands, or too small to have one."""
+THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+(?:\.\d+)?")
+"""A number with marks between its thousands."""
 TAKEN_FOR_MISSING = "taken for missing"
 """What is made of a text where a number should be."""
 
@@ -26,7 +26,7 @@ def numbers(values: NDArray, where: str, findings: list[Finding]) -> NDArray:
         findings.append(Finding(where, "commas between thousands", "read without them"))
         text = text.str.replace(",", "")
     found = pd.to_numeric(text, errors="coerce").to_numpy(dtype=float, na_value=np.nan)
-    words = np.isnan(found) & text.notna().to_numpy()
+    words = np.isnan(found) & pd.notna(values)
     if words.any():
         row = int(np.argmax(words))
         seen = f"{counted(int(words.sum()), 'row')} with text, the first {str(values[row])[:LONGEST]!r} in row {row}"
@@ -35,15 +35,15 @@ def numbers(values: NDArray, where: str, findings: list[Finding]) -> NDArray:
 
 
 def _have_thousands(text: pd.Series) -> bool:
-    """Tell whether numbers have commas between their thousands: a comma and a point, in every one that is so large.
+    """Tell whether numbers have commas between their thousands: all texts with a comma are such, and one has a point.
 
-    Without a point in some of them a comma may be a decimal one.
+    Without a point in one of them a comma may be a decimal one. What has no comma, a number or a word, says nothing.
     """
-    if not pd.api.types.is_string_dtype(text.dropna()):
-        return False
     written = text.dropna()
-    both = written.str.contains(",", regex=False) & written.str.contains(".", regex=False)
-    return bool(both.any()) and bool(written.str.fullmatch(THOUSANDS).all())
+    if not pd.api.types.is_string_dtype(written):
+        return False
+    marked = written[written.str.contains(",", regex=False)]
+    return bool(marked.str.contains(".", regex=False).any()) and bool(marked.str.fullmatch(THOUSANDS).all())
 
 
 def whole_nanoseconds(values: NDArray) -> NDArray:

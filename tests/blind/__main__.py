@@ -47,6 +47,11 @@ def main(
     """Examine ``exoid diagnose`` on simulated sessions whose truth it cannot see."""
     if write and not fixed:
         raise typer.BadParameter("only the fixed set has a record: add --fixed", param_hint="--write")
+    if one_joint and (fixed or every or only):
+        raise typer.BadParameter(
+            "machines of one joint have mixed examinations only: leave --fixed, --full and --only away",
+            param_hint="--one-joint",
+        )
     base = RANGES[seeds].start if seed_base is None else seed_base
     planned = fixed_set.fixed_set() if fixed else _planned(cases, base, mix, every, only, one_joint)
     console = Console()

@@ -4,7 +4,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from tests.blind.causes import CAUSES, HUMAN_CAUSES, joints_of
+from tests.blind.causes import CAUSES, HUMAN_CAUSES, Spec, joints_of
 from tests.blind.faults import FAULTS
 from tests.blind.mechanisms import MECHANISMS, ONE_JOINT
 from tests.blind.outside import OF_ONE_JOINT, OUTSIDE
@@ -14,7 +14,6 @@ MIX = {"single": 0.55, "none": 0.10, "imperfect": 0.08, "pair": 0.12, "outside":
 """Shares of the categories in a mixed examination."""
 MIX_OF_ONE_JOINT = {"single": 0.55, "none": 0.10, "imperfect": 0.10, "outside": 0.25}
 """The same of machines of one joint."""
-Spec = tuple[str, int | None]
 SINGLES: tuple[Spec, ...] = tuple((effect, joint) for effect in CAUSES for joint in joints_of(effect))
 NOT_TOGETHER = (
     {"backlash", "joint_elasticity"},  # one transmission a joint, and each hides the other

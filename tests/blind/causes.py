@@ -19,6 +19,8 @@ from tests.blind.plan import HIP, JOINTS, KNEE, Plan, Run
 from tests.blind.wandering import random_walk
 
 Install = Callable[[Plan, float, Run], None]
+Spec = tuple[str, int | None]
+"""An effect and its joint; none for the whole leg."""
 
 
 @dataclass(frozen=True)

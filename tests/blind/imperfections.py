@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from numpy.random import Generator
 
-from tests.blind.causes import Cause, random_cause
+from tests.blind.causes import Cause, Spec, random_cause
 from tests.blind.plan import HIP, KNEE
 
 SMALL = (
@@ -16,7 +16,7 @@ SMALL = (
 LEAST, MOST = 0.002, 0.009
 
 
-def random_imperfections(rng: Generator, small: Sequence[tuple[str, int | None]]) -> list[tuple[Cause, float]]:
+def random_imperfections(rng: Generator, small: Sequence[Spec]) -> list[tuple[Cause, float]]:
     """Draw three to six effects of those that may be ``small``, and the magnitude of each."""
     chosen = rng.choice(len(small), size=int(rng.integers(3, 7)), replace=False)
     return [(random_cause(rng, *small[i]), float(rng.uniform(LEAST, MOST))) for i in sorted(chosen)]

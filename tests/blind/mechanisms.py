@@ -4,19 +4,21 @@ A machine of one joint is the simulated leg whose knee stands still and whose sh
 the hip's, under another name and in the units of a machine of another size.
 """
 
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Protocol
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from numpy.random import Generator
+from numpy.typing import NDArray
 
 from tests.blind import imperfections
 from tests.blind.body import Leg, Segment
-from tests.blind.causes import log_uniform
+from tests.blind.causes import Spec, log_uniform
 from tests.blind.excitation import Excitation, random_excitation
 from tests.blind.machine import DRIVE_RATE_HZ, random_machine
 from tests.blind.people import random_person
-from tests.blind.plan import HIP, JOINTS
+from tests.blind.plan import HIP, JOINTS, Run
 from tests.blind.plant import Recorded, Rig
 from tests.blind.units import Units
 
@@ -24,7 +26,6 @@ WEIGHTLESS = Segment(1e-4, 0.0, 1e-5)
 LENGTH = 0.4
 QUIET = 0.4
 """Of a leg's noise: a single link needs less torque."""
-Spec = tuple[str, int | None]
 
 
 class Mechanism(Protocol):
@@ -46,6 +47,9 @@ class Mechanism(Protocol):
     def header(self, rig: Rig, r: Recorded) -> dict[str, Any]:
         """Return what the recording says of the machine."""
 
+    def truth(self, rig: Rig, kinds: Sequence[str]) -> dict[str, Any]:
+        """Return what a truth file says of the rig in these kinds of run, in the recording's units."""
+
 
 @dataclass(frozen=True)
 class ExoskeletonLeg:
@@ -66,9 +70,9 @@ class ExoskeletonLeg:
     def columns(self, rig: Rig, r: Recorded) -> dict[str, np.ndarray]:
         """Return time, both joints, cuff forces and counter."""
         columns = {"time_s": r.time.copy()}
-        for quantity, values in _REVOLUTE(r).items():
+        for quantity in _REVOLUTE(r):
             for j, joint in enumerate(JOINTS):
-                columns[f"{joint}_{quantity}"] = values[:, j].copy()
+                columns[f"{joint}_{quantity.column}"] = quantity.values[:, j].copy()
         if r.forces is not None:
             for s, sensor in enumerate(("thigh_front", "thigh_back", "shank_front", "shank_back")):
                 for i, axis in enumerate("xyz"):
@@ -90,6 +94,17 @@ class ExoskeletonLeg:
             for j, joint in enumerate(JOINTS)
         }  # fmt: skip
         return {"controller": controller, "geometry": geometry}
+
+    def truth(self, rig: Rig, kinds: Sequence[str]) -> dict[str, Any]:
+        """Return the wearer, the rigid body and the machine."""
+        return {
+            "person": asdict(rig.person),
+            "X": {kind: rig.leg(Run(kind, "train", 0.0, None)).inertial().tolist() for kind in kinds},
+            "machine": {
+                name: np.asarray(getattr(rig.machine, name)).tolist()
+                for name in ("coulomb", "viscous", "hip_rotor", "counts", "ripple", "ripple_time")
+            },
+        }
 
 
 @dataclass(frozen=True)
@@ -137,15 +152,36 @@ class OneJoint:
 
     def columns(self, rig: Rig, r: Recorded) -> dict[str, np.ndarray]:
         """Return time, the joint and counter."""
-        found = _PRISMATIC(r) if self.kind == "prismatic" else _REVOLUTE(r)
-        of_force = rig.units.torque
-        scaled = {q: (of_force if q[:5] in ("torqu", "force") else rig.units.angle) * v for q, v in found.items()}
-        return {"time_s": r.time.copy(), **{f"axis_{q}": v[:, HIP].copy() for q, v in scaled.items()}} | _counted(r)
+        columns = {"time_s": r.time.copy()}
+        for quantity in _PRISMATIC(r) if self.kind == "prismatic" else _REVOLUTE(r):
+            factor = rig.units.factor(quantity.torque, quantity.angle)
+            columns[f"axis_{quantity.column}"] = factor * quantity.values[:, HIP]
+        return columns | _counted(r)
 
     def header(self, rig: Rig, r: Recorded) -> dict[str, Any]:
         """Return joint and gravity."""
         gravity = 9.81 if self.weight else self.gravity
         return {"joints": [{"name": "axis", "kind": self.kind}], "geometry": {"gravity_m_s2": gravity}}
+
+    def truth(self, rig: Rig, kinds: Sequence[str]) -> dict[str, Any]:
+        """Return the rigid body, its motor's rotor with it, and the machine; nobody wears it."""
+        machine, units = rig.machine, rig.units
+        inertia, _, _, moment = machine.leg.inertial()
+        X = [units.factor(1, -1) * (inertia + machine.hip_rotor)]
+        X += [units.factor(1, 0) * float(moment)] if self.gravity else []
+        X += [units.factor(1, 0) * rig.weight] if self.weight else []
+        return {
+            "person": None,
+            "units": asdict(units),
+            "X": dict.fromkeys(kinds, X),
+            "machine": {
+                "coulomb": [units.factor(1, 0) * float(machine.coulomb[HIP])],
+                "viscous": [units.factor(1, -1) * float(machine.viscous[HIP])],
+                "resolution": [units.factor(0, 1) * 2 * np.pi / float(machine.counts[HIP])],
+                "ripple": [units.factor(1, 0) * float(machine.ripple[HIP])],
+                "ripple_time": [float(machine.ripple_time[HIP])],
+            },
+        }
 
 
 ANYWHERE = (
@@ -162,16 +198,27 @@ ONE_JOINT: dict[str, OneJoint] = {
 MECHANISMS: dict[str, Mechanism] = {"leg": ExoskeletonLeg(), **ONE_JOINT}
 
 
-def _named(angle: str, torque: str, speed: str):
-    def of(r: Recorded) -> dict[str, np.ndarray]:
-        reference = angle.replace("angle", "reference").replace("position", "reference")
-        return {angle: r.angle, torque: r.torque, reference: r.reference, speed: r.drive_speed}
+class _Quantity(NamedTuple):
+    """What is recorded of each joint: the end of its column's name, values (n, 2), powers of torque and of angle."""
+
+    column: str
+    values: NDArray
+    torque: int
+    angle: int
+
+
+def _named(angle: str, torque: str, reference: str, speed: str) -> Callable[[Recorded], list[_Quantity]]:
+    def of(r: Recorded) -> list[_Quantity]:
+        return [
+            _Quantity(angle, r.angle, 0, 1), _Quantity(torque, r.torque, 1, 0),
+            _Quantity(reference, r.reference, 0, 1), _Quantity(speed, r.drive_speed, 0, 1),
+        ]  # fmt: skip
 
     return of
 
 
-_REVOLUTE = _named("angle_rad", "torque_nm", "velocity_rad_s")
-_PRISMATIC = _named("position_m", "force_n", "velocity_m_s")
+_REVOLUTE = _named("angle_rad", "torque_nm", "reference_rad", "velocity_rad_s")
+_PRISMATIC = _named("position_m", "force_n", "reference_m", "velocity_m_s")
 
 
 def _counted(r: Recorded) -> dict[str, np.ndarray]:

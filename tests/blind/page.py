@@ -43,7 +43,7 @@ OF_EACH: tuple[tuple[Table, str], ...] = (
     (tables.coverage, "Of rightly named causes, parameters that the plant's form has in common with the catalogue's."),
     (tables.seconds, "Quantiles of wall time, beside whatever else ran; `make bench` measures speed."),
 )  # fmt: skip
-"""What every examination tells that has such cases."""
+"""What every examination tells that has such cases; a remark may show the page's ``{picture}``."""
 
 INTRODUCTION = """\
 # How often a diagnosis is right
@@ -64,8 +64,8 @@ def page(examinations: Sequence[Examination], picture: str = "") -> str:
     legs = any(s.machine == "leg" for e in examinations for s in e.scores)
     parts = [INTRODUCTION, "" if legs else OF_ONE_JOINT, _what_was_run(examinations), _targets(examinations)]
     parts += [_section(table, remark, examinations, [richest]) for table, remark in OF_SINGLES]
-    parts += [_section(table, remark, examinations, examinations) for table, remark in OF_EACH]
-    return "\n".join(part for part in parts if part).replace("{picture}", picture)
+    parts += [_section(table, remark.format(picture=picture), examinations, examinations) for table, remark in OF_EACH]
+    return "\n".join(part for part in parts if part)
 
 
 def _section(table: Table, remark: str, every: Sequence[Examination], chosen: Sequence[Examination]) -> str:

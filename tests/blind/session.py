@@ -3,7 +3,7 @@
 import hashlib
 import json
 import shutil
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,7 @@ from tests.blind.faults import IN_EVERY_RUN, fault_named
 from tests.blind.floor import left_by_the_baseline, moving, noise_floor, ripple_floor
 from tests.blind.imperfections import random_imperfections
 from tests.blind.magnitude import rms, size_for
-from tests.blind.mechanisms import MECHANISMS
+from tests.blind.mechanisms import MECHANISMS, Mechanism
 from tests.blind.plan import HIP, KNEE, Plan, Run
 from tests.blind.plant import Recorded, Rig, record
 from tests.blind.smooth import SPRING
@@ -44,6 +44,11 @@ class Session:
     hidden: list[tuple[Cause, float, float]]
     """Cause, size, wanted magnitude."""
     runs: list[Recorded]
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """What was moved and recorded."""
+        return MECHANISMS[self.case.machine]
 
     def of(self, purpose: str) -> list[Recorded]:
         """Return the runs with this purpose."""
@@ -138,8 +143,7 @@ def write(session: Session, recordings: Path, truth: Path) -> None:
     rng = np.random.default_rng([session.case.seed, 4])
     names = [f"run_{number}.parquet" for number in rng.permutation(len(session.runs)) + 1]
     label = hashlib.sha256(f"session {session.case.seed}".encode()).hexdigest()[:8]
-    mechanism = MECHANISMS[session.case.machine]
-    tables = [mechanism.columns(session.rig, r) for r in session.runs]
+    tables = [session.mechanism.columns(session.rig, r) for r in session.runs]
     fault = _spoil(session, tables, names, rng) if session.case.fault else None
     for r, columns, name in zip(session.runs, tables, names, strict=True):
         table = pa.table({key: pa.array(values) for key, values in columns.items()})
@@ -153,7 +157,7 @@ def write(session: Session, recordings: Path, truth: Path) -> None:
 
 
 def _header(session: Session, r: Recorded, label: str) -> dict[str, Any]:
-    told = MECHANISMS[session.case.machine].header(session.rig, r)
+    told = session.mechanism.header(session.rig, r)
     return {
         "contract": "recording/1", "run": r.run.kind, "purpose": r.run.purpose, "sample_rate_hz": 200.0,
         "period_s": PERIOD_S, "session": label, **told,
@@ -175,8 +179,10 @@ def _truth(session: Session, names: list[str], fault: dict[str, Any] | None) -> 
     validate, rig = session.of("validate"), session.rig
 
     def by_joint(values: np.ndarray) -> dict[str, float]:
-        joints = MECHANISMS[session.case.machine].joints
-        return dict(zip(joints, (rig.units.torque * np.asarray(values, float)).tolist(), strict=False))
+        joints = session.mechanism.joints
+        # Of a machine of one joint, what would be the knee is no joint.
+        own = rig.units.factor(1, 0) * np.asarray(values, float)[: len(joints)]
+        return dict(zip(joints, own.tolist(), strict=True))
 
     return {
         "case": session.case.as_dict(),
@@ -190,12 +196,7 @@ def _truth(session: Session, names: list[str], fault: dict[str, Any] | None) -> 
             {"file": name, "run": r.run.kind, "purpose": r.run.purpose, "duration_s": r.run.duration_s}
             for name, r in zip(names, session.runs, strict=True)
         ],
-        "person": asdict(rig.person),
-        "X": {kind: rig.leg(Run(kind, "train", 0.0, None)).inertial().tolist() for kind in session.case.kinds},
-        "machine": {
-            name: np.asarray(getattr(rig.machine, name)).tolist()
-            for name in ("coulomb", "viscous", "hip_rotor", "counts", "ripple", "ripple_time")
-        },
+        **session.mechanism.truth(rig, session.case.kinds),
     }
 
 
@@ -205,14 +206,15 @@ def _hidden(session: Session, cause: Cause, size: float, wanted: float) -> dict[
     share = effect / torque if len(session.hidden) == 1 else wanted
     return {
         "effect": cause.effect,
-        "joint": None if cause.joint is None else MECHANISMS[session.case.machine].joints[cause.joint],
+        "joint": None if cause.joint is None else session.mechanism.joints[cause.joint],
         "form": cause.form,
         "own_form": cause.own,
+        # What the form is drawn and installed with, so the simulated leg's; parameters are the recording's.
         "size": size,
         "shape": [float(x) for x in cause.shape],
         "parameters": session.rig.units.converted(cause.effect, cause.parameters(size)),
         "kin": list(cause.kin),
         "wanted_magnitude": wanted,
         "magnitude": share,
-        "rms_nm": share * torque * session.rig.units.torque,
+        "rms_nm": session.rig.units.factor(1, 0) * share * torque,
     }

@@ -83,6 +83,12 @@ def test_a_page_of_machines_of_one_joint_says_so():
     assert "| slide | 50.0 % of 2 (9 to 91) |" in section(page([slid]), "By machine")
 
 
+def test_only_the_remark_on_probabilities_shows_the_picture():
+    said = page([replace(MIXED, command="python -m tests.blind --out {picture}")], "images/one.png")
+    assert "`python -m tests.blind --out {picture}`" in said
+    assert said.count("images/one.png") == 1 and "(images/one.png)" in section(said, "Reliability of the probabilities")
+
+
 @pytest.mark.parametrize("scores", [MIXED.scores, [SILENT]], ids=["mixed", "nothing was named"])
 def test_the_page_and_its_picture_are_written_from_records(tmp_path, scores):
     write(tmp_path, replace(MIXED, scores=scores))

@@ -11,6 +11,7 @@ import scipy.io
 from numpy.testing import assert_allclose
 
 from exoid_cli.app import run
+from pipelines.importing.numbers import numbers
 from tests.importing.conftest import MAP
 
 
@@ -284,6 +285,13 @@ def test_dates_where_an_angle_should_be_are_no_numbers(imported, pendulum, tmp_p
     assert outcome.code == 2 and "with text, the first '2025-03-30" in outcome.err
 
 
+def test_a_date_that_is_missing_is_no_text():
+    findings = []
+    values = np.array(["2025-03-30", "NaT", "NaT"], dtype="datetime64[ns]")
+    assert np.isnan(numbers(values, "angle", findings)).all()
+    assert [finding.found for finding in findings] == ["1 row with text, the first '2025-03-30T00:00:00.' in row 0"]
+
+
 def test_a_guess_takes_dates_of_parquet_for_dates(imported, pendulum, tmp_path, capsys):
     dates = pd.Timestamp("2025-03-30 01:59:58.000123") + pd.to_timedelta(pendulum.time, unit="s")
     path = as_parquet(pendulum, tmp_path, dates)
@@ -292,3 +300,19 @@ def test_a_guess_takes_dates_of_parquet_for_dates(imported, pendulum, tmp_path, 
     assert tomllib.loads(text)["time"] == {"column": "time", "unit": "iso8601"}
     frame = imported(path, map_text=text).recording("log_train").frame
     assert_allclose(np.diff(frame["time_s"]), 0.005, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "coarse"), [("time_s", False), ("t [ms]", False), ("x", False), ("time_s", True), ("t [ms]", True)]
+)
+def test_a_guess_takes_durations_of_parquet_for_ns_whatever_their_name_says(
+    imported, pendulum, tmp_path, capsys, name, coarse
+):
+    since = pd.to_timedelta(pendulum.time, unit="s").round("us")
+    path = tmp_path / "log.parquet"
+    pd.DataFrame({name: since.floor("10ms") if coarse else since} | pendulum.columns() | {"time": 0.0}).to_parquet(path)
+    assert run(["import", str(path), "--guess"]) == 0
+    text = capsys.readouterr().out
+    assert tomllib.loads(text)["time"] == ({"rate_hz": 200.0} if coarse else {"column": name, "unit": "ns"})
+    frame = imported(path, map_text=text).recording("log_train").frame
+    assert_allclose(frame["time_s"], pendulum.time[: len(frame)], atol=1e-9)

@@ -76,6 +76,48 @@ def test_a_clock_too_coarse_for_its_rows_gives_their_rate(imported, guessed, pen
     assert_allclose(frame["time_s"], pendulum.time[: len(frame)], atol=1e-9)
 
 
+def test_a_pause_as_long_as_the_log_changes_no_rate_and_is_told(guessed, pendulum, write_csv):
+    paused = pendulum.time + 10.0 * (pendulum.time >= 5.0)
+    text, doubts = guessed(write_csv(swinging(pendulum) | {"time": np.floor(100.0 * paused) / 100.0}))
+    assert "rate_hz = 200.0" in text
+    assert "none came for 10 s" in doubts["time.rate_hz"]
+
+
+def test_stamps_with_three_and_four_rows_by_turns_give_the_rate_of_both(guessed, pendulum, write_csv):
+    stamps = np.arange(2000) * 3 // 10 / 100.0
+    text, doubts = guessed(write_csv(swinging(pendulum) | {"time": stamps}))
+    assert tomllib.loads(text)["time"]["rate_hz"] == pytest.approx(1000.0 / 3.0, rel=2e-3)
+    assert "none came" not in doubts["time.rate_hz"]
+
+
+def test_a_coarse_clock_whose_stamps_have_few_rows_and_many_by_turns_gives_no_rate(pendulum, write_csv, capsys):
+    stamps = np.repeat(np.arange(400) / 50.0, np.tile([2, 8], 200))
+    path = write_csv(swinging(pendulum) | {"time": stamps})
+    assert run(["import", str(path), "--guess"]) == 2
+    assert "goes forward as a clock does" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("stamps", ["numbers", "dates"])
+def test_a_fine_clock_without_a_name_goes_before_a_coarse_one_of_its_rate_that_has_one(
+    imported, guessed, pendulum, write_csv, stamps
+):
+    coarse = np.floor(pendulum.time)
+    if stamps == "dates":
+        dates = pd.Timestamp("2026-03-01 12:00:00") + pd.to_timedelta(coarse, unit="s")
+        coarse = np.array(dates.strftime("%Y-%m-%d %H:%M:%S"))
+    path = write_csv(swinging(pendulum) | {"time": coarse, "x": 1e6 * pendulum.time})
+    text, doubts = guessed(path)
+    assert tomllib.loads(text)["time"] == {"column": "x", "unit": "us"} and "time.column" in doubts
+    frame = imported(path, map_text=text).recording("log_train").frame
+    assert_allclose(frame["time_s"], pendulum.time[: len(frame)], atol=1e-9)
+
+
+def test_what_rises_at_another_rate_than_a_coarse_clock_does_not_take_its_place(guessed, pendulum, write_csv):
+    others = {"index": 2 * np.arange(2000), "x": 1e3 * pendulum.time**2, "part": 1e6 * pendulum.time % 1e6}
+    text, _ = guessed(write_csv(swinging(pendulum) | {"time": np.floor(100.0 * pendulum.time) / 100.0} | others))
+    assert tomllib.loads(text)["time"] == {"rate_hz": 200.0}
+
+
 def test_what_names_do_not_say_is_unsure(guessed, pendulum, write_csv):
     _, doubts = guessed(write_csv(dict(zip("abcd", swinging(pendulum).values(), strict=True))))
     assert {"joint[0].angle.column", "joint[0].angle.unit", "joint[0].torque.column", "time.column"} <= doubts.keys()
@@ -505,6 +547,38 @@ def test_a_map_of_counts_imports_once_all_that_was_asked_for_is_filled_in(import
     assert_allclose(frame[reference] - frame[angle], 3 * count, atol=1e-9)
 
 
+SIGNED = {"pos_counts": "angle", "speed [counts/s]": "velocity", "ref_counts": "reference", "iq_mA": "torque"}
+
+
+@pytest.mark.parametrize("unsigned", [[name] for name in SIGNED] + [[*SIGNED]], ids=lambda names: "+".join(names))
+def test_a_sign_that_was_lost_is_found_again_whatever_lost_it(imported, guessed, pendulum, write_csv, unsigned):
+    columns, per_rad = swinging(pendulum), 4096 / (2.0 * np.pi)
+    logged = {
+        "time_us": np.round(1e6 * pendulum.time),
+        "pos_counts": np.round(per_rad * columns["angle"]),
+        "speed [counts/s]": np.round(per_rad * columns["velocity"]),
+        "ref_counts": np.round(per_rad * columns["angle"]) + 3,
+        "iq_mA": np.round(1e3 * columns["torque"]),
+    }
+    logged = {name: values.astype(int) for name, values in logged.items()}
+    path = write_csv({name: values % 65536 if name in unsigned else values for name, values in logged.items()})
+    text, _ = guessed(path)
+    joint = tomllib.loads(text)["joint"][0]
+    assert [quantity for quantity in SIGNED.values() if joint[quantity].get("signed_bits") == 16] == [
+        SIGNED[name] for name in unsigned
+    ]
+    for key, answer in COUNTED["revolute"][0].items():
+        text = text.replace(f"# {key} =", f"{answer} #")
+    frame = imported(path, map_text=text).recording("log_train").frame
+    for name, factor, (column, values) in zip(
+        ("angle_rad", "velocity_rad_s", "reference_rad", "torque_nm"),
+        (per_rad, per_rad, per_rad, 1e4),
+        list(logged.items())[1:],
+        strict=True,
+    ):
+        assert_allclose(frame[f"joint_{name}"], values[: len(frame)] / factor, atol=1e-9, err_msg=column)
+
+
 def test_a_set_point_in_counts_beside_an_angle_in_mm_asks_for_those_in_a_metre(guessed, pendulum, write_csv):
     place = 40.0 * pendulum.angle
     columns = {"t_s": pendulum.time, "pos_mm": place, "ref_counts": np.round(1e3 * place), "force_N": pendulum.torque}
@@ -664,6 +738,18 @@ def test_angle_and_velocity_are_found_among_hundreds_of_columns_without_names_an
         (tmp_path / "guess.toml").unlink()
         assert (joint["angle"]["column"], joint["velocity"]["column"]) == ("c133", "c77")
     assert looked_at.call_count <= 2 * 100
+
+
+def test_a_column_without_a_number_in_the_middle_of_a_long_log_hides_no_angle(guessed, pendulum, tmp_path, monkeypatch):
+    monkeypatch.setattr("pipelines.importing.consistency.MOST", 1000)
+    rng, rows = np.random.default_rng(1), np.arange(len(pendulum.time))
+    columns = {"time": pendulum.time} | {f"c{k}": rng.normal(size=len(rows)).cumsum() for k in range(25)}
+    columns |= {"c3": pendulum.velocity, "c8": pendulum.angle}
+    columns |= {"c5": np.where(rows < 9, rows**2, np.nan), "c6": np.where(rows % 999 < 2, rows, np.nan)}
+    path = tmp_path / "log.parquet"
+    pd.DataFrame(columns).to_parquet(path)
+    joint = tomllib.loads(guessed(path)[0])["joint"][0]
+    assert (joint["angle"]["column"], joint["velocity"]["column"]) == ("c8", "c3")
 
 
 def test_a_refusal_of_a_log_of_thousands_of_columns_names_the_first(tmp_path, capsys):

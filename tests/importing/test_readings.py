@@ -337,6 +337,27 @@ def test_commas_between_thousands_are_read_over(imported, pendulum, tmp_path):
     assert "torque: commas between thousands; read without them" in " ".join(outcome.out.split())
 
 
+@pytest.mark.parametrize("other", ["---", "ERR", "1234.5", "1234", ""])
+def test_what_has_no_comma_does_not_hide_those_between_thousands(imported, pendulum, write_csv, other):
+    written = [f"{1e3 * torque:,.6f}" for torque in pendulum.torque]
+    assert sum("," in text for text in written) > 300
+    written[77] = other
+    path = write_csv(pendulum.columns() | {"torque": [f'"{text}"' for text in written]})
+    outcome = imported(path, map_text=MAP.replace('unit = "N·m"', 'unit = "mN·m"'))
+    assert "torque: commas between thousands; read without them" in outcome.told
+    expected = pendulum.torque.copy()
+    expected[77] = float(other) / 1e3 if other[:1].isdigit() else np.nan
+    kept = np.isfinite(expected)
+    assert_allclose(outcome.recording().frame["pivot_torque_nm"], expected[kept], atol=1e-9)
+    assert ("1 row with text" in outcome.told) is (other in ("---", "ERR"))
+
+
+def test_where_one_comma_is_between_no_thousands_none_is(imported, pendulum, write_csv):
+    written = [f'"{1e3 * torque:,.6f}"' for torque in pendulum.torque]
+    written[77] = '"0,5"'
+    assert "rows with text" in imported(write_csv(pendulum.columns() | {"torque": written})).told
+
+
 def test_a_comma_that_may_be_a_decimal_one_is_not_taken_for_one_between_thousands(imported, pendulum, tmp_path):
     path = tmp_path / "log.csv"
     rows = zip(pendulum.time, pendulum.angle, pendulum.velocity, pendulum.torque, strict=True)

@@ -40,11 +40,14 @@ def propose(paths: Sequence[Path]) -> Proposal:
     """
     with about(paths[0]):
         source = open_source(paths[0], SourceSettings())
-        columns = {name: _numeric(values) for name, values in source.load(source.names).items()}
+        columns = source.load(source.names)
+        durations = [name for name, values in columns.items() if values.dtype.kind == "m"]
+        columns = {name: _numeric(values) for name, values in columns.items()}
         dates = {name: stamps for name, values in columns.items() if (stamps := _dates(values)) is not None}
         columns |= dates
         found = meanings(source.names)
-        time = guess_time(found, columns, dates)
+        told = dict.fromkeys(durations, "ns") | dict.fromkeys(dates, "iso8601")
+        time = guess_time(found, columns, told)
         if time is None:
             back = [m.column for m in found if m.quantity == "time" and _goes_back(columns[m.column])]
             if back:

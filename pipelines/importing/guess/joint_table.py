@@ -71,7 +71,7 @@ def write_joint(
     _write_zero(proposal, fit if alone else None, units)
     used = [angle.column]
     if velocity is not None:
-        used.append(_write_velocity(proposal, where, joint, kind, units, of_a_motor))
+        used.append(_write_velocity(proposal, where, joint, kind, counted, units, of_a_motor))
     used.append(
         _write_torque(proposal, where, joint, kind, counted, logged, fit if alone else None, constants, units.gear)
     )
@@ -163,7 +163,13 @@ def _write_zero(proposal: Proposal, fit: TorqueFit | None, units: Units) -> None
 
 
 def _write_velocity(
-    proposal: Proposal, where: str, joint: JointColumns, kind: Kind, units: Units, of_a_motor: bool
+    proposal: Proposal,
+    where: str,
+    joint: JointColumns,
+    kind: Kind,
+    counted: Mapping[str, Counting],
+    units: Units,
+    of_a_motor: bool,
 ) -> str:
     column = joint.columns["velocity"].column
     proposal.table("[joint.velocity]", f"{where}.velocity")
@@ -175,6 +181,7 @@ def _write_velocity(
         proposal.key("sign", -1, "it counts the other way than the angle", sure=False)
     if of_a_motor or units.gear != 1.0:
         _write_gear(proposal, "where it is the motor's", units.gear)
+    _write_counting(proposal, counted["velocity"])
     return column
 
 

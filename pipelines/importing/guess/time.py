@@ -1,7 +1,7 @@
 """Which column is the clock, and in which unit."""
 
 import itertools
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,12 @@ from pipelines.settings.units import UNITS
 
 ADVANCES = 0.9
 """Share of the steps of a clock that go forward."""
+ALIKE, UNEVEN = 2.0, 0.1
+"""Stamps have as many rows as usual, and are as far apart, within this factor; of how many may have others."""
+NEAR = 0.1
+"""By so much the rates of two clocks of the same rows may differ, as a share."""
+SAID = {"iso8601": "dates written out", "ns": "durations, here in whole ns"}
+"""Why a unit is that which the file tells."""
 
 
 @dataclass(frozen=True)
@@ -29,38 +35,79 @@ class TimeGuess:
     restarts: bool
     rate_hz: float | None = None
     """Of rows that are uniform, where the clock is too coarse to tell them apart."""
+    pause_s: float = 0.0
+    """The longest that a coarse clock went on without rows."""
 
     def stamps(self, values: NDArray) -> NDArray:
         """Return the stamps of rows (n,) in the clock's unit, from what stands in its column."""
         return values if self.rate_hz is None else np.arange(len(values)) / (self.rate_hz * UNITS[self.unit].factor)
 
 
-def guess_time(meanings: Sequence[Meaning], columns: Mapping[str, NDArray], dates: Container[str]) -> TimeGuess | None:
-    """Return the clock among columns (n,), of which ``dates`` were written out, here in ns; None where none is one."""
+def guess_time(
+    meanings: Sequence[Meaning], columns: Mapping[str, NDArray], told: Mapping[str, str]
+) -> TimeGuess | None:
+    """Return the clock among columns (n,), in ``told`` units where the file says them; None where none is one."""
     advancing = [meaning for meaning in meanings if _advances(columns[meaning.column])]
     named_so = [meaning for meaning in meanings if meaning.quantity == "time"]
-    coarse = [meaning for meaning in named_so if _stands_still(columns[meaning.column])]
-    candidates = [meaning for meaning in advancing if meaning.quantity == "time"] or coarse or advancing
+    coarse = [m for m in named_so if _stands_still(columns[m.column]) and _is_even(columns[m.column].astype(float))]
+    named = [meaning for meaning in advancing if meaning.quantity == "time"]
+    candidates = named or _finer(advancing, coarse, columns, told) or coarse or advancing
     for found in sorted(candidates, key=lambda meaning: meaning.unit is None):
         values = columns[found.column].astype(float)
         step = _step(values, found in coarse)
         fitting = clock.usual_units(step)
-        unit = found.unit if found.unit and UNITS[found.unit].dimension == "time" else None
-        unit = "iso8601" if found.column in dates else unit
+        unit = _unit(found, told)
         if unit is None and not fitting:
             continue
         chosen = unit or fitting[0]
-        rate = f"{1.0 / (step * UNITS[chosen].factor):.4g} Hz"
-        said = "dates written out" if unit == "iso8601" else "its name says so" if unit else ""
+        rate_hz = _rate_hz(step, chosen)
+        rate = f"{rate_hz:.4g} Hz"
+        said = SAID.get(told.get(found.column, ""), "its name says so") if unit else ""
         why = f"{said}: {rate}" if said else f"steps of {step:.4g} are {rate} in {chosen}, and no rate in another"
-        named = found.quantity == "time"
+        called_so = found.quantity == "time"
         wraps_at, restarts = _breaks(values, chosen)
-        usual = clock.SLOWEST_HZ <= 1.0 / (step * UNITS[chosen].factor) <= clock.FASTEST_HZ
-        why += "" if named else "; no name says which column is the time"
+        usual = _is_usual(rate_hz)
+        why += "" if called_so else "; no name says which column is the time"
         why += "" if usual else f", at which no machine is sampled: is it {' or '.join(fitting) or 'another column'}?"
-        even = 1.0 / (step * UNITS[chosen].factor) if found in coarse else None
-        return TimeGuess(found.column, chosen, why, named, named and usual, wraps_at, restarts, even)
+        pause_s = _longest_pause(values) * UNITS[chosen].factor if found in coarse else 0.0
+        even = rate_hz if found in coarse else None
+        return TimeGuess(found.column, chosen, why, called_so, called_so and usual, wraps_at, restarts, even, pause_s)
     return None
+
+
+def _unit(found: Meaning, told: Mapping[str, str]) -> str | None:
+    """Return the unit of a clock that is known: what the file tells goes before what its name says."""
+    named = found.unit if found.unit and UNITS[found.unit].dimension == "time" else None
+    return told.get(found.column, named)
+
+
+def _finer(
+    advancing: Sequence[Meaning], coarse: Sequence[Meaning], columns: Mapping[str, NDArray], told: Mapping[str, str]
+) -> list[Meaning]:
+    """Return the clocks without a name that tell the same rate as a coarse one; what else rises has another."""
+    rates = [rate for m in coarse for _, rate in _usual_rates(m, _step(columns[m.column].astype(float), True), told)]
+    finer = []
+    for found in advancing if rates else ():
+        values = columns[found.column].astype(float)
+        own = [] if found.quantity else _usual_rates(found, _step(values, False), told)
+        if any(abs(hz / rate - 1.0) < NEAR and not _breaks(values, unit)[1] for unit, hz in own for rate in rates):
+            finer.append(found)
+    return finer
+
+
+def _usual_rates(found: Meaning, step: float, told: Mapping[str, str]) -> list[tuple[str, float]]:
+    """Return the units that a clock of such a step may be in, each with its rate, Hz, where machines have such."""
+    unit = _unit(found, told)
+    rates = [(one, _rate_hz(step, one)) for one in ([unit] if unit else clock.usual_units(step))]
+    return [(one, rate) for one, rate in rates if _is_usual(rate)]
+
+
+def _rate_hz(step: float, unit: str) -> float:
+    return 1.0 / (step * UNITS[unit].factor)
+
+
+def _is_usual(rate_hz: float) -> bool:
+    return clock.SLOWEST_HZ <= rate_hz <= clock.FASTEST_HZ
 
 
 def write_time(proposal: Proposal, found: TimeGuess) -> None:
@@ -68,6 +115,8 @@ def write_time(proposal: Proposal, found: TimeGuess) -> None:
     proposal.table("[time]", "time")
     if found.rate_hz is not None:
         why = f"several rows have one stamp of {found.column}; taken for uniform, {found.unit} for its unit"
+        if found.pause_s:
+            why += f"; but none came for {found.pause_s:.3g} s, which `rate_hz` leaves no gap for"
         proposal.key("rate_hz", float(f"{found.rate_hz:.6g}"), why, sure=False)
         return
     proposal.key("column", found.column, _how_it_goes(found), found.sure)
@@ -100,14 +149,42 @@ def _stands_still(values: NDArray) -> bool:
     return bool(np.all(steps >= 0.0) and 0.0 < np.mean(steps > 0.0) <= ADVANCES)
 
 
+def _stamps(values: NDArray) -> tuple[NDArray, NDArray]:
+    """Return how many rows each stamp of a coarse clock (n,) has, (k,), and how far it is to the next, (k,).
+
+    Rows before the first step and after the last are of stamps that were not seen whole.
+    """
+    begins = np.flatnonzero(np.diff(values)) + 1
+    return np.diff(begins), np.diff(values[begins])
+
+
+def _alike(numbers: NDArray) -> NDArray:
+    """Return which of some numbers (k,) are near their median."""
+    median = np.median(numbers)
+    return (numbers * ALIKE >= median) & (numbers <= ALIKE * median)
+
+
+def _is_even(values: NDArray) -> bool:
+    """Tell whether stamps of a coarse clock (n,) have much the same number of rows."""
+    rows, _ = _stamps(values)
+    return not len(rows) or bool(np.mean(~_alike(rows)) <= UNEVEN)
+
+
+def _longest_pause(values: NDArray) -> float:
+    """Return the longest step of a coarse clock (n,) that is none of its own; 0 where there is none."""
+    _, steps = _stamps(values)
+    return float(np.max(steps[steps > ALIKE * np.median(steps)], initial=0.0)) if len(steps) else 0.0
+
+
 def _step(values: NDArray, coarse: bool) -> float:
     """Return the step from one row to the next."""
     if coarse:
-        # Rows before the first step and after the last are of stamps that were not seen whole.
-        whole = np.flatnonzero(np.diff(values))
-        if len(whole) > 1:
-            return float((values[whole[-1]] - values[whole[0]]) / (whole[-1] - whole[0]))
-        return float((values[-1] - values[0]) / (len(values) - 1))
+        rows, steps = _stamps(values)
+        if not len(rows):
+            return float((values[-1] - values[0]) / (len(values) - 1))
+        # Around the medians: these alone would round the rows of a stamp, of which there are three or four by turns.
+        usual = _alike(rows) & _alike(steps)
+        return float(np.sum(steps[usual]) / np.sum(rows[usual])) if usual.any() else np.median(steps) / np.median(rows)
     steps = np.diff(values)
     return float(np.median(steps[steps > 0]))
 

@@ -1,0 +1,29 @@
+"""Every parameter of every cause has a unit that is known."""
+
+import numpy as np
+import pytest
+
+from tests.blind.causes import FORMS, joints_of
+from tests.blind.units import POWERS, Units
+
+SIZE = 0.1
+
+
+def told_by(effect):
+    """Return the names of the parameters that the forms of a cause tell."""
+    rng = np.random.default_rng(900_000)
+    drawn = [made(rng, joint) for made in FORMS[effect] for joint in joints_of(effect)]
+    return {name for cause in drawn for name in cause.parameters(SIZE)}
+
+
+def test_the_table_has_what_causes_tell_and_nothing_else():
+    assert {(effect, name) for effect in FORMS for name in told_by(effect)} == set(POWERS)
+
+
+def test_play_of_a_slide_is_a_length():
+    assert Units(torque=50.0, angle=0.2).converted("backlash", {"play": 0.03}) == {"play": pytest.approx(0.006)}
+
+
+def test_a_parameter_of_unknown_unit_is_refused():
+    with pytest.raises(KeyError):
+        Units().converted("backlash", {"slack": 0.03})
