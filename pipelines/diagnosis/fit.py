@@ -79,13 +79,20 @@ class Fit:
         return ""
 
     def _gives_energy(self, effect: Effect, amplitude: float, baseline: Baseline) -> bool:
-        """Tell whether the level that an effect is an excess over is plainly negative, with nothing in its place."""
-        others = (cause.effect for cause in self.causes if cause.effect.joint == effect.joint)
-        if any(other.dissipative or other.holds for other in others if other.name != effect.name):
-            return False
+        """Tell whether the level that an effect is an excess over is plainly negative, with what else rubs there."""
         place = baseline.names.index(f"{effect.joint} {effect.excess_over}")
+        j = baseline.joints.index(str(effect.joint))
+        level, carried = self.values[place], self.shares[j, place]
+        others = [
+            self.shares[j, column]
+            for column, (other, _) in enumerate(self.amplitudes(), start=baseline.size)
+            if other.joint == effect.joint and other.name != effect.name and (other.dissipative or other.holds)
+        ]
+        if level >= 0.0 or carried <= sum(others):
+            return False
         spread = np.sqrt(ALIKE * np.linalg.pinv(self.normal, hermitian=True)[place, place])
-        return bool(self.values[place] < -max(UNGROUNDED * amplitude, SURE * spread))
+        lacking = -level * (1.0 - sum(others) / carried)
+        return bool(lacking > max(UNGROUNDED * amplitude, SURE * spread))
 
     def amplitudes(self) -> Iterator[tuple[Effect, Parameter]]:
         """Yield effect and parameter that each of the causes' columns is the amplitude of, in their order."""

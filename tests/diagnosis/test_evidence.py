@@ -159,6 +159,12 @@ def test_causes_are_dropped_where_plain_error_is_left_and_three_of_them_sooner()
     assert standing(3.0, 2.2).held_up([TorqueDrift(joint="hip")]), "nor is what goes with wall time"
 
 
+def test_a_hum_is_no_doubt_of_a_cause_that_takes_all_error_and_of_no_other():
+    assert standing(3.0, 1.0).leaves_nothing
+    assert not standing(3.0, 1.5).leaves_nothing
+    assert not standing(1.05, 1.0).leaves_nothing, "there was nothing to take"
+
+
 def test_what_takes_nothing_away_is_no_cause_however_little_there_was():
     drag = [EncoderOffset(joint="hip")]
     assert not standing(1.1, 1.1, torque=100.0).held_up(drag)

@@ -64,3 +64,24 @@ def test_what_no_bent_spring_explains_keeps_its_probability():
 def test_a_drag_of_any_power_of_speed_is_named_alone(power):
     found = diagnosed(lambda t, q, dq, ddq, torque: 0.25 * np.sign(dq) * np.abs(dq) ** power)
     assert found.causes == ("quadratic_drag@arm",)
+
+
+def ties(more):
+    """Return the causes named first and second, and what the first is tied with."""
+    causes = verdict(diagnosed(more))["causes"]
+    return [c["effect"] for c in causes], {tie["effect"] for tie in causes[0]["indistinguishable_from"]}
+
+
+def test_a_spring_that_saturates_is_tied_with_the_ripple_of_few_waves_that_bends_so():
+    named, tied = ties(lambda t, q, dq, ddq, torque: 3.0 * np.tanh((q - 0.1) / 0.4))
+    assert named == ["cogging"] and tied == {"parallel_spring"}
+
+
+def test_a_damper_that_grips_beyond_a_speed_is_a_drag_that_a_stribeck_peak_imitates():
+    named, tied = ties(lambda t, q, dq, ddq, torque: 3.0 * np.sign(dq) * np.maximum(np.abs(dq) - 1.5, 0.0))
+    assert named == ["quadratic_drag"] and tied == {"stribeck_friction"}
+
+
+def test_a_ripple_of_many_waves_is_tied_with_no_spring():
+    named, tied = ties(lambda t, q, dq, ddq, torque: 0.8 * np.sin(20.0 * q) + 0.3 * np.sin(40.0 * q + 1.0))
+    assert named == ["cogging"] and not tied
