@@ -235,7 +235,7 @@ def tone(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> tuple[flo
     """Return the strongest frequency (Hz) that no period of the motion explains, and the share it foretells.
 
     Where a harmonic of the motion's period above twice the motion's own band holds most, it is that one: a motor that
-    hums while it is recorded may do so in step.
+    hums while it is recorded may do so in step. ``residuals`` are (m, O) of each run, N·m; ``j`` is the output.
     """
     return _free_or_in_step(runs, residuals, j)[:2]
 

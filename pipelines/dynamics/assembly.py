@@ -125,7 +125,13 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
 
 
 def motor_inertia(effect: Effect, model: Model, geometry: Geometry) -> float:
-    """Return what stays with the motor where its joint is not rigid, kg·m²; kg at a prismatic joint."""
+    """Return what stays with the motor where its joint is not rigid, kg·m²; kg at a prismatic joint.
+
+    Raises
+    ------
+    InputError
+        Where the joint has play and the machine is no exoskeleton.
+    """
     if effect.on.is_exoskeleton:
         return effect.motor_inertia
     if isinstance(effect, Backlash):
