@@ -223,3 +223,19 @@ def unrealizable(parameters: pd.DataFrame, machine: Machine, geometry: Geometry)
         for run, rows in bodies.groupby("run", sort=False)
         for reason in machine.mechanism.unrealizable(rows["value"].to_numpy(float), geometry)
     ]
+
+
+def upside_down(parameters: pd.DataFrame, machine: Machine) -> list[str]:
+    """Say which first moments of mass of a ``parameters/1`` table lie above their axes, a sentence each.
+
+    Angles count from hanging straight down. A link may be overbalanced, or stand; where none is, the zero or a sign
+    is wrong, or what is taken for gravity is a spring.
+    """
+    moments = {parameter.name for parameter in machine.mechanism.parameters if parameter.unit == "kg·m"}
+    of_bodies = parameters[(parameters["effect"] == RigidBody.name) & parameters["name"].isin(moments)]
+    return [
+        f"{row['run']}: {row['name']} = {row['value']:.3g} kg·m ({row['ci95_low']:.3g} to {row['ci95_high']:.3g}) has "
+        "mass above the axis where the angle is zero, which is to be hanging straight down: unless the link is "
+        "overbalanced or stands up, the zero is half a turn off, a sign is wrong, or a spring is taken for gravity"
+        for row in of_bodies[of_bodies["ci95_high"] < 0.0].to_dict("records")
+    ]

@@ -15,7 +15,7 @@ from pipelines.contracts.joints import either, the
 from pipelines.diagnosis.floor import Floor
 from pipelines.diagnosis.observations import FOLDS, Run
 from pipelines.diagnosis.spline import Curve, fold_products, held_out_error
-from pipelines.diagnosis.tone import HARMONICS, band_hz
+from pipelines.diagnosis.tone import above_the_motion_hz
 from pipelines.mechanics.machine import Machine
 
 LONGEST_S = 2.0
@@ -245,7 +245,7 @@ def _free_or_in_step(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) 
     free = _tone_in(_unrepeated, LOWEST_HZ, runs, residuals, j)
     if not any(run.motion.period_s for run in runs):
         return (*free, False)
-    above = max(LOWEST_HZ, *(HARMONICS * band_hz(run) for run in runs))
+    above = max(above_the_motion_hz(run) for run in runs)
     in_step = _tone_in(_repeated, above, runs, residuals, j)
     return (*in_step, True) if in_step[1] > max(MOST, free[1]) else (*free, False)
 

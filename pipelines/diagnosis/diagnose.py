@@ -50,7 +50,7 @@ from pipelines.label import effect_labelled
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.origin import giving
 from pipelines.mechanics.scale import on_one_scale
-from pipelines.model import unrealizable
+from pipelines.model import unrealizable, upside_down
 
 SEARCH_SHARE = 0.75
 """Of the progress bar that filling the bank takes."""
@@ -112,6 +112,11 @@ class Diagnosis:
     def unrealizable(self) -> list[str]:
         """Why no real machine has the extended model's rigid bodies; empty when one may."""
         return unrealizable(self.parameters, self.baseline.machine, self.train[0].motion.geometry)
+
+    @property
+    def upside_down(self) -> list[str]:
+        """Which links the extended model has standing on their heads; empty when none."""
+        return upside_down(self.parameters, self.baseline.machine)
 
     @property
     def causes(self) -> tuple[str, ...]:

@@ -35,14 +35,19 @@ def strongest_tone(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray
         window = np.hanning(len(filled))
         power = np.abs(np.fft.rfft(filled * window[:, np.newaxis], axis=0)) ** 2
         power *= 2.0 / (np.sum(window**2) * len(filled)) / there**2
-        power[np.fft.rfftfreq(len(filled), spacing) < max(LOWEST_HZ, HARMONICS * band_hz(run))] = 0.0
+        power[np.fft.rfftfreq(len(filled), spacing) < above_the_motion_hz(run)] = 0.0
         peak = np.argmax(power, axis=0)
         for o, at in enumerate(peak):
             tones[o] = max(tones[o], np.sqrt(power[max(at - WIDTH, 0) : at + WIDTH + 1, o].sum()))
     return tones
 
 
-def band_hz(run: Run) -> float:
+def above_the_motion_hz(run: Run) -> float:
+    """Return the frequency above which the motion, and what a model gets wrong of it, has no lines."""
+    return max(LOWEST_HZ, HARMONICS * _band_hz(run))
+
+
+def _band_hz(run: Run) -> float:
     """Return the frequency below which the joints' speeds have nearly all of their power."""
     speed = run.slow(run.motion.dq)[run.motion.valid]
     power = np.sum(np.abs(np.fft.rfft(speed - speed.mean(axis=0), axis=0)) ** 2, axis=1)

@@ -266,7 +266,7 @@ def _caveats(d: Diagnosis) -> list[str]:
         "these data show it was not asked"
         for effect in d.baseline.known
     ]
-    shown = hiding * (not d.spoilt) + turning
+    shown = (hiding + d.upside_down) * (not d.spoilt) + turning
     return known + _untold_length(d) + [noisy] * d.noisy_angles + shown + _of_one_run(d) + _of_one_kind(d)
 
 

@@ -24,7 +24,7 @@ from pipelines.identification.runs import Runs, checked
 from pipelines.identification.validation import Validation, validate
 from pipelines.mechanics.run import Run
 from pipelines.mechanics.scale import on_one_scale
-from pipelines.model import Model, Term, baseline, unrealizable
+from pipelines.model import Model, Term, baseline, unrealizable, upside_down
 
 BIASED = (
     f"{IN_WORDS}, which lets every fit take the machine for too light; set filter.cutoff_hz = {CUTOFF_HZ:g}, and see "
@@ -62,7 +62,7 @@ class Identified:
     method: dict[str, Any]
     """How it was found, for the file's metadata."""
     remarks: list[str]
-    """What the method says of these data, a sentence each."""
+    """What the method says of these data, and of a machine that would stand on its head, a sentence each."""
     angle_noise: list[str]
     """A sentence where noise of the angles biases every fit; empty where it does not."""
 
@@ -122,7 +122,10 @@ def identify(motions: Sequence[Run], estimator: Estimator | None = None) -> Iden
         ],
         unrealizable=_unrealizable(table, runs),
         method=_method(estimator, fits),
-        remarks=[f"{kind}: {remark}" for kind, fit in fits.items() for remark in fit.remarks],
+        remarks=[
+            *(f"{kind}: {remark}" for kind, fit in fits.items() for remark in fit.remarks),
+            *upside_down(table, runs.motions[0].machine),
+        ],
         angle_noise=[BIASED] * is_loud(training.runs),
     )
 

@@ -155,6 +155,18 @@ def test_a_pendulum_and_a_screw_are_identified_without_exoid_knowing_their_size(
     assert np.allclose(axis["value"], [90.0, 20.0, 200.0], rtol=0.05)
 
 
+def test_a_pendulum_whose_zero_is_half_a_turn_off_is_told_to_stand_on_its_head():
+    hanging = motions(pendulum)
+    turned = [replace(m, q=m.q + np.pi) for m in hanging]
+    (told,) = identify(turned).remarks
+    assert told.startswith("exo_alone: X2 = -0.125 kg·m")
+    assert "the zero is half a turn off" in told
+    assert identify(hanging).remarks == []
+    on_its_head, as_it_should = (verdict(diagnose(runs))["caveats"] for runs in (turned, hanging))
+    assert any("the zero is half a turn off" in caveat for caveat in on_its_head)
+    assert as_it_should == []
+
+
 def test_only_what_a_machine_can_have_and_show_is_a_candidate():
     arm = machine_of([Joint("arm")], Geometry())
     turntable = machine_of([Joint("table")], Geometry(gravity_m_s2=0.0))
