@@ -94,9 +94,30 @@ def _held(raw: NDArray) -> str:
 def stamps(raw: NDArray, settings: TimeSettings, findings: list[Finding]) -> NDArray:
     """Return time stamps (n,) as numbers in the map's unit; whole numbers stay whole, for nanoseconds since 1970 are
     more than a float64 can tell apart.
+
+    Raises
+    ------
+    InputError
+        Where whole numbers are larger than any clock counts.
     """
     found = whole_nanoseconds(raw) if settings.unit == "iso8601" or raw.dtype.kind in "mM" else raw
-    return found if found.dtype.kind in "iu" else numbers(found, "time", findings)
+    return whole(found) if found.dtype.kind in "iu" else numbers(found, "time", findings)
+
+
+def whole(found: NDArray) -> NDArray:
+    """Return whole stamps (n,) as int64: of narrower numbers, and of those without a sign, a difference wraps round.
+
+    Raises
+    ------
+    InputError
+        Where they are larger than that holds.
+    """
+    if found.dtype.kind == "u" and len(found) and found.max() > np.iinfo(np.int64).max:
+        raise InputError(
+            f"has the time stamp {found.max()}, more than any clock counts; correct time.column in the map, or mark "
+            "stamps that are missing as such"
+        )
+    return found.astype(np.int64)
 
 
 def seconds(found: NDArray, origin: float, settings: TimeSettings, findings: list[Finding]) -> NDArray:

@@ -11,7 +11,7 @@ from pipelines.errors import InputError, SettingsError
 from pipelines.importing import clock
 from pipelines.importing.clock import Run
 from pipelines.importing.finding import Finding, counted
-from pipelines.importing.numbers import numbers
+from pipelines.importing.numbers import TAKEN_FOR_MISSING, numbers
 from pipelines.importing.reading import columns_of, quantity, turn_of_its_counter
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.settings import transmission
@@ -71,16 +71,20 @@ class Log:
             raise InputError(
                 f"{channel.enabled!r} has {len(told)} rows where the clock has {self.rows}, expected as many"
             )
-        # What is no number says of no row that the drive was on.
-        off = ~(np.abs(told[run.rows]) > 0.0)
-        if off.all():
+        said = told[run.rows]
+        off, blank = said == 0.0, np.isnan(said)
+        if (off | blank).all():
+            what = "has no number in any row" if blank.all() else "says of no row that the drive was on"
             raise InputError(
-                f"{channel.enabled!r} says of every row that the drive was off; correct joint.enabled in the map"
+                f"{channel.enabled!r} {what}, expected 0 where the drive was off and another number where it was on; "
+                "correct joint.enabled in the map, or leave it out"
             )
-        if off.any():
-            seen = f"{channel.enabled} is 0 in {counted(int(off.sum()), 'row')}: the drive was off"
-            findings.append(Finding(channel.target, seen, "taken for missing"))
-        return np.where(off, np.nan, values)
+        for rows, says in ((off, "is 0"), (blank, "has no number")):
+            if rows.any():
+                seen = f"{channel.enabled} {says} in {counted(int(rows.sum()), 'row')}"
+                known = "the drive was off" if rows is off else "it says of none of them that the drive was on"
+                findings.append(Finding(channel.target, f"{seen}: {known}", TAKEN_FOR_MISSING))
+        return np.where(off | blank, np.nan, values)
 
     def _quantity(self, channel: Channel, run: Run, findings: list[Finding]) -> NDArray:
         names = columns_of(channel.reading, channel.where)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
+import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.importing.finding import Finding
@@ -19,7 +20,10 @@ class Beginnings:
         ``columns`` (n,) are in SI, and ``turns`` what a turn of each counter is in SI.
         """
         for name, turn in turns.items():
-            begins = float(columns[name][0])
+            known = columns[name][np.isfinite(columns[name])]
+            if not len(known):
+                continue
+            begins = float(known[0])
             first, of = self._first.setdefault(name, (begins, log))
             away = round((begins - first) / turn)
             if away:

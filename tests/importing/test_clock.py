@@ -1,10 +1,12 @@
 """A clock that repeats, goes back, starts over, stops or wraps: seen, told, handled; nothing is invented."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
 from exoid_cli.app import run
+from pipelines.contracts import RECORDING
 from tests.importing.conftest import MAP
 
 
@@ -129,6 +131,29 @@ def test_a_clock_that_was_full_is_told_of_and_counted_on_where_the_map_says_so(
     assert_allclose(outcome.recording().frame["time_s"], pendulum.time, atol=1e-9)
 
 
+@pytest.mark.parametrize("kind", ["uint32", "uint64", "int32", "int64"])
+def test_a_clock_of_any_width_that_starts_over_steps_back_and_does_not_wrap_round(imported, pendulum, tmp_path, kind):
+    """Stamps before the first one, as numbers without a sign, are 50 days later."""
+    milliseconds = np.where(np.arange(2000) < 900, 100_000, 0) + np.round(1e3 * pendulum.time)
+    milliseconds[[30, 31]] = milliseconds[[31, 30]]
+    path = tmp_path / "log.parquet"
+    pd.DataFrame(pendulum.columns() | {"time": milliseconds.astype(kind)}).to_parquet(path)
+    outcome = imported(path, map_text=MAP.replace('unit = "s"', 'unit = "ms"\nrestarts = "split"', 1))
+    assert "goes back a little, 1 time" in outcome.told
+    lengths = sorted(len(RECORDING.read(file).frame) for file in outcome.folder.glob("*.parquet"))
+    assert lengths == [900, 1100]
+
+
+def test_a_stamp_that_no_clock_counts_to_is_refused(imported, pendulum, tmp_path):
+    stamps = np.arange(2000, dtype=np.uint64) * np.uint64(5)
+    stamps[7] = np.iinfo(np.uint64).max
+    path = tmp_path / "log.parquet"
+    pd.DataFrame(pendulum.columns() | {"time": stamps}).to_parquet(path)
+    outcome = imported(path, map_text=MAP.replace('unit = "s"', 'unit = "ms"', 1))
+    assert (outcome.code, outcome.err.count("\n")) == (2, 1)
+    assert "has the time stamp 18446744073709551615, more than any clock counts" in outcome.err
+
+
 def test_a_log_without_a_clock_is_uniform_where_the_map_says_so(imported, pendulum, write_csv):
     columns = pendulum.columns()
     del columns["time"]
@@ -154,6 +179,8 @@ def test_a_channel_with_a_clock_of_its_own_is_interpolated(imported, pendulum, t
     inside = (pendulum.time >= 0.5) & (pendulum.time <= fast[-1])
     assert_allclose(frame["pivot_torque_nm"], pendulum.torque[inside], atol=1e-4)
     assert "sampled at 1000 Hz by a clock of its own (fast)" in outcome.told
+    uniform = imported(path, map_text=text.replace('column = "time"\nunit = "s"', "rate_hz = 200.0", 1))
+    assert (uniform.code, "joint[0].torque.time: found 'fast' beside time.rate_hz" in uniform.err) == (2, True)
 
 
 def test_rows_that_never_hold_both_need_to_be_interpolated(imported, pendulum, write_csv):

@@ -758,3 +758,11 @@ def test_a_refusal_of_a_log_of_thousands_of_columns_names_the_first(tmp_path, ca
     path.write_text(",".join(f"c{k}" for k in range(3000)) + f"\n{row}" * 40, encoding="utf-8")
     assert run(["import", str(path), "--guess"]) == 2
     assert "c18, c19 and 2980 more goes forward" in capsys.readouterr().err
+
+
+def test_a_second_log_of_one_row_is_guessed_without_a_period(guessed, pendulum, write_csv):
+    columns = swinging(pendulum)
+    whole = write_csv(columns, "a.csv")
+    short = write_csv({name: values[:1] for name, values in columns.items()}, "b.csv")
+    text, _ = guessed(whole, short)
+    assert [one["files"] for one in tomllib.loads(text)["recording"]] == ["a.csv", "b.csv"]

@@ -280,9 +280,34 @@ def test_rows_of_a_drive_that_was_off_are_left_out(imported, pendulum, write_csv
 def test_a_drive_that_was_never_on_and_a_column_that_is_not_there_are_refused(imported, pendulum, write_csv):
     path = write_csv(pendulum.columns() | {"on": np.zeros(2000)})
     never = imported(path, map_text=MAP.replace('name = "pivot"', 'name = "pivot"\nenabled = "on"'))
-    assert (never.code, "'on' says of every row that the drive was off" in never.err) == (2, True)
+    assert (never.code, "'on' says of no row that the drive was on" in never.err) == (2, True)
     absent = imported(path, map_text=MAP.replace('name = "pivot"', 'name = "pivot"\nenabled = "onn"'))
     assert (absent.code, "has no column 'onn', which joint[0].enabled" in absent.err) == (2, True)
+
+
+def test_a_switch_in_words_is_refused_and_one_that_is_silent_now_and_then_is_told(imported, pendulum, write_csv):
+    text = MAP.replace('name = "pivot"', 'name = "pivot"\nenabled = "on"')
+    words = imported(write_csv(pendulum.columns() | {"on": np.repeat(["ON", "OFF"], 1000)}), map_text=text)
+    assert (words.code, words.err.count("\n")) == (2, 1)
+    assert "'on' has no number in any row, expected 0 where the drive was off and another number" in words.err
+    silent = np.repeat(["1", "0"], 1000).astype(object)
+    silent[:20] = ""
+    told = imported(write_csv(pendulum.columns() | {"on": silent}), map_text=text).told
+    assert "on is 0 in 1 000 rows: the drive was off" in told
+    assert "on has no number in 20 rows: it says of none of them that the drive was on" in told
+
+
+def test_a_set_point_that_begins_later_than_the_log_begins_in_no_turn_before(imported, pendulum, write_csv):
+    wrapped = (pendulum.angle + np.pi) % (2 * np.pi) - np.pi
+    late = wrapped.astype(object)
+    late[:50] = ""
+    line = 'velocity = { column = "velocity", unit = "rad/s" }'
+    text = MAP.replace(line, f'{line}\nreference = {{ column = "asked", unit = "rad", wraps_at = {2 * np.pi} }}')
+    outcome = imported(write_csv(pendulum.columns() | {"asked": late}), map_text=text)
+    assert (outcome.code, outcome.err) == (0, "")
+    assert_allclose(outcome.recording().frame["pivot_reference_rad"][50:], pendulum.angle[50:], atol=1e-9)
+    never = imported(write_csv(pendulum.columns() | {"asked": np.full(2000, "")}), map_text=text)
+    assert "Traceback" not in never.err and never.code in (0, 2)
 
 
 def test_joints_that_make_no_mechanism_are_told_before_anybody_waits_for_a_fit(imported, pendulum, write_csv):

@@ -67,6 +67,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
     write_time(proposal, time)
     columns[time.column] = time.stamps(columns[time.column])
     run = _longest_run(columns[time.column], time.unit)
+    assert run is not None, "a clock goes forward over ten rows or more"
     here = {name: values[run.rows] for name, values in columns.items() if len(values) == len(columns[time.column])}
     with about(paths[0]):
         joints = group_joints([m for m in found if m.column in here], here, run.time_s, time.column)
@@ -122,9 +123,11 @@ def _dates(values: NDArray) -> NDArray | None:
     return stamps if np.isfinite(stamps).all() else None
 
 
-def _longest_run(stamps: NDArray, unit: str) -> clock.Run:
+def _longest_run(stamps: NDArray, unit: str) -> clock.Run | None:
+    """Return the longest run of a clock's stamps (n,); None where no two of them follow each other."""
+    stamps = clock.whole(stamps) if stamps.dtype.kind in "iu" else stamps
     runs = clock.runs((stamps - clock.first_stamp(stamps)).astype(float) * UNITS[unit].factor, stamps, [])
-    return max(runs, key=len)
+    return max(runs, key=len, default=None)
 
 
 def _write_geometry(proposal: Proposal, joints: int) -> None:
@@ -144,7 +147,10 @@ def _period(path: Path, time: TimeGuess, joints: Sequence[JointColumns]) -> floa
     stamps = time.stamps(whole_nanoseconds(logged) if time.unit == "iso8601" else _numeric(logged))
     if any(values.dtype.kind not in "iuf" or len(values) != len(stamps) for values in (stamps, *moved.values())):
         return None
-    run = _longest_run(stamps, time.unit)
+    with about(path):
+        run = _longest_run(stamps, time.unit)
+    if run is None:
+        return None
     here = {name: values[run.rows] for name, values in moved.items()}
     return repeats_after(run.time_s, np.column_stack([_motion(joint, here) for joint in joints]))
 
