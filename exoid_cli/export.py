@@ -1,13 +1,16 @@
 """``exoid export``: an identified model in the form that another tool reads."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from exoid_cli import completion
 from exoid_cli.console import console
 from exoid_cli.place import ConfigOption, place_of, settings_in_force
+
+if TYPE_CHECKING:
+    from pipelines.export import Exported, Format
 
 
 def export(
@@ -36,7 +39,6 @@ def export(
     from pipelines.contracts.atomic import write_text
     from pipelines.errors import SettingsError
     from pipelines.export import FORMATS, exported
-    from pipelines.export.exported import values_in_words
     from pipelines.mechanics.read import geometry_from
     from pipelines.validation import suggestion
 
@@ -47,51 +49,65 @@ def export(
     model = model or place_of(config, lacking="no model is given").step("identify").target
     settings = settings_in_force(config)
     made = exported(PARAMETERS.read(model), run, geometry_from(settings))
-    path = _path(model, output, chosen.suffix)
-    meant = next((format.name for format in FORMATS if format.suffix == path.suffix != chosen.suffix), None)
-    if meant:
-        raise SettingsError(f"-o {path}: ends as --to {meant} writes it, expected {chosen.suffix} with --to {to}")
+    path = _path(model, output, chosen)
     with console.working("writing the model"):
-        files = {path.with_suffix(suffix): text for suffix, text in chosen.write(made, path.stem).items()}
-    if path.suffix not in {file.suffix for file in files}:
-        files[path] = files.pop(path.with_suffix(chosen.suffix))
+        files = _texts(made, chosen, path)
     if any(file.resolve() == model.resolve() for file in files):
         raise SettingsError(f"-o {path}: is the model itself; choose another file")
     for file, text in files.items():
         write_text(file, text)
+    _report(made, chosen, list(files))
+
+
+def _path(model: Path, output: Path | None, chosen: "Format") -> Path:
+    """Return the file to write: the one that was asked for, or one in that folder, or one beside the model."""
+    from pipelines.errors import SettingsError
+    from pipelines.export import FORMATS
+
+    if output is None:
+        return model.with_suffix(chosen.suffix)
+    path = output if output.suffix and not output.is_dir() else output / f"{model.stem}{chosen.suffix}"
+    meant = next((format.name for format in FORMATS if format.suffix == path.suffix != chosen.suffix), None)
+    if meant:
+        raise SettingsError(
+            f"-o {path}: ends as --to {meant} writes it, expected {chosen.suffix} with --to {chosen.name}"
+        )
+    return path
+
+
+def _texts(made: "Exported", chosen: "Format", path: Path) -> dict[Path, str]:
+    """Return what goes into each file; the main one is ``path``, whatever its suffix."""
+    files = {path.with_suffix(suffix): text for suffix, text in chosen.write(made, path.stem).items()}
+    if path.suffix not in {file.suffix for file in files}:
+        files[path] = files.pop(path.with_suffix(chosen.suffix))
+    return files
+
+
+def _report(made: "Exported", chosen: "Format", files: list[Path]) -> None:
+    from pipelines.export import Degree
+    from pipelines.export.exported import values_in_words
+
     holdings = made.holdings(chosen)
-    console.emit(
+    terms = [
         {
-            "to": to,
-            "run": made.run,
-            "files": [str(file) for file in files],
-            "warnings": made.driving(),
-            "terms": [
-                {
-                    "term": term.effect.label,
-                    "held": holding.degree.value,
-                    "how": holding.how,
-                    "parameters": {
-                        p.name: {"value": float(value), "unit": p.unit}
-                        for p, value in zip(term.effect.parameters, term.effect.physical(term.values), strict=True)
-                    },
-                }
-                for term, holding in holdings
-            ],
+            "term": term.effect.label,
+            "held": holding.degree.value,
+            "how": holding.how,
+            "parameters": {
+                p.name: {"value": float(value), "unit": p.unit}
+                for p, value in zip(term.effect.parameters, term.effect.physical(term.values), strict=True)
+            },
         }
-    )
+        for term, holding in holdings
+    ]
+    written = [str(file) for file in files]
+    console.emit({"to": chosen.name, "run": made.run, "files": written, "warnings": made.driving(), "terms": terms})
     console.table(
         ("term", "held", "how"), [(term.effect.label, holding.degree, holding.how) for term, holding in holdings]
     )
     for sentence in made.driving():
         console.warn(sentence)
     for term, holding in holdings:
-        if holding.degree == "left out":
+        if holding.degree is Degree.NOT:
             console.warn(f"{term.effect.label} is not in the file ({holding.how}): {values_in_words(term)}")
-    console.say(f"{', '.join(map(str, files))}: the {made.run} model")
-
-
-def _path(model: Path, output: Path | None, suffix: str) -> Path:
-    if output is None:
-        return model.with_suffix(suffix)
-    return output if output.suffix and not output.is_dir() else output / f"{model.stem}{suffix}"
+    console.say(f"{', '.join(written)}: the {made.run} model")

@@ -78,6 +78,7 @@ def identify(
         "validation": found.validation.as_json(),
         "collinear": found.collinear,
         "unrealizable": found.unrealizable,
+        "remarks": found.remarks,
         "angle_noise": found.angle_noise,
     }
     PARAMETERS.write(output / "parameters.parquet", found.parameters, shared | described)

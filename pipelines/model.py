@@ -228,9 +228,11 @@ def unrealizable(parameters: pd.DataFrame, machine: Machine, geometry: Geometry)
 def upside_down(parameters: pd.DataFrame, machine: Machine) -> list[str]:
     """Say which first moments of mass of a ``parameters/1`` table lie above their axes, a sentence each.
 
-    Angles count from hanging straight down. A link may be overbalanced, or stand; where none is, the zero or a sign
-    is wrong, or what is taken for gravity is a spring.
+    Empty where gravity does not act: nothing is above then. Angles count from hanging straight down. A link may be
+    overbalanced, or stand; where none is, the zero or a sign is wrong, or what is taken for gravity is a spring.
     """
+    if not machine.mechanism.has_gravity:
+        return []
     moments = {parameter.name for parameter in machine.mechanism.parameters if parameter.unit == "kg·m"}
     of_bodies = parameters[(parameters["effect"] == RigidBody.name) & parameters["name"].isin(moments)]
     return [

@@ -116,7 +116,8 @@ class Effect(ABC):
     absorbed: ClassVar[Mapping[str, str]] = {}
     """Places of joints at which another parameter takes it up whole, and which."""
     by_angle: ClassVar[bool] = False
-    """True where it shows only in a torque that depends on where the joints stand, as gravity's does."""
+    """True where it shows only in a torque that depends on where its joint stands, as gravity's does; at the whole
+    machine, on where the first one does."""
     holds: ClassVar[bool] = False
     """True where it raises what can hold a joint that stands."""
     whole_leg: ClassVar[bool] = False
@@ -175,18 +176,19 @@ class Effect(ABC):
     def possible(cls, machine: Machine) -> list[str | None]:
         """Return the joints of a machine that can have it and show it; ``[None]`` where it is the whole machine's."""
         mechanism = machine.mechanism
-        if cls.name in mechanism.absorbs or (cls.by_angle and not mechanism.bends):
+        if cls.name in mechanism.absorbs:
             return []
         if cls.name in THE_LEG.mechanism.reactions and cls.name not in mechanism.reactions:
             return []
         if cls.joints is not None and not set(cls.joints) & set(mechanism.places):
             return []
+        shows_at = mechanism.bends_at if cls.by_angle else mechanism.places
         if cls.whole_leg:
-            return [None]
+            return [None] if mechanism.places[0] in shows_at else []
         places = dict(zip(machine.names, mechanism.places, strict=True))
         return [
             name for name, place in places.items()
-            if (cls.joints is None or place in cls.joints) and place not in cls.absorbed
+            if place in shows_at and (cls.joints is None or place in cls.joints) and place not in cls.absorbed
         ]  # fmt: skip
 
     @property

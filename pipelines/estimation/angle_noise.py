@@ -36,7 +36,7 @@ def is_loud(runs: Sequence[Run]) -> bool:
     body = [k for k, (effect, _) in enumerate(model.linear_parameters) if isinstance(effect, RigidBody)]
     grams = []
     for piece in (piece for run in runs for piece in _beginning(run)):
-        if piece.motion.cutoff_hz is not None and piece.motion.cutoff_hz <= CUTOFF_HZ:
+        if piece.motion.cutoff_hz <= CUTOFF_HZ:
             return False
         grams.append(_gram(piece, model, body))
     return _outdoes(np.sum(grams, axis=0), len(model.linear_parameters), body)

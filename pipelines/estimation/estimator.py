@@ -77,6 +77,11 @@ def estimated(fit: Fit) -> Estimate:
     return Estimate(**vars(fit), covariance=covariance, critical=S.critical)
 
 
+def distrust(settled: bool, after: str) -> tuple[str, ...]:
+    """Return what to say of a search that went on for so long: nothing where it settled."""
+    return () if settled else (f"did not settle in {after}; distrust its values",)
+
+
 def carry_of(problem: Problem, sensitivity: NDArray, slope: NDArray) -> NDArray:
     """Return how fitted values answer to held ones, (k, p): the sum of scores falls by ``slope`` (k, p) per unit."""
     carry = np.zeros_like(slope)

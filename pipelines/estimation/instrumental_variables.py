@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pipelines.dynamics.closed_loop import closed_loop
 from pipelines.estimation.durbin_wu_hausman import DurbinWuHausman, durbin_wu_hausman
-from pipelines.estimation.estimator import Estimator, Fit, carry_of, estimated
+from pipelines.estimation.estimator import Estimator, Fit, carry_of, distrust, estimated
 from pipelines.estimation.least_squares import LEAST_NM, WeightedLeastSquares
 from pipelines.estimation.long_run import Scores
 from pipelines.estimation.normal_matrix import inverse
@@ -62,9 +62,10 @@ class InstrumentalVariables(Estimator):
         # On the same rows by the same weights: they would differ by what one of them leaves out, too.
         itself = [replace(r, instruments=r.measured.regressor) for r in rows]
         test = durbin_wu_hausman(_solved(problem, itself, found.weights), found)
-        settled = () if change.max() < SETTLED else (f"did not settle in {ITERATIONS} iterations; distrust its values",)
-        told = {"iterations": iteration, "durbin_wu_hausman": test.as_json()}
-        return replace(found, told=told, remarks=(*settled, _sentence(test, problem.names, found)))
+        settled = bool(change.max() < SETTLED)
+        told = {"iterations": iteration, "settled": settled, "durbin_wu_hausman": test.as_json()}
+        remarks = (*distrust(settled, f"{ITERATIONS} iterations"), _sentence(test, problem.names, found))
+        return replace(found, told=told, remarks=remarks)
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,14 @@ absolute residual, until both rest; then Tukey's bisquare with that scale. On Ga
 least squares for equal intervals.
 """
 
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.estimation.estimator import Estimator, Fit, carry_of
+from pipelines.estimation.estimator import Estimator, Fit, carry_of, distrust
 from pipelines.estimation.least_squares import LEAST_NM, WeightedLeastSquares
 from pipelines.estimation.long_run import Scores
 from pipelines.estimation.normal_matrix import inverse
@@ -76,8 +77,9 @@ class IterativelyReweighted(Estimator):
         """Fit all runs at once."""
         start = WeightedLeastSquares().fit(problem)
         scale = _sums(problem, start.values, start.weights**-0.5, Huber).scale
-        values, scale, first = _iterated(problem, start.values, scale, Huber)
-        values, _, second = _iterated(problem, values, scale, Bisquare)
+        first = _iterated(problem, start.values, scale, Huber)
+        second = _iterated(problem, first.values, first.scale, Bisquare)
+        values, scale, settled = second.values, first.scale, first.settled and second.settled
         sums = _sums(problem, values, scale, Bisquare)
         free = np.ix_(problem.fitted, problem.fitted)
         sensitivity = inverse(sums.slope[free], problem.names)
@@ -86,20 +88,36 @@ class IterativelyReweighted(Estimator):
         return Fit(
             values, sums.normal[free], sensitivity, carry_of(problem, sensitivity, sums.slope[problem.fitted]),
             scale**-2.0, _scores(problem, values, scale),
-            {"iterations": first + second, "scale_nm": scale.tolist(), "rejected_share": shares},
-            tuple(
-                f"{joint}: {100 * share:.1f} % of the blocks are more than {BISQUARE:g} robust standard deviations off "
-                "and count for nothing"
-                for joint, share in shares.items()
-                if share > WORTH_SAYING
-            ),
+            {"iterations": first.iterations + second.iterations, "settled": settled, "scale_nm": scale.tolist(),
+             "rejected_share": shares},
+            distrust(settled, f"{ITERATIONS} iterations") + _of_outliers(shares),
         )  # fmt: skip
 
 
-def _iterated(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> tuple[NDArray, NDArray, int]:
-    """Return values and scale where they rest, and after how many iterations; the bisquare's scale is held."""
+def _of_outliers(shares: Mapping[str, float]) -> tuple[str, ...]:
+    return tuple(
+        f"{joint}: {100 * share:.1f} % of the blocks are more than {BISQUARE:g} robust standard deviations off "
+        "and count for nothing"
+        for joint, share in shares.items()
+        if share > WORTH_SAYING
+    )
+
+
+class _Iterated(NamedTuple):
+    """Where the iteration ended."""
+
+    values: NDArray
+    """(k,)."""
+    scale: NDArray
+    """(J,) N·m."""
+    iterations: int
+    settled: bool
+
+
+def _iterated(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> _Iterated:
+    """Fit and weigh in turn until the values rest; the bisquare's scale is held."""
     free, held = problem.fitted, problem.of_held
-    for iteration in range(1, ITERATIONS + 1):  # noqa: B007
+    for iteration in range(1, ITERATIONS + 1):
         sums = _sums(problem, values, scale, loss)
         sensitivity = inverse(sums.normal[np.ix_(free, free)], problem.names)
         before = values
@@ -107,8 +125,8 @@ def _iterated(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> 
         if loss is Huber:
             scale = sums.scale
         if np.all(np.abs(values - before) < SETTLED * np.sqrt(np.diag(sensitivity))):
-            break
-    return values, scale, iteration
+            return _Iterated(values, scale, iteration, settled=True)
+    return _Iterated(values, scale, ITERATIONS, settled=False)
 
 
 def _sums(problem: Problem, values: NDArray, scale: NDArray, loss: Loss) -> Sums:

@@ -7,13 +7,14 @@ too, and noise in the angles stands in the residual where it belongs. It costs s
 """
 
 from collections.abc import Hashable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from pipelines.dynamics.replay import replay
-from pipelines.estimation.estimator import Estimator, Fit, carry_of
+from pipelines.estimation.estimator import Estimator, Fit, carry_of, distrust
 from pipelines.estimation.least_squares import WeightedLeastSquares
 from pipelines.estimation.long_run import Scores
 from pipelines.estimation.normal_matrix import inverse
@@ -52,12 +53,14 @@ class OutputError(Estimator):
         size = np.abs(problem.held) / 50.0
         size[problem.fitted] = np.sqrt(np.diag(start.sensitivity))
         values = nearest(problem, start.values, start.normal)
-        evaluations = 0
+        simulations = 0
         for _ in range(PASSES):
             weights = _weights(_errors(problem, problem.completed(values)))
-            values, steps = _searched(problem, values, size, weights)
-            evaluations += steps
-        return _fit(problem, values, size, weights, evaluations)
+            values, more, settled = _searched(problem, values, size, weights)
+            simulations += more
+        found = _fit(problem, values, size, weights)
+        told = found.told | {"simulations": simulations, "settled": settled}
+        return replace(found, told=told, remarks=distrust(settled, f"{simulations} simulations of all runs"))
 
 
 def _errors(problem: Problem, every: NDArray) -> list[NDArray]:
@@ -84,8 +87,10 @@ def _weights(errors: Sequence[NDArray]) -> NDArray:
     return np.asarray(1.0 / np.maximum(squares.mean(axis=0), LEAST_RAD**2))
 
 
-def _searched(problem: Problem, values: NDArray, size: NDArray, weights: NDArray) -> tuple[NDArray, int]:
-    """Return the values with the least weighted square error, and how many simulations of all runs that took."""
+def _searched(problem: Problem, values: NDArray, size: NDArray, weights: NDArray) -> tuple[NDArray, int, bool]:
+    """Return the values with the least weighted square error, after how many simulations of all runs, and whether the
+    search came to rest there.
+    """
     unit, root = size[problem.fitted], np.sqrt(weights)
     outputs = sum(error.size for error in _errors(problem, problem.completed(values)))
 
@@ -106,10 +111,10 @@ def _searched(problem: Problem, values: NDArray, size: NDArray, weights: NDArray
         return np.concatenate([(s * root[:, np.newaxis]).reshape(-1, k) for s in slopes]) * unit
 
     found = least_squares(residual, np.zeros(len(unit)), jacobian, method="trf", xtol=RESTS, ftol=SETTLED, gtol=None)
-    return values + unit * found.x, int(found.nfev + found.njev * (1 + len(unit)))
+    return values + unit * found.x, int(found.nfev + found.njev * (1 + len(unit))), bool(found.success)
 
 
-def _fit(problem: Problem, values: NDArray, size: NDArray, weights: NDArray, simulations: int) -> Fit:
+def _fit(problem: Problem, values: NDArray, size: NDArray, weights: NDArray) -> Fit:
     every = problem.completed(values)
     errors = _errors(problem, every)
     slopes = _slopes(problem, every, range(len(every)), size)
@@ -121,7 +126,7 @@ def _fit(problem: Problem, values: NDArray, size: NDArray, weights: NDArray, sim
         for part, e in zip(slopes, errors, strict=True)
     ]
     rms = np.sqrt([np.mean(e**2, axis=(0, 1)) for e in errors]).tolist()
-    told = {"window_s": WINDOW_S, "simulations": simulations, "angle_rms": rms}
+    told = {"window_s": WINDOW_S, "angle_rms": rms}
     return Fit(
         values, normal, sensitivity, carry_of(problem, sensitivity, np.asarray(slope)), weights, _by_run(scores), told
     )

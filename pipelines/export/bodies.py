@@ -10,19 +10,21 @@ is a leg with I2 > 0 and I1 > 0 if and only if (X3² + Y3²) / X2 < m2 < (X1 - X
 such an m2 exactly where the mass matrix is positive definite. Here m2 is the middle of that range, and m1 twice the
 least it may be, but no less than m2: a nominal leg, whose X are the identified ones to rounding.
 
-A single joint's body has X1 about the axis; a pendulum's mass is twice the least it may be. What slides weighs X1.
+A single joint's body has X1 about the axis; a pendulum's mass is twice the least it may be, or 1 kg if that is more.
+What slides weighs X1.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
 from pipelines.errors import InputError
 from pipelines.export.exported import Exported
 from pipelines.mechanics.mechanism import Mechanism
-from pipelines.mechanics.mechanisms.leg import LEG
+from pipelines.mechanics.mechanisms.leg import LEG, LEVEL_LEG
 from pipelines.mechanics.mechanisms.single import LIFT, PENDULUM, SLIDE, TURNTABLE
 
 Vector = tuple[float, float, float]
@@ -30,6 +32,8 @@ Vector = tuple[float, float, float]
 SWINGS_FORWARD: Vector = (0.0, -1.0, 0.0)
 """Axis about which a positive angle swings what hangs down forward: x is forward, z up."""
 
+HANGS: Vector = (0.0, 0.0, -1.0)
+LIES_FORWARD: Vector = (1.0, 0.0, 0.0)
 RISES: Vector = (0.0, 0.0, 1.0)
 SLIDES_FORWARD: Vector = (1.0, 0.0, 0.0)
 
@@ -39,24 +43,36 @@ NOMINAL_MASS = 1.0
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body behind its joint. SI units, in the joint's frame, in which the body hangs at angle zero."""
+    """A rigid body behind its joint. SI units, in the joint's frame."""
 
     joint: Joint
     mass: float
     inertia: float
     """About the centre of mass, kg·m²; about every axis: those across the plane of motion do not show, and three equal
     ones keep the triangle inequality that simulators check."""
-    forward: float = 0.0
+    across: float = 0.0
+    """Of the centre of mass, m, to where a positive angle takes the body."""
+    along: float = 0.0
     """Of the centre of mass, m."""
-    down: float = 0.0
-    """Of the centre of mass, along the body, m."""
     axis: Vector = SWINGS_FORWARD
-    below: float = 0.0
+    lies: Vector = HANGS
+    """Direction from the joint along the body, at angle zero."""
+    beyond: float = 0.0
     """From the joint before, along the body before, m."""
     shift: float = 0.0
     """By how much its encoder's angle is more than its own."""
     carried: float = 0.0
     """Share of its weight that a counterweight carries."""
+
+    @property
+    def centre(self) -> NDArray:
+        """Of mass, (3,) m."""
+        return self.across * np.cross(self.axis, self.lies) + self.along * np.array(self.lies) + 0.0  # no -0
+
+    @property
+    def place(self) -> NDArray:
+        """Of its joint in the frame of the one before, (3,) m."""
+        return self.beyond * np.array(self.lies) + 0.0
 
 
 def bodies(exported: Exported) -> tuple[Body, ...]:
@@ -79,6 +95,16 @@ def bodies(exported: Exported) -> tuple[Body, ...]:
 
 def _leg(exported: Exported) -> tuple[Body, ...]:
     X1, X2, X3, X4 = exported.X
+    return _in_series(exported, X1, X2, X3, X4)
+
+
+def _level_leg(exported: Exported) -> tuple[Body, ...]:
+    X1, X2, X3 = exported.X
+    return tuple(replace(body, axis=RISES, lies=LIES_FORWARD) for body in _in_series(exported, X1, X2, X3, None))
+
+
+def _in_series(exported: Exported, X1: float, X2: float, X3: float, X4: float | None) -> tuple[Body, ...]:
+    """Return two links; without an X4, which nothing shows where gravity does not act, what the second makes of it."""
     hip, knee = exported.joints
     across = [_moment_across(exported, joint) for joint in (hip, knee)]
     length, shift = exported.geometry.thigh_length_m, exported.shift()
@@ -90,11 +116,11 @@ def _leg(exported: Exported) -> tuple[Body, ...]:
             "from motions that separate X1, X2 and X3 better, or export to c, matlab or json, which need no bodies"
         )
     m2 = 0.5 * (of_shank**2 / X2 + (X1 - X2) / length**2)
-    left, along = X1 - X2 - m2 * length**2, X4 - m2 * length
+    left, along = X1 - X2 - m2 * length**2, 0.0 if X4 is None else X4 - m2 * length
     of_thigh = np.hypot(along, across[0])
     m1 = max(2.0 * of_thigh**2 / left, m2)
     thigh = Body(hip, m1, left - of_thigh**2 / m1, across[0] / m1, along / m1, shift=shift[0])
-    shank = Body(knee, m2, X2 - of_shank**2 / m2, across[1] / m2, X3 / m2, below=length, shift=shift[1])
+    shank = Body(knee, m2, X2 - of_shank**2 / m2, across[1] / m2, X3 / m2, beyond=length, shift=shift[1])
     return thigh, shank
 
 
@@ -102,7 +128,7 @@ def _pendulum(exported: Exported) -> tuple[Body, ...]:
     (joint,), (X1, X2), (shift,) = exported.joints, exported.X, exported.shift()
     across = _moment_across(exported, joint)
     moment = np.hypot(X2, across)
-    mass = 2.0 * moment**2 / X1 or NOMINAL_MASS
+    mass = max(2.0 * moment**2 / X1, NOMINAL_MASS)
     return (Body(joint, mass, X1 - moment**2 / mass, across / mass, X2 / mass, shift=shift),)
 
 
@@ -133,6 +159,6 @@ def _moment_across(exported: Exported, joint: Joint) -> float:
 
 
 MADE: dict[Mechanism, Callable[[Exported], tuple[Body, ...]]] = {
-    LEG: _leg, PENDULUM: _pendulum, TURNTABLE: _turntable, LIFT: _lift, SLIDE: _slide,
+    LEG: _leg, LEVEL_LEG: _level_leg, PENDULUM: _pendulum, TURNTABLE: _turntable, LIFT: _lift, SLIDE: _slide,
 }  # fmt: skip
 """How each mechanism's bodies are chosen."""

@@ -16,7 +16,7 @@ from pipelines.effects import Side
 from pipelines.effects.friction import Friction
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError, about
-from pipelines.export.format import Format, Holding, left_out
+from pipelines.export.format import Degree, Format, Holding, left_out
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import Machine, machine_of
 from pipelines.mechanics.motion import geometry_of
@@ -95,7 +95,7 @@ class Exported:
         yield from (f"WARNING: {sentence}" for sentence in self.driving())
         for term, holding in self.holdings(format):
             yield f"{term.effect.label}: {holding.degree} ({holding.how})"
-            if holding.degree != "exactly":
+            if holding.degree is not Degree.EXACT:
                 yield f"    {values_in_words(term)}"
 
 

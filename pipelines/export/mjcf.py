@@ -14,7 +14,7 @@ from pipelines.dynamics.assembly import motor_inertia
 from pipelines.effects.joint_elasticity import DAMPING_RATIO
 from pipelines.export.bodies import Body, bodies
 from pipelines.export.exported import Exported
-from pipelines.export.format import Format, Holding, approximate, exact
+from pipelines.export.format import Degree, Format, Holding, approximate, exact
 from pipelines.export.holding import Held, held_friction, looked_up, sound_friction
 from pipelines.export.language import one_line, unique
 from pipelines.export.xml_text import document, number, numbers
@@ -80,10 +80,10 @@ def _body(parent: ET.Element, name: str, twist: str, body: Body, exported: Expor
     inertia = numbers(*[body.inertia] * 3)
     # Two slides of a body that is centred at their frame MuJoCo takes for independent. Where a slide's centre is, its
     # motion does not ask.
-    aside = OFF_CENTRE_M if soft and body.joint.kind == "prismatic" else 0.0
-    centre = numbers(body.forward + aside, 0.0, -body.down)
+    aside = OFF_CENTRE_M * np.array([1.0, 0.0, 0.0]) * bool(soft and body.joint.kind == "prismatic")
+    centre = numbers(*(body.centre + aside))
     ET.SubElement(made, "inertial", pos=centre, mass=number(body.mass), diaginertia=inertia)
-    end = numbers(0.0, 0.0, 0.0, 0.0, 0.0, -exported.geometry.thigh_length_m)
+    end = numbers(0.0, 0.0, 0.0, *(exported.geometry.thigh_length_m * np.array(body.lies)))
     ET.SubElement(made, "geom", type="capsule", size="0.03", fromto=end, contype="0", conaffinity="0")
     return made
 
@@ -95,7 +95,7 @@ def _frame(body: Body) -> dict[str, str]:
     if body.joint.kind == "prismatic":
         return {"pos": numbers(*(-body.shift * axis))} | carried
     quat = numbers(np.cos(0.5 * body.shift), *(-np.sin(0.5 * body.shift) * axis))
-    return {"pos": numbers(0.0, 0.0, -body.below), "quat": quat} | carried
+    return {"pos": numbers(*body.place), "quat": quat} | carried
 
 
 def _joint(body: Body, exported: Exported) -> dict[str, str]:
@@ -103,7 +103,7 @@ def _joint(body: Body, exported: Exported) -> dict[str, str]:
     name, says = body.joint.name, {}
     damping = [0.0, 0.0]
     friction, drag = exported.of("friction", name), exported.of("quadratic_drag", name)
-    if friction and _friction(friction).degree != "left out":
+    if friction and _friction(friction).degree is not Degree.NOT:
         coulomb, damping[0] = sound_friction(friction)
         says["frictionloss"] = number(coulomb)
         # Fast enough to hold within two steps, the fastest that MuJoCo allows.

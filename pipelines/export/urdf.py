@@ -12,7 +12,7 @@ import numpy as np
 
 from pipelines.export.bodies import Body, bodies
 from pipelines.export.exported import Exported
-from pipelines.export.format import Format, Holding, exact
+from pipelines.export.format import Degree, Format, Holding, exact
 from pipelines.export.holding import Held, held_friction, looked_up, sound_friction
 from pipelines.export.language import one_line, unique
 from pipelines.export.xml_text import document, number, numbers
@@ -53,7 +53,7 @@ def write(exported: Exported, stem: str) -> Mapping[str, str]:
 
 def _link(root: ET.Element, name: str, body: Body) -> None:
     inertial = ET.SubElement(ET.SubElement(root, "link", name=name), "inertial")
-    ET.SubElement(inertial, "origin", xyz=numbers(body.forward, 0.0, -body.down), rpy="0 0 0")
+    ET.SubElement(inertial, "origin", xyz=numbers(*body.centre), rpy="0 0 0")
     ET.SubElement(inertial, "mass", value=number(body.mass))
     same, none = number(body.inertia), "0"
     ET.SubElement(inertial, "inertia", ixx=same, iyy=same, izz=same, ixy=none, ixz=none, iyz=none)
@@ -63,14 +63,14 @@ def _joint(root: ET.Element, name: str, parent: str, link: str, body: Body, expo
     joint = ET.SubElement(root, "joint", name=name, type=body.joint.kind)
     # Set back by the shift: at angle zero the link is where its encoder says so.
     back, turns = -body.shift * np.array(body.axis), body.joint.kind == "revolute"
-    place, turned = ([0.0, 0.0, -body.below], back) if turns else (back, np.zeros(3))
+    place, turned = (body.place, back) if turns else (back, np.zeros(3))
     ET.SubElement(joint, "origin", xyz=numbers(*place), rpy=numbers(*turned))
     ET.SubElement(joint, "parent", link=parent)
     ET.SubElement(joint, "child", link=link)
     ET.SubElement(joint, "axis", xyz=numbers(*body.axis))
     ET.SubElement(joint, "limit", lower=number(-pi), upper=number(pi), effort="1e6", velocity="1e3")
     friction = exported.of("friction", body.joint.name)
-    if friction and _friction(friction).degree != "left out":
+    if friction and _friction(friction).degree is not Degree.NOT:
         coulomb, viscous = sound_friction(friction)
         ET.SubElement(joint, "dynamics", damping=number(viscous), friction=number(coulomb))
 

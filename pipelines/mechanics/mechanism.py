@@ -42,8 +42,8 @@ class Mechanism:
     parameters: tuple[Inertial, ...]
     along: Callable[[NDArray, NDArray, NDArray, NDArray], NDArray]
     """Compiled: q, dq, ddq, each (n, J), and the geometry's array to the regressor, (n, J, p)."""
-    bends: bool
-    """Whether its torque depends on where the joints stand, and not on acceleration alone."""
+    bends_at: tuple[str, ...]
+    """Places of the joints whose positions its torque depends on; none where it is of acceleration alone."""
     reactions: Mapping[str, Any] = field(hash=False, compare=False)
     """Compiled equations of effects that differ from mechanism to mechanism, by the effect's name, ``rigid_body``
     among them; an effect that is not listed cannot be there."""

@@ -62,6 +62,8 @@ class Model:
     collinear: tuple[str, ...]
     unrealizable: tuple[str, ...] | None
     """Why it is no real machine; None where the file does not say."""
+    remarks: tuple[str, ...]
+    """What its method, or what is strange about it, is worth a sentence."""
     angle_noise: tuple[str, ...]
     """Why the angles let its rigid bodies be too light; empty where they do not."""
     validation: dict[str, dict[str, dict[str, float]]]
@@ -116,6 +118,7 @@ def _model(session: Session, artifact: Artifact, title: str) -> Model:
         estimates=tuple(replace(e, meaning=meaning(session, e.effect, e.joint, e.name)) for e in estimates(table)),
         collinear=tuple(map(str, about.get("collinear") or ())),
         unrealizable=None if unrealizable is None else tuple(map(str, unrealizable)),
+        remarks=tuple(map(str, about.get("remarks") or ())),
         angle_noise=tuple(map(str, about.get("angle_noise") or ())),
         validation=about.get("validation") or {},
     )

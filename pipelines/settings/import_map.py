@@ -299,8 +299,8 @@ class ImportMap(Settings):
         for place, reading in self.readings():
             if reading.time is not None and self.time.column is None:
                 raise ValueError(
-                    f"{place}.time: found {reading.time!r} beside time.rate_hz, expected time.column: nobody knows when "
-                    "on that clock the rows without one began; name the column of a clock of theirs, or leave this out"
+                    f"{place}.time: found {reading.time!r} beside time.rate_hz, expected time.column: nobody knows "
+                    "when on that clock the rows began; name the column of a clock of theirs, or leave this out"
                 )
             if reading.column is not None:
                 owner = owners.setdefault(reading.column, place)

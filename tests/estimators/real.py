@@ -1,6 +1,5 @@
 """Recordings of real machines: what the methods find, and what they leave of runs not fitted."""
 
-import os
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
@@ -17,6 +16,7 @@ from pipelines.mechanics.read import read_motions
 from pipelines.settings.datasets import datasets
 from pipelines.settings.filter import FilterSettings
 from tests.estimators.markdown import show as table
+from tests.real.folder import real_data_folder
 
 MACHINES = {
     "emps": ("emps/*.mat", "emps.toml"),
@@ -24,7 +24,7 @@ MACHINES = {
 }
 # Of the benchmark's authors: volts for metres and for metres a second, times 35.1507 N/V.
 CONTROLLERS = {"axis": {"type": "pd", "kp_n_m": 35.1507 * 160.18 * 243.45, "kd_n_s_m": 35.1507 * 243.45}}
-FOLDER = Path(os.environ.get("EXOID_REAL_DATA") or Path(__file__).parents[3] / "shared" / "data")
+FOLDER = real_data_folder()
 
 
 def show(methods: Sequence[Estimator]) -> None:

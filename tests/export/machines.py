@@ -45,7 +45,8 @@ def frame_of(terms, run, joints=("hip", "knee")):
     called = dict(zip(("hip", "knee"), joints, strict=True))
     rows = [
         {
-            "name": p.name, "symbol": p.symbol, "joint": called.get(term.effect.joint), "value": float(value),
+            "name": p.name, "symbol": p.symbol, "value": float(value),
+            "joint": called.get(term.effect.joint, term.effect.joint),
             "run": run if term.effect.name == "rigid_body" else None, "unit": p.unit, "std_error": 0.1,
             "ci95_low": float(value) - 0.2, "ci95_high": float(value) + 0.2, "step": "extension",
             "effect": term.effect.name,

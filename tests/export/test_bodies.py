@@ -29,19 +29,19 @@ def leg_of(X, *more):
 def test_bodies_have_the_identified_parameters_whatever_the_leg():
     for X in random_legs(60):
         thigh, shank = bodies(leg_of(X))
-        X2 = shank.mass * (shank.down**2 + shank.forward**2) + shank.inertia
-        X3 = shank.mass * shank.down
-        X4 = thigh.mass * thigh.down + shank.mass * LENGTH
-        X1 = thigh.mass * (thigh.down**2 + thigh.forward**2) + thigh.inertia + shank.mass * LENGTH**2 + X2
+        X2 = shank.mass * (shank.along**2 + shank.across**2) + shank.inertia
+        X3 = shank.mass * shank.along
+        X4 = thigh.mass * thigh.along + shank.mass * LENGTH
+        X1 = thigh.mass * (thigh.along**2 + thigh.across**2) + thigh.inertia + shank.mass * LENGTH**2 + X2
         np.testing.assert_allclose([X1, X2, X3, X4], X, rtol=1e-12, atol=1e-12)
         assert min(thigh.mass, shank.mass, thigh.inertia, shank.inertia) > 0
 
 
 def test_a_mass_off_the_axis_moves_the_centre_and_keeps_the_inertia():
     thigh, shank = bodies(leg_of([2.6, 0.63, 1.2, 5.7], named("mass_off_axis@hip"), named("mass_off_axis@knee")))
-    assert shank.mass * shank.forward == pytest.approx(0.25, rel=1e-12)
-    assert thigh.mass * thigh.forward == pytest.approx(0.25, rel=1e-12)
-    assert shank.mass * (shank.down**2 + shank.forward**2) + shank.inertia == pytest.approx(0.63, rel=1e-12)
+    assert shank.mass * shank.across == pytest.approx(0.25, rel=1e-12)
+    assert thigh.mass * thigh.across == pytest.approx(0.25, rel=1e-12)
+    assert shank.mass * (shank.along**2 + shank.across**2) + shank.inertia == pytest.approx(0.63, rel=1e-12)
 
 
 def test_bodies_exist_exactly_where_the_mass_matrix_is_positive_definite():

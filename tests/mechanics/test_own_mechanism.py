@@ -150,7 +150,8 @@ def test_without_its_file_it_is_refused_with_what_there_is(exoid, recordings, tm
     outcome = exoid("identify", recordings / "train.parquet", "-o", tmp_path / "out")
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)
     assert "train.parquet has joints x (prismatic), y (prismatic) and gravity 0 m/s², expected those of" in outcome.err
-    assert "two revolute joints in series, whose axes are parallel; one revolute joint under gravity; " in outcome.err
+    assert "two revolute joints in series, whose axes are parallel, under gravity; two revolute joints" in outcome.err
+    assert "; one revolute joint under gravity; " in outcome.err
     (tmp_path / "exoid.toml").write_text(NAMED, encoding="utf-8")
     outcome = exoid("identify", recordings / "train.parquet", "-o", tmp_path / "out")
     assert (outcome.code, outcome.err.count("\n")) == (2, 1)

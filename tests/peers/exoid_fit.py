@@ -60,7 +60,8 @@ def identify(files: Sequence[Path]) -> tuple[Answer, HeldOut]:
     table = found.parameters.iloc[[0, 1, 2, 3, 4, 6, 5, 7]]
     values = table["value"].to_numpy(float)
     half_width = (table["ci95_high"] - table["ci95_low"]).to_numpy(float) / 2.0
-    return Answer("exoid", values, NAMES, values, half_width, np.asarray, seconds), HeldOut(_judged(motions))
+    says = (*found.unrealizable, *found.collinear, *found.angle_noise, *found.remarks)
+    return Answer("exoid", values, NAMES, values, half_width, np.asarray, seconds, says), HeldOut(_judged(motions))
 
 
 def diagnose(files: Sequence[Path]) -> Diagnosed:

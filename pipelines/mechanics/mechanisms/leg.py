@@ -3,8 +3,12 @@
 The regressor is the only place where the equations of motion stand. Angles: the first (hip) from the downward
 vertical, the second (knee) relative to the first link, flexion negative: any double pendulum is a leg. The paper
 prints several of these formulas with slips; the mended forms and a test for each are in ``docs/errata.md``.
+
+Where gravity does not act along the plane of motion, as at a planar arm, nothing depends on X4, nor on where the first
+joint stands.
 """
 
+from dataclasses import replace
 from math import cos, sin
 
 import numpy as np
@@ -65,6 +69,21 @@ def _rigid_body(at, state, values, geometry, joint, out):
         out[1] += knee[i] * values[i]
 
 
+@njit(cache=True)
+def _level_along(q, dq, ddq, geometry):
+    """Rigid-body regressor of a whole motion without gravity, (n, 2, 3)."""
+    return np.ascontiguousarray(_along(q, dq, ddq, geometry)[:, :, :3])
+
+
+@njit(REACTION, cache=True)
+def _level_body(at, state, values, geometry, joint, out):
+    """Add A(q, dq, ddq) X, X4 apart."""
+    hip, knee = regressor_at(at.q, at.dq, at.ddq, geometry[0], geometry[1])
+    for i in range(3):
+        out[0] += hip[i] * values[i]
+        out[1] += knee[i] * values[i]
+
+
 @njit(REACTION, cache=True)
 def _mass_off_axis(at, state, values, geometry, joint, out):
     """Add the column of X4 (hip) or X3 (knee) a right angle ahead."""
@@ -98,7 +117,7 @@ def potential_energy(q, X, geometry: Geometry) -> float:
 
 def _broken(X: NDArray, geometry: Geometry) -> list[str]:
     """M(q) > 0 for every knee angle if and only if X2 > 0 and X2 (X1 - X2) > (L1 X3)²."""
-    X1, X2, X3, _ = X
+    X1, X2, X3 = X[:3]
     broken = []
     if X2 <= 0:
         broken.append(f"X2 = {X2:.4g} kg·m² is not positive: the shank would have no inertia")
@@ -122,10 +141,10 @@ def _inertia_forms(geometry: Geometry) -> NDArray:
 
 LEG = Mechanism(
     name="leg",
-    title="two revolute joints in series, whose axes are parallel: a leg, any double pendulum",
+    title="two revolute joints in series, whose axes are parallel, under gravity: a leg, any double pendulum",
     kinds=("revolute", "revolute"),
     places=("hip", "knee"),
-    has_gravity=None,
+    has_gravity=True,
     parameters=(
         Inertial("X1", "kg·m²", "inertia about the hip with the knee at a right angle", (1.0, 12.0)),
         Inertial("X2", "kg·m²", "inertia of the shank about the knee", (0.2, 4.0)),
@@ -133,11 +152,22 @@ LEG = Mechanism(
         Inertial("X4", "kg·m", "first moment of the thigh, shank's mass at the knee, about the hip", (1.0, 8.0)),
     ),
     along=_along,
-    bends=True,
+    bends_at=("hip", "knee"),
     reactions={"rigid_body": _rigid_body, "mass_off_axis": _mass_off_axis, "payload_change": _payload_change},
     broken=_broken,
     inertia_forms=_inertia_forms,
     has_length=True,
+)
+
+LEVEL_LEG = replace(
+    LEG,
+    title="two revolute joints in series whose parallel axes are vertical, or their links balanced: a planar arm",
+    has_gravity=False,
+    parameters=LEG.parameters[:3],
+    bends_at=("knee",),
+    along=_level_along,
+    reactions={**LEG.reactions, "rigid_body": _level_body},
+    inertia_forms=lambda geometry: _inertia_forms(geometry)[:3],
 )
 
 

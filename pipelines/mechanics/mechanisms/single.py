@@ -115,7 +115,7 @@ PENDULUM = Mechanism(
     has_gravity=True,
     parameters=(_INERTIA, Inertial("X2", "kg·m", "first moment of mass about the joint's axis", (0.01, 10.0))),
     along=_pendulum_along,
-    bends=True,
+    bends_at=("joint",),
     reactions={"rigid_body": _pendulum, "mass_off_axis": _mass_off_axis, "payload_change": _payload_change},
     broken=_broken_inertia,
     inertia_forms=_inertia_forms_under_gravity,
@@ -128,7 +128,7 @@ TURNTABLE = replace(
     has_gravity=False,
     parameters=(_INERTIA,),
     along=_inertia_along,
-    bends=False,
+    bends_at=(),
     reactions={"rigid_body": _inertia},
     inertia_forms=_inertia_forms,
 )

@@ -1,0 +1,67 @@
+"""A level arm of two links: what gravity alone would show is asked of no motion, all else is as of a leg."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.diagnosis.candidates import proposals
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.observations import Baseline
+from pipelines.diagnosis.verdict import verdict
+from pipelines.dynamics.replay import replay
+from pipelines.effects import EFFECTS
+from pipelines.identification import identify
+from pipelines.mechanics.kinematics import motion_table
+from pipelines.mechanics.motion import motion_from_table
+from pipelines.settings.filter import FilterSettings
+
+pytest.importorskip("mujoco")
+from tests.diagnosis.planar_arm import TRUTH, planar_arm
+
+
+def motions(**hidden):
+    tables = [planar_arm("train", 1, **hidden), planar_arm("validate", 2, **hidden)]
+    made = [motion_from_table(motion_table(table, FilterSettings())) for table in tables]
+    return [replace(m, file=f"{m.purpose}.parquet") for m in made]
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return motions()
+
+
+@pytest.fixture(scope="module")
+def found(arm):
+    return identify(arm)
+
+
+def test_its_three_inertial_parameters_and_its_friction_are_recovered(found):
+    table = found.parameters
+    assert list(table["name"]) == ["X1", "X2", "X3", "coulomb", "viscous", "coulomb", "viscous"]
+    assert np.allclose(table["value"][:3], TRUTH[:3], rtol=0.01)
+    # The drive holds each torque for 4 ms, which at reversals looks like friction of another size.
+    assert np.allclose(table["value"][3:], TRUTH[3:], rtol=0.08)
+    assert (found.collinear, found.unrealizable, found.remarks) == ([], [], [])
+
+
+def test_it_moves_as_it_was_recorded(arm, found):
+    assert replay(found.models["exo_alone"], arm[1]).rmse.max() < 0.01
+
+
+def test_nothing_is_missing_of_it_and_a_spring_at_its_elbow_is_named_with_its_size(arm):
+    assert diagnose(arm).status == "nothing_missing"
+    said = verdict(diagnose(motions(spring=6.0)))
+    (cause,) = said["causes"]
+    assert (cause["effect"], cause["joint"]) == ("parallel_spring", "elbow")
+    stiffness, rest = cause["parameters"]
+    assert stiffness["value"] == pytest.approx(6.0, rel=0.03)
+    assert rest["value"] == pytest.approx(0.3, abs=0.02)
+
+
+def test_what_turns_gravity_is_no_candidate_and_what_turns_the_elbow_is_one(arm):
+    machine = arm[0].machine
+    tried = {effect.label for effect in proposals(Baseline(("exo_alone",), machine, cuffs=False), ("exo_alone",))}
+    assert not {"base_tilt", "mass_off_axis@shoulder", "encoder_offset@shoulder", "backlash@shoulder"} & tried
+    assert {"encoder_offset@elbow", "backlash@elbow", "mass_off_axis@elbow", "payload_change@elbow"} <= tried
+    assert all(effect.possible(machine) for effect in EFFECTS if effect.name in ("rigid_body", "friction"))
