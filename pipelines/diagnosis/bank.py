@@ -12,6 +12,7 @@ from pipelines.diagnosis.candidates import Candidate, expanded, gram_of_runs, pr
 from pipelines.diagnosis.gram import Gram, error, gram_of, solve
 from pipelines.diagnosis.observations import FOLDS, Baseline, Run, with_load
 from pipelines.diagnosis.scan import Scan, worth_a_look
+from pipelines.mechanics.geometry import Geometry
 
 PASSES = 3
 ROWS = 4096
@@ -35,6 +36,11 @@ class Bank:
     gram: Gram
     weights: NDArray
     """(O,) inverse variance of each output under the baseline."""
+
+    @property
+    def geometry(self) -> Geometry:
+        """Lengths and gravity of the machine."""
+        return self.runs[0].motion.geometry
 
     def columns_of(self, chosen: Sequence[int]) -> NDArray:
         """Return the columns of the baseline and some candidates, (c,) places in ``gram``."""

@@ -162,7 +162,7 @@ def choose(bank: Bank, floor: Floor, evidence: Mapping[str, float]) -> Choice:
             near = _finalists(level, named, scorer, shadows | absurd.keys())
             finalists = [_rank(scorer, s, empty) for s in near]
             shadows |= {r.labels for r in finalists if shadows_motion(r.fit, empty.rms, floor.rms, bank.runs)}
-            absurd |= {r.labels: why for r in finalists if (why := r.fit.absurdity(bank.baseline))}
+            absurd |= {r.labels: why for r in finalists if (why := r.fit.absurdity(bank.baseline, bank.geometry))}
             finalists = [r for r in finalists if r.labels not in shadows | absurd.keys()]
             if finalists:
                 break
@@ -190,7 +190,7 @@ def _and_anew(ranked: Ranked, scorer: Scorer, empty: Fit) -> Iterator[Ranked]:
     if all(ours.effect == theirs.effect for ours, theirs in zip(causes, ranked.fit.causes, strict=True)):
         return
     made = _ranked(scorer, causes, empty)
-    if not made.fit.absurdity(scorer.bank.baseline):
+    if not made.fit.absurdity(scorer.bank.baseline, scorer.bank.geometry):
         yield made
 
 
@@ -245,7 +245,8 @@ def _ranked(scorer: Scorer, causes: Sequence[Candidate], empty: Fit) -> Ranked:
     gain = log_likelihood(best.rms, empty.rms, independent, scorer.imperfect)
     # One that bends the motion has no amplitude of its own, but its shape is as free as one.
     bends = sum(c.bends if c.own_bend is None else len(best.acting(c)) for c in best.causes)
-    columns = len(best.values) - len(empty.values) + bends
+    ours = sum(len(c.effect.linear) - c.effect.priced for c in best.causes if isinstance(c.effect, FreerForm))
+    columns = len(best.values) - len(empty.values) + bends - ours
     besides = sum(_heard_beside(best, label, scorer) for label in {c.label for c in best.causes})
     return Ranked(best, gain + besides - cost(best.causes, columns, independent), besides)
 
@@ -340,9 +341,11 @@ def _freed_behind(
         return np.inf
     chosen = [scorer.bank.candidates[i] for i in choice.levels[len(labels) - 1][labels].chosen]
     made = _ranked(scorer, in_form(chosen, rival.label, form), empty)
-    if made.fit.absurdity(scorer.bank.baseline):
+    if made.fit.absurdity(scorer.bank.baseline, scorer.bank.geometry):
         return np.inf
-    return max(choice.named.score, _twice(choice, cause.label, scorer, empty)) - made.score
+    # A law of the angle is any ripple of few waves, in one shape or in two.
+    freer = -np.inf if form.alone else _twice(choice, cause.label, scorer, empty)
+    return max(choice.named.score, freer) - made.score
 
 
 def _twice(choice: Choice, label: str, scorer: Scorer, empty: Fit) -> float:

@@ -13,6 +13,7 @@ from pipelines.diagnosis.gram import Gram, error, solve
 from pipelines.diagnosis.observations import Baseline, Run, with_load
 from pipelines.diagnosis.onset import ALWAYS, NEVER, Onset
 from pipelines.effects import Effect, Parameter, Side
+from pipelines.mechanics.geometry import Geometry
 
 SWEEPS = 2
 EVALUATIONS = 14
@@ -32,6 +33,8 @@ UNGROUNDED = 0.1
 """Share of an excess of friction by which the level below it may come out negative, as its form's misfit lets it."""
 SURE, ALIKE = 2.0, 6.0
 """Standard errors by which it must, and blocks that are one piece of news."""
+UNREAL = 0.02
+"""Share of a rigid body's largest inertia by which its least may come out negative, as its causes' misfit lets it."""
 NEWTON_STEPS = 3
 """Of Gauss and Newton along what bends each run in its own way, which the torque is nearly linear in."""
 STEP = 0.01
@@ -62,12 +65,13 @@ class Fit:
     loads: NDArray | None = None
     """Values (size + ...,) whose bodies the loads in the runs are computed from, where not those the runs came with."""
 
-    def absurdity(self, baseline: Baseline) -> str:
+    def absurdity(self, baseline: Baseline, geometry: Geometry) -> str:
         """Return why no machine or person has the causes as they were fitted; empty where one may.
 
         An amplitude beyond any that carries most of a joint's torque imitates what it is not, with others that take
         most of it away again; where a joint's torques are large themselves it means little. So does an excess of
-        friction over a level that gives energy: another law of the speed bends like both together.
+        friction over a level that gives energy: another law of the speed bends like both together. And causes beside
+        which no mass moves as the rigid body does have taken a part of it for something else.
         """
         most = self.shares.max(axis=0)
         for column, (effect, parameter) in enumerate(self.amplitudes(), start=baseline.size):
@@ -76,7 +80,24 @@ class Fit:
                 return f"the {parameter.name} of {effect.label} is beyond any, and others take most of it away again"
             if effect.excess_over and self._gives_energy(effect, amplitude, baseline):
                 return f"{effect.label} is an excess over friction that gives energy"
-        return ""
+        return "beside them the rigid body is none that a machine has" if self._unreal(baseline, geometry) else ""
+
+    def _unreal(self, baseline: Baseline, geometry: Geometry) -> bool:
+        """Tell whether the machine, or machine and person together, plainly have a least inertia below nought.
+
+        ``inertia_forms`` make of X a matrix that is positive definite where masses are; along its own eigenvector
+        the least eigenvalue is linear in X.
+        """
+        forms = baseline.machine.mechanism.inertia_forms(geometry)
+        inverse = np.linalg.pinv(self.normal, hermitian=True)
+        for bodies in range(1, len(baseline.bodies) + 1):
+            p = bodies * len(forms)
+            inertias, axes = np.linalg.eigh(np.tensordot(self.values[:p].reshape(bodies, -1).sum(axis=0), forms, 1))
+            slope = np.tile(np.einsum("j,ijk,k->i", axes[:, 0], forms, axes[:, 0]), bodies)
+            spread = np.sqrt(ALIKE * slope @ inverse[:p, :p] @ slope)
+            if -inertias[0] > max(UNREAL * inertias[-1], SURE * spread):
+                return True
+        return False
 
     def _gives_energy(self, effect: Effect, amplitude: float, baseline: Baseline) -> bool:
         """Tell whether the level that an effect is an excess over is plainly negative, with what else rubs there."""

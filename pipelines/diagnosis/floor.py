@@ -10,6 +10,8 @@ from scipy.ndimage import uniform_filter1d
 from pipelines.diagnosis.observations import Run
 
 LONGEST_LAG_S = 1.0
+LONGEST_NOISE_S = 0.25
+"""How long noise of a sensor or a drive resembles itself; what is slower wanders."""
 MOST_INDEPENDENT = 1 / 6
 """Of 25 ms blocks: what a model leaves of a leg is never white (DESIGN section 5)."""
 
@@ -63,9 +65,9 @@ def independent_share(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDAr
 
 
 def slow_scatter(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray:
-    """Return the scatter's power density below 1 Hz over that between 2 and 6 Hz, for each output, (O,).
+    """Return the scatter's power density below 1 Hz over what noise as fast as it has there, for each output, (O,).
 
-    About 1 for a sensor's noise; many times that where a person or a drift does not repeat; 1 without periods.
+    About 1 for noise, white or coloured; many times that where a person or a drift does not repeat; 1 without periods.
     """
     pairs = [scatter(run, residual) for run, residual in zip(runs, residuals, strict=True)]
     rate = runs[0].motion.sample_rate_hz / runs[0].block.decimation
@@ -126,17 +128,28 @@ def _correlation_time(series: Sequence[NDArray]) -> float:
 
 
 def _slow_share(series: Sequence[NDArray], rate_hz: float) -> float:
-    """Compare slow with fast scatter: noise of a sensor is flat there, a person or a drift is not.
+    """Compare slow scatter with that of noise which is as strong between 2 and 6 Hz, and as much alike from 1 to 8 Hz.
 
-    Samples that are not usable count as nought, which leaves the ratio as it is.
+    Noise of a first order has the density 1 / (1 + (2 pi f tau)^2): how it falls from 1.5 to 6 Hz tells tau. Samples
+    that are not usable count as nought, which leaves ratios as they are.
     """
-    slow, fast = 0.0, 0.0
-    for s in series:
-        filled = np.nan_to_num(s)
-        if len(filled) < 64:
-            continue
-        frequency = np.fft.rfftfreq(len(filled), 1.0 / rate_hz)
-        power = np.abs(np.fft.rfft(filled * np.hanning(len(filled)))) ** 2
-        slow += float(power[(frequency > 0.05) & (frequency < 1.0)].mean())
-        fast += float(power[(frequency > 2.0) & (frequency < 6.0)].mean())
-    return slow / fast if fast > 0 else 1.0
+    slow, fast, before, behind = (
+        sum(_density(s, rate_hz, band) for s in series) for band in ((0.05, 1.0), (2.0, 6.0), (1.0, 2.0), (4.0, 8.0))
+    )
+    if not fast > 0.0 or not behind > 0.0:
+        return 1.0
+    falls = before / behind
+    longest = (2.0 * np.pi * LONGEST_NOISE_S) ** 2
+    room = 36.0 - 2.25 * falls  # of the density's ratio at 1.5 and 6 Hz, solved for (2 pi tau)^2
+    squared = float(np.clip((falls - 1.0) / room, 0.0, longest)) if room > 0.0 else longest
+    return slow / fast * (1.0 + 0.25 * squared) / (1.0 + 16.0 * squared)  # that of noise, at 0.5 and 4 Hz
+
+
+def _density(series: NDArray, rate_hz: float, band: tuple[float, float]) -> float:
+    """Return the mean power of a series (k,) within a band, Hz; nought of one that is too short to tell."""
+    filled = np.nan_to_num(series)
+    if len(filled) < 64:
+        return 0.0
+    frequency = np.fft.rfftfreq(len(filled), 1.0 / rate_hz)
+    power = np.abs(np.fft.rfft(filled * np.hanning(len(filled)))) ** 2
+    return float(power[(frequency > band[0]) & (frequency < band[1])].mean())

@@ -18,7 +18,7 @@ from pipelines.mechanics.motion import Motion
 
 ANY_SIZE = (-1e6, 1e6)
 """Amplitudes of which none is absurd."""
-BENDS, ANY_LAW = (2, 3, 4), (0, 1, 2, 3, 4, 5, 6)
+BENDS, ANY_LAW = (2, 3, 4), tuple(range(11))
 """Powers of the angle: beside the straight line and the preload that a spring has itself, and of any law."""
 STEEPER = 3
 """Power of speed above a drag's own; those below are viscous friction's."""
@@ -29,6 +29,8 @@ class FreerForm(Effect):
 
     instead: ClassVar[str]
     """That the cause it belongs to may be of this form, and how to see whether it is."""
+    priced: ClassVar[int]
+    """How many columns a machine's own law of this form would have: that ours needs more is no evidence against it."""
     alone: ClassVar[bool] = False
     """True where it stands in its cause's place, and not beside it: then it is a spring at that joint, too."""
 
@@ -60,6 +62,7 @@ class BentSpring(FreerForm):
     side = Side.STRUCTURE
     equation = "tau = k2 (q / s)^2 + k3 (q / s)^3 + k4 (q / s)^4, s the joint's travel beside an exoskeleton's"
     linear = _amplitudes(BENDS)
+    priced = len(BENDS)
     parity = Parity.EVEN
     instead = (
         "a spring that hardens, softens or goes slack would explain as much: hold the joint at several places and see "
@@ -77,8 +80,9 @@ class LawOfAngle(FreerForm):
     name = "law_of_angle"
     title = "Law of the angle"
     side = Side.STRUCTURE
-    equation = "tau = k0 + k1 (q / s) + ... + k6 (q / s)^6, s the joint's travel beside an exoskeleton's"
+    equation = "tau = k0 + k1 (q / s) + ... + k10 (q / s)^10, s the joint's travel beside an exoskeleton's"
     linear = _amplitudes(ANY_LAW)
+    priced = 2 + len(BENDS)
     parity = Parity.EVEN
     instead = BentSpring.instead
     alone = True
@@ -96,6 +100,7 @@ class BentDrag(FreerForm):
     side = Side.DRIVE
     equation = "tau = c3 abs(v / s)^3 sgn(v), s the joint's speed beside an exoskeleton's"
     linear = (Parameter("bend", "N·m", "torque per speed to the third power", "c3", ANY_SIZE),)
+    priced = 1
     parity = Parity.ODD
     instead = (
         "a drag of another power of speed would explain as much: move the joint at several constant speeds and see how "

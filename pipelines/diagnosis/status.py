@@ -38,7 +38,7 @@ IMPERFECT = 0.015
 HUM = 0.35
 """Share of the noise floor from which a tone is none of the noise's own lines: those reach 0.25."""
 WANDERING = 3.0
-"""Slow over fast scatter between periods from which something moves that does not repeat."""
+"""Slow scatter between periods over that of noise, from which something moves that does not repeat."""
 
 
 @dataclass(frozen=True)

@@ -267,7 +267,9 @@ def _caveats(d: Diagnosis) -> list[str]:
         for effect in d.baseline.known
     ]
     shown = (hiding + d.upside_down) * (not d.spoilt) + turning
-    return known + _untold_length(d) + [noisy] * d.noisy_angles + shown + _of_one_run(d) + _of_one_kind(d)
+    unreal = [f"no real machine has the extended model's rigid body, so what it is named for is in doubt: {s}"
+              for s in d.unrealizable if d.causes]  # fmt: skip
+    return known + _untold_length(d) + [noisy] * d.noisy_angles + unreal + shown + _of_one_run(d) + _of_one_kind(d)
 
 
 def _untold_length(d: Diagnosis) -> list[str]:

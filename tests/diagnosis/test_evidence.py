@@ -225,7 +225,7 @@ def test_a_large_amplitude_is_absurd_only_where_it_carries_most_of_the_joints_to
     measured[:, 0] += largest * direction
     strong = replace(run, measured=measured)
     baseline = baseline_of([strong])
-    assert bool(fit([cause], [strong], baseline, np.ones(4)).absurdity(baseline)) == absurd
+    assert bool(fit([cause], [strong], baseline, np.ones(4)).absurdity(baseline, strong.motion.geometry)) == absurd
 
 
 def test_refinement_stays_at_the_maximum_that_the_scan_found():
