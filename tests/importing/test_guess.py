@@ -766,3 +766,58 @@ def test_a_second_log_of_one_row_is_guessed_without_a_period(guessed, pendulum, 
     short = write_csv({name: values[:1] for name, values in columns.items()}, "b.csv")
     text, _ = guessed(whole, short)
     assert [one["files"] for one in tomllib.loads(text)["recording"]] == ["a.csv", "b.csv"]
+
+
+def two_links(pendulum, first, second):
+    """Return columns of two joints by the names of their quantities, ``first`` and ``second`` with a place for each."""
+    columns = swinging(pendulum)
+    made = {"time": columns["time"]}
+    for name, factor in ((first, 1.0), (second, -0.5)):
+        for quantity in ("position", "velocity", "effort"):
+            made[name.format(quantity)] = (
+                factor * columns["torque" if quantity == "effort" else quantity.replace("position", "angle")]
+            )
+    return made
+
+
+def test_both_joints_of_a_state_within_a_record_are_found(guessed, pendulum, tmp_path):
+    columns = swinging(pendulum)
+    rows = [
+        {"stamp": t, "state": {"q": [q, -0.5 * q], "dq": [v, -0.5 * v]}, "cmd": {"tau": [tau, -0.5 * tau]}}
+        for t, q, v, tau in zip(*columns.values(), strict=True)
+    ]
+    path = tmp_path / "log.json"
+    path.write_text(json.dumps(rows), encoding="utf-8")
+    joints = tomllib.loads(guessed(path)[0])["joint"]
+    assert [joint["angle"]["column"] for joint in joints] == ["state.q[0]", "state.q[1]"]
+    assert [joint["velocity"]["column"] for joint in joints] == ["state.dq[0]", "state.dq[1]"]
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "order", "doubted"),
+    [
+        ("elbow.{}", "shoulder.{}", ["shoulder", "elbow"], False),
+        ("r_knee_{}", "r_hip_{}", ["r_hip", "r_knee"], False),
+        ("azimuth.{}", "lever.{}", ["azimuth", "lever"], True),
+        ("joint1.{}", "joint2.{}", None, False),
+    ],
+)
+def test_which_joint_carries_which_is_read_off_names_or_doubted(
+    guessed, pendulum, write_csv, first, second, order, doubted
+):
+    text, doubts = guessed(write_csv(two_links(pendulum, first, second)))
+    joints = tomllib.loads(text)["joint"]
+    assert ("joint" in doubts) == doubted
+    if order:
+        assert [joint["name"] for joint in joints] == order
+    else:
+        assert [joint["angle"]["column"] for joint in joints] == ["joint1.position", "joint2.position"]
+
+
+def test_what_slides_is_taken_for_level_until_somebody_says_that_it_rises(guessed, pendulum, write_csv):
+    columns = swinging(pendulum)
+    text, doubts = guessed(
+        write_csv({"t": columns["time"], "pos_mm": 100 * columns["angle"], "F_N": columns["torque"]})
+    )
+    assert tomllib.loads(text)["geometry"] == {"gravity_m_s2": 0.0}
+    assert "a lift's" in doubts["geometry.gravity_m_s2"]

@@ -11,7 +11,7 @@ from pipelines.errors import InputError, about
 from pipelines.importing import clock
 from pipelines.importing.guess.counting import countings
 from pipelines.importing.guess.joint_table import write_joint
-from pipelines.importing.guess.joints import JointColumns, group_joints
+from pipelines.importing.guess.joints import JointColumns, group_joints, order_is_told
 from pipelines.importing.guess.names import meanings
 from pipelines.importing.guess.proposal import Proposal
 from pipelines.importing.guess.time import TimeGuess, guess_time, write_time
@@ -80,7 +80,7 @@ def propose(paths: Sequence[Path]) -> Proposal:
     used = {time.column}
     for number, joint in enumerate(joints):
         used |= set(write_joint(proposal, number, joint, here, run.time_s, len(joints) == 1, single))
-    _write_geometry(proposal, len(joints))
+    _write_geometry(proposal, joints)
     _write_recordings(proposal, paths, [_period(path, time, joints) for path in paths])
     _remark_on_the_rest(proposal, [name for name in source.names if name not in used], columns)
     return proposal
@@ -130,10 +130,16 @@ def _longest_run(stamps: NDArray, unit: str) -> clock.Run | None:
     return max(runs, key=len, default=None)
 
 
-def _write_geometry(proposal: Proposal, joints: int) -> None:
+def _write_geometry(proposal: Proposal, joints: Sequence[JointColumns]) -> None:
     proposal.table("[geometry]", "geometry")
-    proposal.key("gravity_m_s2", 9.81, "0 for an axis that lies level, or turns about the vertical", sure=False)
-    if joints > 1:
+    if all(joint.slides for joint in joints):
+        proposal.key("gravity_m_s2", 0.0, "9.81 for an axis that rises, a lift's", sure=False)
+    else:
+        proposal.key("gravity_m_s2", 9.81, "0 for an axis that lies level, or turns about the vertical", sure=False)
+    if not order_is_told(joints):
+        order = " carries ".join(joint.name for joint in joints)
+        proposal.doubt("joint", f"the order of their columns: {order}; no name says so. Turn their tables round if not")
+    if len(joints) > 1:
         proposal.unknown("thigh_length_m", "axis of the first joint to that of the second", blocks=False)
 
 

@@ -1,5 +1,6 @@
 """Which columns belong to one joint, and which of them is its angle, its velocity, its torque."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -20,6 +21,8 @@ FEW_PAIRS = 400
 """So many pairs of columns are looked at one by one: twenty columns, each with each."""
 MANY = 100.0
 """So many counts a column goes over that is an encoder's, and no queue's."""
+FROM_THE_BASE = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
+"""Joints of limbs, of which each carries those behind it."""
 
 
 @dataclass(frozen=True)
@@ -36,15 +39,19 @@ class JointColumns:
     @property
     def drive(self) -> str | None:
         """The quantity that tells best what its drive delivers; None where none does."""
+        return next((quantity for quantity in (SLIDING if self.slides else TURNING) if quantity in self.columns), None)
+
+    @property
+    def slides(self) -> bool:
+        """Whether the name of its angle says that it is a length."""
         unit = self.columns["angle"].unit
-        slides = unit is not None and UNITS[unit].dimension == "length"
-        return next((quantity for quantity in (SLIDING if slides else TURNING) if quantity in self.columns), None)
+        return unit is not None and UNITS[unit].dimension == "length"
 
 
 def group_joints(
     meanings: Sequence[Meaning], columns: Mapping[str, NDArray], time_s: NDArray, clock: str
 ) -> list[JointColumns]:
-    """Return the joints of a log of columns (n,) at times (n,) s, in the order of their columns."""
+    """Return the joints of a log of columns (n,) at times (n,) s, in their columns' order, a limb's from the body."""
     usable = [
         m for m in meanings
         if m.column != clock and m.quantity != "enabled" and _moves(columns[m.column], len(time_s))
@@ -71,7 +78,19 @@ def group_joints(
         replace(_joint(name, members, number, len(by_joint)), enabled=_switch(switches, name, len(by_joint) == 1))
         for number, (name, members) in enumerate(by_joint.items(), 1)
     ]
-    return joints if told else [_told_by_counts(joint) for joint in joints]
+    return sorted(joints if told else map(_told_by_counts, joints), key=_place)
+
+
+def _place(joint: JointColumns) -> int:
+    """Return where a joint stands in its limb; nought where its name does not say."""
+    return next((place for place, name in enumerate(FROM_THE_BASE, 1) if name in joint.name.lower()), 0)
+
+
+def order_is_told(joints: Sequence[JointColumns]) -> bool:
+    """Tell whether the names of joints say which carries which: places in a limb, or numbers."""
+    places = [_place(joint) for joint in joints]
+    numbered = [re.search(r"\d+", joint.name) for joint in joints]
+    return len(joints) == 1 or (0 not in places and len(set(places)) == len(places)) or all(numbered)
 
 
 def _counted(found: Meaning, values: NDArray) -> Meaning:

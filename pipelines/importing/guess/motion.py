@@ -145,7 +145,8 @@ def _angle_unit(angle: NDArray, named: str | None) -> tuple[str, str, bool]:
         return by_step
     if reach > LARGEST_ANGLE_RAD:
         return "deg", f"reaches {reach:.4g}, which in rad would be {reach / (2 * np.pi):.1f} turns", False
-    return "rad", f"reaches {reach:.4g}; in degrees it would hardly move. No name says its unit", False
+    in_degrees = f"in degrees that would be {np.radians(reach):.2g} rad"
+    return "rad", f"reaches {reach:.4g}; {in_degrees}. No name says its unit", False
 
 
 def _by_encoder_step(known: NDArray) -> tuple[str, str, bool] | None:

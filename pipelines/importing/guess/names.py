@@ -47,6 +47,8 @@ SOMETHING_ELSE = _words(
     "batterie versorgung ecart erreur etat"
 )
 """Words that make of a torque or a position something else."""
+CONTAINERS = _words("state status")
+"""Those of them that are what holds it in ``state.q``, a name within a name."""
 TALLIES = _words(
     "adc dac pwm tick cycle loop step sample frame packet message msg rx tx timer sys system cpu index fifo buffer "
     "queue missed lost dropped crc zyklus takt"
@@ -113,7 +115,7 @@ def meaning(name: str) -> Meaning:
     if told is not None and not (told.decides or _confirms(told, quantity, set(words))):
         told, words = None, _split(plain)
         quantity = _quantity(set(words))
-    said = set(words)
+    said = set(words) - _containers(plain)
     if told is not None:
         quantity = told.quantity or (quantity if told.unit else "")
         words = [word for word in words if word not in SIGNS]
@@ -126,6 +128,12 @@ def meaning(name: str) -> Meaning:
         quantity = "reference"
     unit = told.unit if told and told.unit and UNITS[told.unit].dimension in DIMENSIONS.get(quantity, ()) else None
     return Meaning(name, quantity, _joint(words), unit, commanded, bool(said & FILTERED), bool(said & MEASURED))
+
+
+def _containers(name: str) -> set[str]:
+    """Return the words of a name within a name that tell only what holds it."""
+    outer, _, inner = name.replace("/", ".").rpartition(".")
+    return set(_split(outer)) & CONTAINERS - set(_split(inner))
 
 
 def in_counts(found: Meaning) -> Meaning | None:

@@ -47,6 +47,11 @@ class Proposal:
         self.doubts.append(Doubt(f"{self._table}.{name}", why, blocks))
         self.lines.append(_with_reason(f"# {name} = ", f"FILL IN: {why}"))
 
+    def doubt(self, key: str, why: str) -> None:
+        """Add a doubt about several lines at once."""
+        self.doubts.append(Doubt(key, why, blocks=False))
+        self.remark(f"UNSURE: {key}: {why}")
+
     @property
     def text(self) -> str:
         """The map as TOML."""
