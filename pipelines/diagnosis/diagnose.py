@@ -56,6 +56,8 @@ SEARCH_SHARE = 0.75
 """Of the progress bar that filling the bank takes."""
 OR_A_FREER_FORM = 0.5
 """No spring is straight all the way, no drag a mere square: what one that bends explains as well is likely as not."""
+OR_NO_MACHINE = 0.5
+"""Causes beside which no machine has the rigid body may have taken a part of it for something else."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,7 @@ class Diagnosis:
         seen = np.flatnonzero(np.diag(normal) > 0.0)
         return collinearities(normal[np.ix_(seen, seen)], [names[place] for place in seen])
 
-    @property
+    @cached_property
     def unrealizable(self) -> list[str]:
         """Why no real machine has the extended model's rigid bodies; empty when one may."""
         return unrealizable(self.parameters, self.baseline.machine, self.train[0].motion.geometry)
@@ -157,7 +159,8 @@ class Diagnosis:
     def chance(self, label: str) -> float:
         """Return how likely a named cause is among its rivals, with those that cannot be told from it."""
         among_rivals = min(sum(self.alike(label).values()), 1.0)
-        return OR_A_FREER_FORM * among_rivals if label in self.of_a_freer_form else among_rivals
+        bent = OR_A_FREER_FORM if label in self.of_a_freer_form else 1.0
+        return among_rivals * bent * (OR_NO_MACHINE if self.unrealizable else 1.0)
 
     def alike(self, label: str) -> dict[str, float]:
         """Return a named cause and those that cannot be told from it, with their probabilities."""

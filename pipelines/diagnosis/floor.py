@@ -12,6 +12,8 @@ from pipelines.diagnosis.observations import Run
 LONGEST_LAG_S = 1.0
 LONGEST_NOISE_S = 0.25
 """How long noise of a sensor or a drive resembles itself; what is slower wanders."""
+IN_BURSTS = 5.0
+"""Fourth moment over the square of the second, 3 of noise, from which scatter comes in bursts: kicks are no noise."""
 MOST_INDEPENDENT = 1 / 6
 """Of 25 ms blocks: what a model leaves of a leg is never white (DESIGN section 5)."""
 
@@ -130,14 +132,18 @@ def _correlation_time(series: Sequence[NDArray]) -> float:
 def _slow_share(series: Sequence[NDArray], rate_hz: float) -> float:
     """Compare slow scatter with that of noise which is as strong between 2 and 6 Hz, and as much alike from 1 to 8 Hz.
 
-    Noise of a first order has the density 1 / (1 + (2 pi f tau)^2): how it falls from 1.5 to 6 Hz tells tau. Samples
-    that are not usable count as nought, which leaves ratios as they are.
+    Noise of a first order has the density 1 / (1 + (2 pi f tau)^2): how it falls from 1.5 to 6 Hz tells tau. What comes
+    in bursts is held against white noise. Samples that are not usable count as nought, which leaves ratios as they are.
     """
     slow, fast, before, behind = (
         sum(_density(s, rate_hz, band) for s in series) for band in ((0.05, 1.0), (2.0, 6.0), (1.0, 2.0), (4.0, 8.0))
     )
     if not fast > 0.0 or not behind > 0.0:
         return 1.0
+    known = np.concatenate(series)
+    known = known[np.isfinite(known)]
+    if np.mean(known**4) > IN_BURSTS * np.mean(known**2) ** 2:
+        return slow / fast
     falls = before / behind
     longest = (2.0 * np.pi * LONGEST_NOISE_S) ** 2
     room = 36.0 - 2.25 * falls  # of the density's ratio at 1.5 and 6 Hz, solved for (2 pi tau)^2

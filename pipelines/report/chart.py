@@ -25,11 +25,7 @@ class Mark(StrEnum):
     LINE = "line"
     DOTS = "dots"
     MEAN = "mean"
-    """A thick line through few points: over rows that it has no value in, but not over a ``GAP``."""
-
-
-GAP = np.inf
-"""What interrupts a ``MEAN``."""
+    """A thick line through few points: over rows that it has no value in."""
 
 
 @dataclass(frozen=True)

@@ -62,8 +62,8 @@ def _draw_series(axis: Axes, chart: Chart, series: Series) -> None:
         return
     x, values = chart.x, series.values
     if series.mark is Mark.MEAN:
-        own = ~np.isnan(values)  # over the rows of others, not over its gaps
-        x, values = x[own], np.where(np.isinf(values[own]), np.nan, values[own])
+        own = ~np.isnan(values)  # over the rows of others
+        x, values = x[own], values[own]
     width = 1.8 if series.mark is Mark.MEAN else WIDTHS[series.role]
     axis.plot(x, values, color=colour, lw=width, label=label)
 

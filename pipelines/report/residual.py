@@ -8,7 +8,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
-from pipelines.report.chart import GAP, Chart, Mark, Panel, Series
+from pipelines.report.chart import Chart, Mark, Panel, Series
 from pipelines.report.measured import MODELS, models_of
 from pipelines.report.session import Session
 from pipelines.signals.binned_mean import FEWEST, binned_mean
@@ -91,8 +91,8 @@ def _chart(session: Session, frame: pd.DataFrame, joint: Joint, one: Against, re
     return Chart(
         key=f"residual-{joint.name}-{one.variable.replace('_', '-')}",
         title=f"{joint.name} error against {one.title}",
-        caption="Dots are blocks of validation runs away from reversals, lines their running means, broken where "
-        f"blocks are fewer than {FEWEST}; the band is the noise floor.",
+        caption="Dots are blocks of validation runs away from reversals, lines their running means, each of "
+        f"{FEWEST} blocks or more; the band is the noise floor.",
         x_label=one.label,
         x=places[order],
         panels=(Panel(f"{joint.name} {quantity} error, {joint.unit('torque')}", (*clouds, *means), floor, reach),),
@@ -100,13 +100,12 @@ def _chart(session: Session, frame: pd.DataFrame, joint: Joint, one: Against, re
 
 
 def _mean_along(x: NDArray, y: NDArray) -> tuple[NDArray, NDArray]:
-    """Return a running mean of y (n,) along x (n,), with a ``GAP`` where blocks are few.
+    """Return a running mean of y (n,) along x (n,): places and means, (k,) each.
 
     The bins span all but the outermost 0.5 % at either end, where a mean would be of hardly any.
     """
     low, high = np.percentile(x, [0.5, 99.5])
-    middles, means = binned_mean(x, y, low, high + 1e-12)
-    return middles, np.where(np.isnan(means), GAP, means)
+    return binned_mean(x, y, low, high + 1e-12)
 
 
 def telling(session: Session, joint: Joint) -> str:

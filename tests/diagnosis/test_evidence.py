@@ -4,16 +4,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+from scipy.signal import butter, lfilter
 
 from pipelines.diagnosis import impacts
 from pipelines.diagnosis.candidates import Candidate, lowest
 from pipelines.diagnosis.examined import Examined, Extended
 from pipelines.diagnosis.fit import _scale, fit, refined
+from pipelines.diagnosis.floor import slow_scatter
 from pipelines.diagnosis.gain import Errors
 from pipelines.diagnosis.impacts import evidence_of_play
 from pipelines.diagnosis.observations import FOLDS, baseline_of, observe, with_load
 from pipelines.diagnosis.slow import SlowError, slow_error
-from pipelines.diagnosis.status import Standing
+from pipelines.diagnosis.status import WANDERING, Standing
 from pipelines.diagnosis.tone import strongest_tone
 from pipelines.diagnosis.volition import evidence_of_will
 from pipelines.effects import Backlash, Cogging, EncoderOffset, Parameter, TorqueDrift, ViscousAsymmetry
@@ -54,6 +57,42 @@ def test_slow_error_that_repeats_is_systematic_and_fast_error_that_repeats_is_no
         found = slow_error([run], [noise(run) + repeated])
         assert (found.excess[0] > 0.2) == systematic
         assert (found.sureness[0] > 3.5) == systematic
+
+
+def coloured(run, lasting_s, seed, shape=None):
+    """Return noise of a first order (m, O) that resembles itself for so long, of rms 1."""
+    decay = np.exp(-run.block.decimation / run.motion.sample_rate_hz / lasting_s)
+    made = lfilter(
+        [np.sqrt(1 - decay**2)], [1, -decay], np.random.default_rng(seed).normal(size=(len(run.time), 4)), axis=0
+    )
+    return made[:, : run.measured.shape[1]]
+
+
+@pytest.mark.parametrize("lasting_s", [0.001, 0.05, 0.1, 0.2])
+def test_noise_of_any_colour_wanders_in_hardly_any_run(run, lasting_s):
+    found = [slow_scatter([run], [coloured(run, lasting_s, seed)])[:2] for seed in range(200)]
+    assert np.mean(np.array(found) > WANDERING) < 0.05
+
+
+def drifting(run, seed):
+    return coloured(run, 5.0, seed)
+
+
+def pushing(run, seed):
+    """A wearer who pushes now and then, for a second or two."""
+    return 5.0 * lfilter(*butter(2, 0.04), coloured(run, 1e-6, seed), axis=0)
+
+
+def kicking(run, seed):
+    """Kicks of 0.2 s, one in 2.5 s."""
+    begun = np.random.default_rng(seed).random(run.measured.shape) < 0.01
+    return 6.0 * lfilter(np.ones(8), 1, begun, axis=0)
+
+
+@pytest.mark.parametrize("moved", [drifting, pushing, kicking])
+def test_what_does_not_repeat_and_is_no_noise_wanders_in_most_runs(run, moved):
+    found = [slow_scatter([run], [moved(run, seed) + noise(run, seed)])[0] for seed in range(20)]
+    assert np.mean(np.array(found) > WANDERING) > 0.8
 
 
 @pytest.mark.parametrize("frequency", [1.7, 4.3, 8.9])
@@ -226,6 +265,19 @@ def test_a_large_amplitude_is_absurd_only_where_it_carries_most_of_the_joints_to
     strong = replace(run, measured=measured)
     baseline = baseline_of([strong])
     assert bool(fit([cause], [strong], baseline, np.ones(4)).absurdity(baseline, strong.motion.geometry)) == absurd
+
+
+@pytest.mark.parametrize(("least", "unreal"), [(0.4, False), (-0.01, False), (-0.4, True)])
+def test_causes_beside_which_the_machine_has_no_mass_are_absurd(run, least, unreal):
+    """Only plainly: of a body that hardly lacks any, the misfit of a cause's form may be the reason."""
+    baseline = baseline_of([run])
+    L1, X1, X3 = run.motion.geometry.thigh_length_m, 3.0, 1.0
+    # The X2 with which the matrix [[X1 - X2, L1 X3], [L1 X3, X2]] has this least eigenvalue.
+    X2 = brentq(lambda x: np.linalg.eigvalsh([[X1 - x, L1 * X3], [L1 * X3, x]])[0] - least, -1.0, 1.4)
+    measured = run.average(baseline.columns(run.motion, run.motion, run.motion))[..., :4] @ [X1, X2, X3, 4.0]
+    made = replace(run, measured=measured + 0.1 * noise(run))
+    found = fit([Candidate(ViscousAsymmetry(joint="hip"), ((),))], [made], baseline, np.ones(4))
+    assert bool(found.absurdity(baseline, run.motion.geometry)) == unreal
 
 
 def test_refinement_stays_at_the_maximum_that_the_scan_found():

@@ -21,6 +21,24 @@ LAWS = {
 }
 
 
+@pytest.mark.parametrize("stiffness", [5.0, 7.0])
+def test_a_cord_over_both_joints_is_no_mass_that_no_machine_has(stiffness):
+    """It pulls as the shank's weight does, and weight has inertia: named for a mass it is as likely as not."""
+
+    def with_cord(table: Table) -> Table:
+        frame = table.frame.copy()
+        pull = stiffness * (frame["hip_angle_rad"] + frame["knee_angle_rad"] + 0.6)
+        frame["hip_torque_nm"] += pull
+        frame["knee_torque_nm"] += pull
+        return replace(table, frame=frame)
+
+    motions = [motion_from_table(motion_table(with_cord(t), FilterSettings())) for t in recordings(seed=4)]
+    found = diagnose([replace(motion, file=f"run_{i}.parquet") for i, motion in enumerate(motions)])
+    said = verdict(found)
+    assert all(cause["probability"] <= 0.5 for cause in said["causes"])
+    assert not said["causes"] or any("no real machine has" in caveat for caveat in said["caveats"])
+
+
 @pytest.mark.parametrize("law", LAWS)
 def test_a_spring_of_any_form_is_named_alone(law):
     def with_spring(table: Table) -> Table:

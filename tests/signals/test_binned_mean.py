@@ -10,14 +10,21 @@ def test_each_bin_has_the_mean_of_its_own_values_both_ends_included():
     rng = np.random.default_rng(0)
     x = np.concatenate([[0.0, 1.0], rng.uniform(0, 1, 4000)])
     y = rng.standard_normal(len(x))
-    middles, means = binned_mean(x, y, 0.0, 1.0)
-    for k, middle in enumerate(middles):
-        near = np.abs(x - middle) <= 0.5 / BINS
-        assert means[k] == pytest.approx(y[near].mean(), abs=1e-12)
+    places, means = binned_mean(x, y, 0.0, 1.0)
+    assert len(places) == BINS
+    for k in range(BINS):
+        near = np.abs(x - (k + 0.5) / BINS) <= 0.5 / BINS
+        assert (places[k], means[k]) == pytest.approx((x[near].mean(), y[near].mean()), abs=1e-12)
 
 
-def test_a_bin_of_too_few_has_no_mean_and_what_lies_outside_counts_nowhere():
-    x = np.concatenate([np.full(FEWEST, 0.5 / BINS), np.full(FEWEST - 1, 1.5 / BINS), [-1.0, 2.0]])
-    _, means = binned_mean(x, np.ones(len(x)), 0.0, 1.0)
-    assert means[0] == 1.0
-    assert np.isnan(means[1:]).all()
+def test_bins_of_too_few_are_joined_and_what_lies_outside_counts_nowhere():
+    rng = np.random.default_rng(1)
+    x = np.concatenate([rng.uniform(0.0, 0.1, 5 * FEWEST), rng.uniform(0.5, 1.0, FEWEST + 3), [-1.0, 2.0]])
+    places, means = binned_mean(x, 2.0 * x, 0.0, 1.0)
+    assert 2 <= len(places) < BINS
+    assert np.all(np.diff(places) > 0)
+    np.testing.assert_allclose(means, 2.0 * places)
+    inside = (x >= 0) & (x <= 1)
+    assert places.min() >= x[inside].min() and places.max() <= 1.0
+    few = binned_mean(x[: FEWEST - 1], x[: FEWEST - 1], 0.0, 1.0)
+    assert [len(part) for part in few] == [0, 0]

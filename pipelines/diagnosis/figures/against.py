@@ -117,6 +117,7 @@ def draw(axis: Axes, seen: Against, floor: float, height: float, changed: bool) 
         for part, line in zip(seen.parts, cycle(LINES)):
             if part.any():
                 x = seen.x[part]
-                axis.plot(*binned_mean(x, residual[part], x.min(), x.max()), line, color=colour, lw=2)
+                mean = binned_mean(x, residual[part], x.min(), x.max())
+                axis.plot(*mean, line, color=colour, lw=2, marker="o", ms=3)
     axis.set_ylim(-height, height)
     axis.set_xlabel(seen.label)

@@ -35,8 +35,8 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
     lines = [Line2D([], [], color=colour, lw=1.8) for colour in (BEFORE, AFTER)]
     drawn.legend(lines[: len(names)], names, loc="upper right", ncols=2)
     drawn.suptitle(
-        "What the torque error goes with, most first, the phase of the period last: share of its variance that a curve "
-        "foretells (band: noise floor)",
+        "What the torque error goes with, most first, the phase of the period last:\n"
+        "share of its variance that a curve foretells (band: noise floor)",
         x=0.01, ha="left", fontweight="bold",
     )  # fmt: skip
     drawn.tight_layout()

@@ -14,10 +14,10 @@
     return new type(bytes.buffer);
   }
   // uPlot draws a gap where a value is null; NaN it would join over.
-  // A mean's curve goes on over rows that are not its own (undefined), and not over its gaps (infinite).
+  // A mean's curve goes on over rows that are not its own (undefined).
   function column(told) {
     const values = numbers(told.values, Float32Array), none = told.mark === "mean" ? undefined : null;
-    return values.every(Number.isFinite) ? values : Array.from(values, (v) => (Number.isFinite(v) ? v : Number.isNaN(v) ? none : null));
+    return values.every(Number.isFinite) ? values : Array.from(values, (v) => (Number.isFinite(v) ? v : none));
   }
   const shown = (v) => (v == null ? "" : Math.abs(v) >= 1e5 || (v !== 0 && Math.abs(v) < 1e-3) ? v.toExponential(2) : String(+v.toPrecision(4)));
 
