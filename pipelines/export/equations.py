@@ -98,11 +98,9 @@ def holding(term: Term) -> Holding:
         return left_out("it needs a second coordinate at the joint, which is rigid here")
     if effect.reading_states:
         return left_out("it needs the torques of the past")
-    own = [p.name for p in effect.parameters if p.per_run]
-    known = f"; {' and '.join(own)} of one run, each has its own" if own else ""
     if effect.reading is not None:
         is_shift = shift_of(term) is not None
-        return exact(f"a constant between angles{known}") if is_shift else left_out("its reading is more than a shift")
+        return exact("a constant between angles") if is_shift else left_out("its reading is more than a shift")
     try:
         for kernel in (effect.reaction, effect.derivative, effect.torque_reading):
             if kernel is not None:
@@ -110,8 +108,8 @@ def holding(term: Term) -> Holding:
     except NotWritable as error:
         return left_out(str(error))
     if effect.torque_reading is not None:
-        return exact(f"torque_reading{known}")
-    return exact(("inverse dynamics, its memory an argument" if effect.states else "inverse dynamics") + known)
+        return exact("torque_reading")
+    return exact("inverse dynamics, its memory an argument" if effect.states else "inverse dynamics")
 
 
 def equations(exported: Exported) -> Equations:

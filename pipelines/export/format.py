@@ -1,7 +1,7 @@
 """What a format is: which terms of a model it can hold, and how the model is written in it."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
@@ -52,7 +52,14 @@ class Format:
     title: str
     suffix: str
     """Of the file, its dot included."""
-    holding: Callable[[Term], Holding]
+    holds: Callable[[Term], Holding]
     """What becomes of a term, its values looked at: a negative friction, say, may be more than a format holds."""
     write: Callable[["Exported", str], Mapping[str, str]]
     """Of a model and the file's stem: the text of each file by its suffix."""
+
+    def holding(self, term: Term) -> Holding:
+        """Return what becomes of a term, and that each run has its own where what is held is one run's."""
+        found, own = self.holds(term), [p.name for p in term.effect.parameters if p.per_run]
+        if found.degree is Degree.NOT or not own:
+            return found
+        return replace(found, how=f"{found.how}; {' and '.join(own)} of one run, each has its own")

@@ -101,6 +101,11 @@ def stamps(raw: NDArray, settings: TimeSettings, findings: list[Finding]) -> NDA
         Where whole numbers are larger than any clock counts.
     """
     found = whole_nanoseconds(raw) if settings.unit == "iso8601" or raw.dtype.kind in "mM" else raw
+    if settings.unit == "iso8601" and len(raw) and not np.isfinite(found).any():
+        raise InputError(
+            f"has {str(raw[0])[:LONGEST]!r} where a date should be, expected dates as 2026-01-31 12:00:00.125; write "
+            "them so, or correct time.column or time.unit in the map"
+        )
     return whole(found) if found.dtype.kind in "iu" else numbers(found, "time", findings)
 
 

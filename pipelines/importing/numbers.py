@@ -12,6 +12,7 @@ LONGEST = 20
 """Letters of a text that a finding shows."""
 THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+(?:\.\d+)?")
 """A number with marks between its thousands."""
+DAYS_FIRST = re.compile(r"^\s*(\d\d)\.(\d\d)\.(\d{4})")
 TAKEN_FOR_MISSING = "taken for missing"
 """What is made of a text where a number should be."""
 
@@ -49,14 +50,16 @@ def _have_thousands(text: pd.Series) -> bool:
 def whole_nanoseconds(values: NDArray) -> NDArray:
     """Return dates written out, ``2026-01-31 12:00:00.125``, as nanoseconds (n,) int64; NaN where there is none.
 
-    Times of day without a date are those of one day, and durations are since its beginning.
+    ``31.01.2026 12:00:00,125`` is such a date, too: with points between them, days come first everywhere. Times of day
+    without a date are those of one day, and durations are since its beginning.
     """
     if values.dtype.kind in "iuf":
         return values
     if values.dtype.kind in "mM":
         whole = values.astype(f"{values.dtype.kind}8[ns]").astype(np.int64)
         return np.where(np.isnat(values), np.nan, whole) if np.isnat(values).any() else whole
-    text = pd.Series(values)
+    text = pd.Series(values).astype("string")
+    text = text.str.replace(DAYS_FIRST, r"\3-\2-\1", regex=True).str.replace(",", ".", regex=False)
     dates = pd.to_datetime(text, errors="coerce", format="ISO8601", utc=True)
     if dates.isna().all():
         dates = pd.to_datetime("1970-01-01T" + text.astype("str"), errors="coerce", format="ISO8601", utc=True)

@@ -230,3 +230,14 @@ def test_a_log_whose_rows_are_reversed_is_told_so(imported, exoid, pendulum, wri
         2,
         True,
     )
+
+
+def test_dates_with_the_day_first_are_read_and_what_is_none_is_refused_by_what_it_says(imported, pendulum, write_csv):
+    stamps = pd.Timestamp("2024-03-05 23:59:58") + pd.to_timedelta(pendulum.time, unit="s")
+    columns = pendulum.columns() | {"time": stamps.strftime("%d.%m.%Y %H:%M:%S,%f")}
+    text = MAP.replace('unit = "s"', 'unit = "iso8601"', 1)
+    outcome = imported(write_csv(columns, delimiter=";"), map_text=text)
+    assert_allclose(outcome.recording().frame["time_s"], pendulum.time, atol=1e-9)
+    american = imported(write_csv(pendulum.columns() | {"time": stamps.strftime("%m/%d/%y %I.%M")}), map_text=text)
+    assert (american.code, american.err.count("\n")) == (2, 1)
+    assert "has '03/05/24 11.59' where a date should be, expected dates as 2026-01-31" in american.err

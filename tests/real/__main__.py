@@ -48,7 +48,8 @@ def measured(found: dict[str, Diagnosed], data: Path) -> dict[str, str]:
         if any(cause["each_run"] for cause in one.verdict["causes"]):
             made[f"{key}-each-run"] = tables.of_each_run(one)
         if LOGS[key].known:
-            made[f"{key}-known"] = tables.known(one)
+            made[f"{key}-known"] = tables.sizes(one, "known")
+        made[f"{key}-sizes"] = tables.sizes(one, "causes")
         made |= {f"{key}-depends": tables.depends(one), f"{key}-says": f"> {one.verdict['summary']}"}
     return made
 

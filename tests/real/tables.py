@@ -106,14 +106,18 @@ def pendulum(found: Sequence[Diagnosed], published: Path) -> str:
     return table(headings, rows)
 
 
-def known(d: Diagnosed) -> str:
-    """Return what was told to be there as it was fitted."""
+def sizes(d: Diagnosed, of: str) -> str:
+    """Return how large the ``known`` effects, or the named ``causes``, were found to be."""
     rows = [
-        (cause_label(told), f"{p['value']:.3g} {p['unit']}", " … ".join(f"{end:.2g}" for end in p["ci95"]))
-        for told in d.verdict["known"]
-        for p in told["parameters"]
+        (cause_label(one), p["name"], _sized(p, ".3g"), " … ".join(f"{end:.2g}" for end in p["ci95"]))
+        for one in d.verdict[of]
+        for p in one["parameters"]
     ]
-    return table(("known", "found", "95 % interval"), rows)
+    return table((of.removesuffix("s"), "parameter", "found", "95 % interval"), rows)
+
+
+def _sized(parameter: Mapping[str, Any], digits: str) -> str:
+    return f"{parameter['value']:{digits}}" + f" {parameter['unit']}" * (parameter["unit"] != "1")
 
 
 def by_order(d: Diagnosed) -> str:
