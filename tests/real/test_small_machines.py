@@ -7,9 +7,13 @@ from pipelines.mechanics.scale import on_one_scale
 from tests.real.machines import LOGS, diagnosed, motions, recordings
 
 
-@pytest.mark.parametrize("machine", ["simple", "xl330", "modexo"])
-def test_reversals_of_small_or_dirty_logs_show_no_travel(real_data, tmp_path, machine):
-    assert diagnosed(LOGS[machine], real_data, tmp_path).verdict["reversals"] == []
+@pytest.mark.parametrize(
+    ("machine", "status"), [("simple", "nothing_missing"), ("xl330", "partly_explained"), ("modexo", "unknown_cause")]
+)
+def test_small_or_dirty_logs_have_no_sure_cause_and_show_no_travel_at_reversals(real_data, tmp_path, machine, status):
+    said = diagnosed(LOGS[machine], real_data, tmp_path).verdict
+    assert (said["status"], said["reversals"]) == (status, [])
+    assert all(cause["probability"] < 0.7 for cause in said["causes"])
 
 
 @pytest.mark.parametrize("machine", ["simple", "xl330", "modexo"])
