@@ -109,7 +109,7 @@ def pendulum(found: Sequence[Diagnosed], published: Path) -> str:
 def sizes(d: Diagnosed, of: str) -> str:
     """Return how large the ``known`` effects, or the named ``causes``, were found to be."""
     rows = [
-        (cause_label(one), p["name"], _sized(p, ".3g"), " … ".join(f"{end:.2g}" for end in p["ci95"]))
+        (cause_label(one), p["name"], _sized(p, ".3g"), " … ".join(f"{end:.3g}" for end in p["ci95"]))
         for one in d.verdict[of]
         for p in one["parameters"]
     ]
