@@ -37,8 +37,9 @@ def test_a_fault_leaves_a_gap_that_is_told_or_stops_the_run_with_its_reason(fram
     assert result.wrong == 0 or "frozen" in str(result.why)  # that is known only when others have moved on
     assert result.wrong_s <= told_s(result.why)
     assert result.disabled or "could not be disabled" in str(result.why)
-    missing = int(result.frame["sequence"].iloc[-1] - result.frame["sequence"].iloc[0]) + 1 - len(result.frame)
-    assert missing == result.missing
+    between = int(result.frame["sequence"].iloc[-1] - result.frame["sequence"].iloc[0]) + 1 - len(result.frame)
+    # Of a run that went to its end, the last sample may be a busy computer's to miss: no other tells of it.
+    assert between == result.missing or (result.why is None and between < result.missing)
     if case.stops is None or (case.either and result.why is None):
         assert result.why is None
         assert len(result.frame) + result.missing == RATE

@@ -36,7 +36,7 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
     drawn.legend(lines[: len(names)], names, loc="upper right", ncols=2)
     drawn.suptitle(
         "What the torque error goes with, most first, the phase of the period last:\n"
-        "share of its variance that a curve foretells (band: noise floor)",
+        "share of its variance that a curve foretells (band: noise floor; dashed: backward, or another run)",
         x=0.01, ha="left", fontweight="bold",
     )  # fmt: skip
     drawn.tight_layout()
