@@ -43,6 +43,7 @@ from pipelines.diagnosis.ties import ALIKE
 from pipelines.diagnosis.uncertainty import Uncertainty, uncertainty
 from pipelines.dynamics.replay import replay
 from pipelines.effects import Effect
+from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import ExoidError, InputError
 from pipelines.estimation.angle_noise import CUTOFF_HZ, is_loud
 from pipelines.estimation.collinearity import collinearities, profiled
@@ -110,10 +111,21 @@ class Diagnosis:
         seen = np.flatnonzero(np.diag(normal) > 0.0)
         return collinearities(normal[np.ix_(seen, seen)], [names[place] for place in seen])
 
-    @cached_property
+    @property
     def unrealizable(self) -> list[str]:
         """Why no real machine has the extended model's rigid bodies; empty when one may."""
         return unrealizable(self.parameters, self.baseline.machine, self.train[0].motion.geometry)
+
+    @cached_property
+    def lacks_mass(self) -> bool:
+        """Whether a rigid body has a least inertia below nought by more than its standard error."""
+        table, geometry = self.parameters.reset_index(drop=True), self.train[0].motion.geometry
+        for _, rows in table[table["effect"] == RigidBody.name].groupby("run"):
+            own = rows.index.to_numpy()
+            least, _, slope = self.baseline.machine.mechanism.least_inertia(rows["value"], geometry)
+            if least < -np.sqrt(slope @ self.covariance[np.ix_(own, own)] @ slope):
+                return True
+        return False
 
     @property
     def upside_down(self) -> list[str]:
@@ -160,7 +172,7 @@ class Diagnosis:
         """Return how likely a named cause is among its rivals, with those that cannot be told from it."""
         among_rivals = min(sum(self.alike(label).values()), 1.0)
         bent = OR_A_FREER_FORM if label in self.of_a_freer_form else 1.0
-        return among_rivals * bent * (OR_NO_MACHINE if self.unrealizable else 1.0)
+        return among_rivals * bent * (OR_NO_MACHINE if self.lacks_mass else 1.0)
 
     def alike(self, label: str) -> dict[str, float]:
         """Return a named cause and those that cannot be told from it, with their probabilities."""

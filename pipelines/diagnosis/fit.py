@@ -83,19 +83,14 @@ class Fit:
         return "beside them the rigid body is none that a machine has" if self._unreal(baseline, geometry) else ""
 
     def _unreal(self, baseline: Baseline, geometry: Geometry) -> bool:
-        """Tell whether the machine, or machine and person together, plainly have a least inertia below nought.
-
-        ``inertia_forms`` make of X a matrix that is positive definite where masses are; along its own eigenvector
-        the least eigenvalue is linear in X.
-        """
-        forms = baseline.machine.mechanism.inertia_forms(geometry)
-        inverse = np.linalg.pinv(self.normal, hermitian=True)
+        """Tell whether the machine, or machine and person together, plainly have a least inertia below nought."""
+        inverse, p = np.linalg.pinv(self.normal, hermitian=True), baseline.body
         for bodies in range(1, len(baseline.bodies) + 1):
-            p = bodies * len(forms)
-            inertias, axes = np.linalg.eigh(np.tensordot(self.values[:p].reshape(bodies, -1).sum(axis=0), forms, 1))
-            slope = np.tile(np.einsum("j,ijk,k->i", axes[:, 0], forms, axes[:, 0]), bodies)
-            spread = np.sqrt(ALIKE * slope @ inverse[:p, :p] @ slope)
-            if -inertias[0] > max(UNREAL * inertias[-1], SURE * spread):
+            X = self.values[: bodies * p].reshape(bodies, p).sum(axis=0)
+            least, largest, slope = baseline.machine.mechanism.least_inertia(X, geometry)
+            along = np.tile(slope, bodies)
+            spread = np.sqrt(ALIKE * along @ inverse[: bodies * p, : bodies * p] @ along)
+            if -least > max(UNREAL * largest, SURE * spread):
                 return True
         return False
 

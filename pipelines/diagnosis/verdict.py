@@ -268,7 +268,7 @@ def _caveats(d: Diagnosis) -> list[str]:
     ]
     shown = (hiding + d.upside_down) * (not d.spoilt) + turning
     unreal = [f"no real machine has the extended model's rigid body, so what it is named for is in doubt: {s}"
-              for s in d.unrealizable if d.causes]  # fmt: skip
+              for s in d.unrealizable if d.causes and d.lacks_mass]  # fmt: skip
     return known + _untold_length(d) + [noisy] * d.noisy_angles + unreal + shown + _of_one_run(d) + _of_one_kind(d)
 
 

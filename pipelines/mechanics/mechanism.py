@@ -100,6 +100,15 @@ class Mechanism:
         still = np.zeros(len(self.kinds))
         return self._torque(q, still, still, X, geometry)
 
+    def least_inertia(self, X, geometry: Geometry) -> tuple[float, float, NDArray]:
+        """Return the least eigenvalue of what ``inertia_forms`` make of X (p,), the largest, and its slope (p,).
+
+        The least is above nought where masses are, and along its own eigenvector it is linear in X.
+        """
+        forms = self.inertia_forms(geometry)
+        inertias, axes = np.linalg.eigh(np.tensordot(np.asarray(X, dtype=float), forms, 1))
+        return float(inertias[0]), float(inertias[-1]), np.einsum("j,ijk,k->i", axes[:, 0], forms, axes[:, 0])
+
     def unrealizable(self, X, geometry: Geometry) -> list[str]:
         """Say which conditions of a real machine the parameters X (p,) break; empty when none."""
         return self.broken(np.asarray(X, dtype=float), geometry)

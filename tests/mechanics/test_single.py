@@ -44,6 +44,18 @@ def test_the_parts_of_a_mechanism_add_up_to_its_regressor(mechanism):
 
 
 @every
+def test_the_least_inertia_is_above_nought_exactly_where_a_machine_can_be_real(mechanism):
+    draw, real = np.random.default_rng(8), {True: 0, False: 0}
+    for X in draw.uniform(-0.5, 3.0, (200, len(mechanism.parameters))):
+        least, largest, slope = mechanism.least_inertia(X, EARTH)
+        assert (least > 0.0) == (mechanism.unrealizable(X, EARTH) == [])
+        assert least <= largest
+        assert_allclose(slope @ X, least, atol=1e-12)
+        real[least > 0.0] += 1
+    assert min(real.values()) > 10
+
+
+@every
 def test_the_torque_at_an_instant_is_that_along_a_motion(mechanism):
     joints, geometry = len(mechanism.kinds), EARTH.array()
     draw = np.random.default_rng(6)
