@@ -79,11 +79,13 @@ class Log:
                 f"{channel.enabled!r} {what}, expected 0 where the drive was off and another number where it was on; "
                 "correct joint.enabled in the map, or leave it out"
             )
-        for rows, says in ((off, "is 0"), (blank, "has no number")):
+        for rows, says, so in (
+            (off, "is 0", "the drive was off"),
+            (blank, "has no number", "it says of none of them that the drive was on"),
+        ):
             if rows.any():
-                seen = f"{channel.enabled} {says} in {counted(int(rows.sum()), 'row')}"
-                known = "the drive was off" if rows is off else "it says of none of them that the drive was on"
-                findings.append(Finding(channel.target, f"{seen}: {known}", TAKEN_FOR_MISSING))
+                seen = f"{channel.enabled} {says} in {counted(int(rows.sum()), 'row')}: {so}"
+                findings.append(Finding(channel.target, seen, TAKEN_FOR_MISSING))
         return np.where(off | blank, np.nan, values)
 
     def _quantity(self, channel: Channel, run: Run, findings: list[Finding]) -> NDArray:

@@ -62,9 +62,9 @@ def _along(q, dq, ddq, geometry):
 
 @njit(REACTION, cache=True)
 def _rigid_body(at, state, values, geometry, joint, out):
-    """Add A(q, dq, ddq) X."""
+    """Add A(q, dq, ddq) X, of a leg without gravity X4 apart."""
     hip, knee = regressor_at(at.q, at.dq, at.ddq, geometry[0], geometry[1])
-    for i in range(4):
+    for i in range(len(values)):
         out[0] += hip[i] * values[i]
         out[1] += knee[i] * values[i]
 
@@ -73,15 +73,6 @@ def _rigid_body(at, state, values, geometry, joint, out):
 def _level_along(q, dq, ddq, geometry):
     """Rigid-body regressor of a whole motion without gravity, (n, 2, 3)."""
     return np.ascontiguousarray(_along(q, dq, ddq, geometry)[:, :, :3])
-
-
-@njit(REACTION, cache=True)
-def _level_body(at, state, values, geometry, joint, out):
-    """Add A(q, dq, ddq) X, X4 apart."""
-    hip, knee = regressor_at(at.q, at.dq, at.ddq, geometry[0], geometry[1])
-    for i in range(3):
-        out[0] += hip[i] * values[i]
-        out[1] += knee[i] * values[i]
 
 
 @njit(REACTION, cache=True)
@@ -166,7 +157,6 @@ LEVEL_LEG = replace(
     parameters=LEG.parameters[:3],
     bends_at=("knee",),
     along=_level_along,
-    reactions={**LEG.reactions, "rigid_body": _level_body},
     inertia_forms=lambda geometry: _inertia_forms(geometry)[:3],
 )
 
