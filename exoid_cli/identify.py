@@ -1,7 +1,7 @@
 """``exoid identify``: friction from the empty exoskeleton, then inertia with the human."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -10,10 +10,14 @@ from exoid_cli.console import console
 from exoid_cli.parameters_view import said, show_parameters
 from exoid_cli.place import ConfigOption, inputs_and_folder, place_of, settings_in_force
 from exoid_cli.steps import AgainOption, only
+from pipelines.errors import InputError
 
 if TYPE_CHECKING:
-    from pipelines.identification import Identified
+    from collections.abc import Sequence
+
+    from pipelines.identification import Extension, Identified
     from pipelines.mechanics.machine import Machine
+    from pipelines.mechanics.run import Run
 
 
 def identify(
@@ -40,6 +44,25 @@ def identify(
             autocompletion=completion.methods,
         ),
     ] = None,
+    causes: Annotated[
+        Path | None,
+        typer.Option(help="The parameters.parquet of a diagnosis: fit what it named, too, its shapes held."),
+    ] = None,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="What the model has besides, as rotor_inertia@knee; more than once for more.",
+            show_default="[identify] effects, nothing",
+        ),
+    ] = None,
+    reversals: Annotated[
+        bool | None,
+        typer.Option(
+            "--reversals/--no-reversals",
+            help="Whether samples near reversals are fitted, too.",
+            show_default="[identify] reversals, no",
+        ),
+    ] = None,
 ) -> None:
     """Fit the leg's parameters to training runs and measure the torque error on validation runs.
 
@@ -48,31 +71,63 @@ def identify(
       exoid identify
       exoid identify motions/*.parquet -o identified/
       exoid identify motions/*.parquet -o iv/ --method instrumental_variables
+      exoid identify recordings/*.parquet -o refitted/ --causes diagnosed/parameters.parquet
     """
-    from pipelines.contracts import PARAMETERS, RESIDUALS, describe
+    from pipelines.contracts import describe
     from pipelines.estimation.estimators import estimator_named
     from pipelines.identification import identify as fit
-    from pipelines.identification.validation import residuals
     from pipelines.mechanics.read import geometry_from, read_runs, refuse_another_mechanism
+    from pipelines.mechanics.scale import on_one_scale
 
-    if not files and output is None and method is None:
+    if not files and output is None and (method, causes, effect, reversals) == (None,) * 4:
         only(context, place_of(config, lacking="no motion is given"), "identify", again=again)
         return
+    if causes and output is None:
+        raise InputError("--causes: no folder is given; name one with -o, for identified/ is without them")
     files, output = inputs_and_folder("identify", files, output, config, "no motion is given")
     settings = settings_in_force(config)
     estimator = estimator_named(settings.identify.method if method is None else method)
-    runs = read_runs(files, settings.filter, geometry_from(settings))
+    asked = settings.identify.changed(method=estimator.name, effects=effect or None, reversals=reversals)
+    runs = on_one_scale(read_runs(files, settings.filter, geometry_from(settings)))
     refuse_another_mechanism(settings.mechanism, runs)
     with console.working("fitting"):
-        found = fit(runs, estimator)
-    config_used = settings.sections_about(runs[0].machine.is_exoskeleton, "mechanism", "filter") | {
-        "identify": settings.identify.changed(method=estimator.name).model_dump(mode="json")
-    }
-    shared = {"joints": runs[0].joint_metadata} | describe(inputs=files, config=config_used)
+        found = fit(runs, estimator, _extension(asked.effects, causes, runs, files), reversals=asked.reversals)
+    heeded = settings.sections_about(runs[0].machine.is_exoskeleton, "mechanism", "filter")
+    config_used = heeded | {"identify": asked.model_dump(mode="json")}
+    inputs = [*files, causes] if causes else files
+    shared = {"joints": runs[0].joint_metadata} | describe(inputs=inputs, config=config_used)
+    figures = _write(found, output, shared, figures=asked.figures)
+    _report(found, runs[0].machine)
+    console.wrote(output, "parameters.parquet", "residuals.parquet", *figures)
+
+
+def _extension(
+    labels: "Sequence[str]", causes: Path | None, runs: "Sequence[Run]", files: "Sequence[Path]"
+) -> "Extension":
+    """Return what the model has beside rigid body and friction."""
+    from pipelines.contracts import PARAMETERS
+    from pipelines.identification.extension import chosen, named
+
+    beside = chosen(labels, runs[0].machine)
+    if not causes:
+        return beside
+    of_diagnosis = named(PARAMETERS.read(causes), runs, files)
+    if not of_diagnosis.effects:
+        console.say(f"{causes}: names nothing beside rigid body and friction.")
+    return of_diagnosis | beside
+
+
+def _write(found: "Identified", output: Path, shared: "dict[str, Any]", *, figures: bool) -> list[str]:
+    """Write parameters, residuals and, if asked, figures into a folder; return the figures' names."""
+    from pipelines.contracts import PARAMETERS, RESIDUALS
+    from pipelines.identification.figures import draw
+    from pipelines.identification.validation import residuals
+
+    run = found.runs[0]
     described = {
         "covariance": found.covariance.tolist(),
-        "mechanism": runs[0].machine.mechanism.name,
-        "geometry": runs[0].machine.told(runs[0].geometry),
+        "mechanism": run.machine.mechanism.name,
+        "geometry": run.machine.told(run.geometry),
         "method": found.method,
         "one_step": found.one_step.tolist(),
         "validation": found.validation.as_json(),
@@ -81,18 +136,18 @@ def identify(
         "remarks": found.remarks,
         "angle_noise": found.angle_noise,
     }
+    if found.extension.each_run:
+        described["each_run"] = found.extension.each_run
     PARAMETERS.write(output / "parameters.parquet", found.parameters, shared | described)
     left = output / "residuals.parquet"
     with console.working("predicting every run"):
-        RESIDUALS.write_pieces(left, residuals(runs, found.models, "baseline"), shared)
-    if settings.identify.figures:
-        from pipelines.identification.figures import draw
-
-        with console.working("drawing"):
-            draw(RESIDUALS.scan(left), output)
-    _report(found, runs[0].machine)
-    figures = sorted(path.name for path in output.glob("*.png")) if settings.identify.figures else []
-    console.wrote(output, "parameters.parquet", "residuals.parquet", *figures)
+        model = "extended" if found.extension.effects else "baseline"
+        RESIDUALS.write_pieces(left, residuals(found.runs, found.model_of, model), shared)
+    if not figures:
+        return []
+    with console.working("drawing"):
+        draw(RESIDUALS.scan(left), output)
+    return sorted(path.name for path in output.glob("*.png"))
 
 
 def _report(found: "Identified", machine: "Machine") -> None:

@@ -1,6 +1,7 @@
 """A model's parameters as a table with intervals and units."""
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from exoid_cli.console import console
@@ -28,7 +29,7 @@ def show_parameters(
             (
                 _named(row),
                 said(row["value"], joints),
-                f"{said(row['ci95_low'], joints)} … {said(row['ci95_high'], joints)}",
+                _interval(row, joints),
                 row["unit"],
                 *(beside[k] if beside else []),
                 row["step"],
@@ -37,6 +38,11 @@ def show_parameters(
         ],
         numbers="value, one step",
     )
+
+
+def _interval(row: Mapping[Any, Any], joints: "Sequence[Joint]") -> str:
+    ends = [row[key] for key in ("ci95_low", "ci95_high")]
+    return " … ".join(said(end, joints) for end in ends) if all(map(isfinite, ends)) else "held"
 
 
 def _named(row: Mapping[Any, Any]) -> str:

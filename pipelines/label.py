@@ -1,10 +1,11 @@
 """A cause's label, ``effect@joint`` (see ``Effect.label``): whose it is, and how sentences say it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from pipelines.contracts.joints import the
-from pipelines.effects import Effect
+from pipelines.effects import EFFECTS, Effect
+from pipelines.errors import InputError
 from pipelines.mechanics.machine import Machine
 from pipelines.model import effect_named
 
@@ -29,6 +30,23 @@ def effect_labelled(label: str) -> Effect:
     """Return the effect that ``cogging@knee`` is the label of."""
     name, _, joint = label.partition("@")
     return effect_named(name)(joint=joint or None)
+
+
+def effect_at(label: str, machine: Machine, fits: Callable[[type[Effect]], bool], setting: str) -> Effect:
+    """Return the effect of a label at a machine, if it ``fits`` what a ``setting`` may hold.
+
+    Raises
+    ------
+    InputError
+        Where there is none of this name or at this joint, or it does not fit.
+    """
+    told = effect_labelled(label)
+    if fits(type(told)) and told.joint in told.possible(machine):
+        return type(told)(joint=told.joint, on=machine)
+    can_be = [one(joint=place, on=machine).label for one in EFFECTS if fits(one) for place in one.possible(machine)]
+    raise InputError(
+        f"{setting}: found {label}, expected {' or '.join(can_be) or 'nothing'}; correct it or leave it out"
+    )
 
 
 def effect_told(cause: Mapping[str, Any]) -> Effect:

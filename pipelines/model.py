@@ -17,6 +17,8 @@ from pipelines.mechanics.motion import Motion
 from pipelines.validation import closest, suggestion
 
 BY_NAME = {effect.name: effect for effect in EFFECTS}
+BASELINE = (RigidBody.name, Friction.name)
+"""What every lab's model holds."""
 
 
 @dataclass(frozen=True)
@@ -158,11 +160,7 @@ def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_
     if not (is_body & (frame["run"] == run)).any():
         known = ", ".join(sorted(frame.loc[is_body, "run"].dropna().unique()))
         raise InputError(f"the parameters hold no rigid body for run {run!r}, only for {known}")
-    others = frame[~is_body & (frame["run"].isna() | (frame["run"] == run))]
-    terms = [
-        _term_from_rows(_effect_of_rows(rows, machine), rows)
-        for _, rows in others.groupby(["effect", "joint"], sort=False, dropna=False)
-    ]
+    terms = [term for term, _ in terms_beside_bodies(frame, machine) if term.effect.run in (None, run)]
     bodies = {str(kind): rows for kind, rows in frame[is_body].groupby("run")}
     if any(term.effect.at_cuff for term in terms) and {"exo_alone", "human"} <= set(bodies):
         # Machine and limb move apart: each needs its own.
@@ -174,10 +172,23 @@ def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_
     return Model((*(_term_from_rows(effect, rows) for effect, rows in parts), *terms))
 
 
+def terms_beside_bodies(frame: pd.DataFrame, machine: Machine) -> list[tuple[Term, pd.DataFrame]]:
+    """Return every term that a ``parameters/1`` table of a machine has beside rigid bodies, and the rows that tell it.
+
+    Raises
+    ------
+    InputError
+        Where it tells of effects or joints that there are not, or not of all their values.
+    """
+    others = frame[frame["effect"] != RigidBody.name].groupby(["effect", "joint", "run"], sort=False, dropna=False)
+    return [(_term_from_rows(_effect_of_rows(rows, machine), rows), rows) for _, rows in others]
+
+
 def _effect_of_rows(rows: pd.DataFrame, machine: Machine) -> Effect:
     """Return the effect that a parameters table tells of in some rows, all of one cause."""
     first = rows.iloc[0]
-    joint, of = first["joint"] if isinstance(first["joint"], str) else None, effect_named(str(first["effect"]))
+    joint, run = (first[key] if isinstance(first[key], str) else None for key in ("joint", "run"))
+    of = effect_named(str(first["effect"]))
     if joint not in ([None] if of.whole_leg else machine.names):
         expected = "none: it is the whole machine's" if of.whole_leg else " or ".join(machine.names)
         raise InputError(
@@ -185,7 +196,7 @@ def _effect_of_rows(rows: pd.DataFrame, machine: Machine) -> Effect:
             "joint, or the joints in its metadata"
         )
     each_run = bool(of.may_differ and "each_run" in rows and rows["each_run"].any())
-    return of(joint=joint, on=machine, each_run=each_run)
+    return of(joint=joint, run=run, on=machine, each_run=each_run)
 
 
 def _term_from_rows(effect: Effect, rows: pd.DataFrame) -> Term:

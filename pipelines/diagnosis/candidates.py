@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.gram import Gram, gram_of, solve
 from pipelines.diagnosis.observations import FOLDS, Baseline, Run
 from pipelines.effects import EFFECTS, Effect, Parameter, Side
-from pipelines.model import Model, Term
+from pipelines.model import BASELINE, Model, Term
 
 WORN = ("mass_off_axis", "payload_change")
 """Effects of the structure that the person may carry instead: then in their runs only, and felt by the cuffs."""
-BASELINE = ("rigid_body", "friction")
 TURNS = ("1/turn", "rad/m")
 """Units of what is counted along a joint's way."""
 WAVES = 1.5

@@ -5,11 +5,10 @@ Who built a machine knows its rotors and gears. Data need not show that they are
 
 from collections.abc import Sequence
 
-from pipelines.diagnosis.candidates import BASELINE
-from pipelines.effects import EFFECTS, Effect, Side
-from pipelines.errors import InputError
-from pipelines.label import effect_labelled
+from pipelines.effects import Effect, Side
+from pipelines.label import effect_at
 from pipelines.mechanics.machine import Machine
+from pipelines.model import BASELINE
 
 
 def known_effects(labels: Sequence[str], machine: Machine) -> tuple[Effect, ...]:
@@ -20,17 +19,7 @@ def known_effects(labels: Sequence[str], machine: Machine) -> tuple[Effect, ...]
     InputError
         Where there is none of this name or at this joint, or drawings do not show it.
     """
-    return tuple(_known(label, machine) for label in dict.fromkeys(labels))
-
-
-def _known(label: str, machine: Machine) -> Effect:
-    told = effect_labelled(label)
-    if _fits(type(told)) and told.joint in told.possible(machine):
-        return type(told)(joint=told.joint, on=machine)
-    can_be = [one(joint=place, on=machine).label for one in EFFECTS if _fits(one) for place in one.possible(machine)]
-    raise InputError(
-        f"diagnose.known: found {label}, expected {' or '.join(can_be) or 'nothing'}; correct it or leave it out"
-    )
+    return tuple(effect_at(label, machine, _fits, "diagnose.known") for label in dict.fromkeys(labels))
 
 
 def _fits(effect: type[Effect]) -> bool:

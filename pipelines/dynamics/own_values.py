@@ -30,7 +30,7 @@ def with_own_values(model: Model, table: Table, recording: Path | None) -> tuple
         if own:
             of = f"that of {runs[0]['name']}, the first run it tells of" if runs else "that of its rows"
             why = f"{table.path} tells none of {recording}" if recording else "this loop is no recorded run"
-            guesses.append(f"{label}: each run has its own {' and '.join(own)}, and {why}; simulated with {of}")
+            guesses.append(f"{label}: each run has its own {' and '.join(own)}, and {why}; taken is {of}")
     return Model(tuple(terms)), tuple(guesses)
 
 

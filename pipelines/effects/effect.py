@@ -250,6 +250,8 @@ class Effect(ABC):
     def jacobian(self, values: NDArray) -> NDArray:
         """Return how ``physical`` changes with ``values``, (parameters, fitted), to carry intervals over."""
         values = np.asarray(values, dtype=float)
+        if type(self).physical is Effect.physical:
+            return np.eye(len(values))
         steps = np.diag(DIFFERENCE * np.maximum(np.abs(values), DIFFERENCE))
         ahead = np.array([self.physical(values + step) for step in steps])
         behind = np.array([self.physical(values - step) for step in steps])

@@ -21,7 +21,7 @@ from pipelines.estimation.long_run import Scores
 from pipelines.estimation.normal_matrix import inverse
 from pipelines.estimation.problem import Problem
 from pipelines.estimation.realizable import nearest
-from pipelines.estimation.regression import Regression, by_segment, regressions, residual_of
+from pipelines.estimation.regression import Regression, by_segment, residual_of
 
 ITERATIONS = 20
 SETTLED = 0.01
@@ -80,10 +80,9 @@ class _Rows:
 
 
 def _rows(problem: Problem, measured: Sequence[Regression], values: NDArray) -> list[_Rows]:
-    model = problem.model.with_linear(problem.completed(values))
-    rows = []
+    training, every, rows = problem.training, problem.completed(values), []
     for (_, run), r in zip(problem.runs, measured, strict=True):
-        (simulated,) = regressions(closed_loop(model, run.whole()), problem.model)
+        (simulated,) = training.regressions(closed_loop(training.model_of(run, every), run.whole()))
         rows.append(_Rows(r, simulated.regressor, r.usable & simulated.usable))
     return rows
 

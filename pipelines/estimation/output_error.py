@@ -65,8 +65,8 @@ class OutputError(Estimator):
 
 def _errors(problem: Problem, every: NDArray) -> list[NDArray]:
     """Return by how much the simulation strays, (windows, samples, J) for each run."""
-    model = problem.model.with_linear(every)
-    return [replay(model, run.whole(), WINDOW_S, WINDOW_S).error for _, run in problem.runs]
+    model_of = problem.training.model_of
+    return [replay(model_of(run, every), run.whole(), WINDOW_S, WINDOW_S).error for _, run in problem.runs]
 
 
 def _slopes(problem: Problem, every: NDArray, columns: Sequence[int], size: NDArray) -> list[NDArray]:

@@ -1,17 +1,17 @@
 """What is to be estimated from what: some columns of a model, from the training runs of some kinds."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.estimation.compressed import Compressed, compress, together
-from pipelines.estimation.regression import Regression, regressions
+from pipelines.estimation.regression import Regression, regressions, residual_of
 from pipelines.mechanics.run import Run
 from pipelines.mechanics.silence import silent_torque
-from pipelines.model import Model
+from pipelines.model import Model, Term
 
 
 @dataclass(frozen=True)
@@ -21,6 +21,25 @@ class Training:
     runs: tuple[Run, ...]
     model: Model
     """Of all kinds of run; what a run has not is a column of zeros there."""
+    own: Mapping[str, tuple[Term, ...]] = field(default_factory=dict)
+    """By a run's file, terms that it has for itself; they are held as they are."""
+    reversals: bool = False
+    """Whether samples near reversals are fitted, too."""
+
+    def model_of(self, run: Run, values: NDArray) -> Model:
+        """Return the model of one run with some linear values, (p,), and what the run has for itself."""
+        return Model((*self.model.with_linear(values), *self.own.get(run.file, ())))
+
+    def regressions(self, run: Run) -> Iterator[Regression]:
+        """Yield a run's regression on the p columns, less the torque of what it has for itself, piece by piece."""
+        p = len(self.model.linear_parameters)
+        whole = self.model_of(run, np.zeros(p))
+        own = whole.linear_values
+        for r in regressions(run, whole):
+            yield replace(
+                r, regressor=r.regressor[:, :, :p], torque=residual_of(r, own),
+                usable=np.broadcast_to(r.valid[:, np.newaxis], r.usable.shape) if self.reversals else r.usable,
+            )  # fmt: skip
 
     @cached_property
     def compressed(self) -> tuple[Compressed, ...]:
@@ -31,7 +50,7 @@ class Training:
         InputError
             Where the torque of a joint is nought in all of them.
         """
-        parts = tuple(compress(regressions(run, self.model)) for run in self.runs)
+        parts = tuple(compress(self.regressions(run)) for run in self.runs)
         # Of triangles only nought is told from a constant; the diagnosis sees the samples.
         for j, joint in enumerate(self.runs[0].machine.joints if self.runs else ()):
             if all(part.count[j] > 0 and not part.torque[j].any() for part in parts):
@@ -41,7 +60,7 @@ class Training:
     @cached_property
     def whole(self) -> "Training":
         """The same with whole runs in memory."""
-        return Training(tuple(run.whole() for run in self.runs), self.model)
+        return replace(self, runs=tuple(run.whole() for run in self.runs))
 
 
 @dataclass(frozen=True)
@@ -85,7 +104,7 @@ class Problem:
     def regressions(self) -> Iterator[tuple[int, Regression]]:
         """Yield each run's number and its regression on all columns, piece by piece."""
         for number, run in self.runs:
-            for regression in regressions(run, self.model):
+            for regression in self.training.regressions(run):
                 yield number, regression
 
     def whole(self) -> "Problem":

@@ -2,44 +2,55 @@
 
 Step 1 fits the rigid body and the friction of the empty exoskeleton. Step 2 holds that friction and
 fits the rigid body of human and exoskeleton; step 1's covariance is carried into step 2's intervals.
+What the model has beside both is fitted in step 1, or in step 2 where it acts with a human only.
 A fit of everything at once is computed beside it as a check. Least squares goes through each training run once to
 compress its rows, from which every fit follows, and twice for the covariance of what the fit left.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from pipelines.effects import Effect, Parameter
+from pipelines.effects.friction import Friction
+from pipelines.effects.rigid_body import RigidBody
 from pipelines.estimation.angle_noise import CUTOFF_HZ, IN_WORDS, is_loud
 from pipelines.estimation.collinearity import collinearities
-from pipelines.estimation.estimator import Estimate, Estimator, estimated
+from pipelines.estimation.estimator import Estimate, Estimator, Fit, estimated
 from pipelines.estimation.least_squares import WeightedLeastSquares
 from pipelines.estimation.problem import Problem, Training
+from pipelines.estimation.regression import mask_in_words
+from pipelines.identification.extension import Extension
 from pipelines.identification.runs import Runs, checked
 from pipelines.identification.validation import Validation, validate
 from pipelines.mechanics.run import Run
 from pipelines.mechanics.scale import on_one_scale
-from pipelines.model import Model, Term, baseline, unrealizable, upside_down
+from pipelines.model import BASELINE, Model, Term, baseline, unrealizable, upside_down
 
 BIASED = (
     f"{IN_WORDS}, which lets every fit take the machine for too light; set filter.cutoff_hz = {CUTOFF_HZ:g}, and see "
     "to encoder counts and time stamps"
 )
+STEP = 0.25
+"""Standard errors by which a shape is moved to see what the values make of it."""
+
+Found = TypeVar("Found", bound=Fit, covariant=True)
 
 
 @dataclass(frozen=True)
 class Row:
-    """One row of ``parameters/1`` before it has a value."""
+    """One row of ``parameters/1``."""
 
     effect: Effect
     parameter: Parameter
-    run: str | None
     step: str
+    value: float
+    slope: NDArray
+    """(p + s,) how it changes with the model's linear values and the shapes that are held."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +64,12 @@ class Identified:
     one_step: NDArray
     """The values of a fit of everything at once, in the same order."""
     validation: Validation
-    models: dict[str, Model]
-    """What was found, for each kind of run."""
+    runs: tuple[Run, ...]
+    """As they were fitted and judged."""
+    training: Training
+    values: NDArray
+    """(p,) of the training's model."""
+    extension: Extension
     collinear: list[str]
     """What this motion cannot separate, a sentence each."""
     unrealizable: list[str]
@@ -66,8 +81,18 @@ class Identified:
     angle_noise: list[str]
     """A sentence where noise of the angles biases every fit; empty where it does not."""
 
+    def model_of(self, run: Run) -> Model | None:
+        """Return what was found, as it is in a run; None where none of its kind was trained on."""
+        return _found(self.training, self.values, run)
 
-def identify(motions: Sequence[Run], estimator: Estimator | None = None) -> Identified:
+
+def identify(
+    motions: Sequence[Run],
+    estimator: Estimator | None = None,
+    extension: Extension | None = None,
+    *,
+    reversals: bool = False,
+) -> Identified:
     """Identify friction, the exoskeleton's rigid body and, where there are runs with one, the human's.
 
     Parameters
@@ -76,6 +101,10 @@ def identify(motions: Sequence[Run], estimator: Estimator | None = None) -> Iden
         Runs to train on and to validate on.
     estimator : Estimator, optional
         The method of both steps; weighted least squares unless given.
+    extension : Extension, optional
+        What the model has beside rigid body and friction. Whole runs are then held in memory, for it may remember.
+    reversals : bool
+        Whether samples near reversals are fitted, too.
 
     Raises
     ------
@@ -84,132 +113,219 @@ def identify(motions: Sequence[Run], estimator: Estimator | None = None) -> Iden
     NotIdentifiable
         Where the motion cannot separate the parameters.
     """
-    estimator = estimator or WeightedLeastSquares()
+    estimator, extension = estimator or WeightedLeastSquares(), extension or Extension()
     runs = checked(on_one_scale(motions))
-    model = _model(runs)
-    columns = model.linear_parameters
-    training = Training(tuple(runs.of("train")), model)
-    nothing = np.zeros(len(columns))
-    friction = _columns(model, None)
-    first = Problem(training, ("exo_alone",), np.append(_columns(model, "exo_alone"), friction), nothing)
-    fits = {"exo_alone": estimated(estimator.fit(first))}
-    alone = fits["exo_alone"]
-    rows = [Row(effect, parameter, effect.run, "friction") for effect, parameter in (columns[c] for c in first.fitted)]
-    values, covariance = alone.values, alone.covariance
-    critical = np.full(len(rows), alone.critical)
-    problems = {"exo_alone": first}
-    if "with_human" in runs.kinds:
-        second = Problem(training, ("with_human",), _columns(model, "with_human"), first.completed(alone.values))
-        held = fits["with_human"] = estimated(estimator.fit(second))
-        problems["with_human"] = second
-        values, covariance = _joined(alone, held, first)
-        body = [columns[column] for column in second.fitted]
-        rows += [Row(e, p, "with_human", "inertia") for e, p in body]
-        rows += [Row(e, p, "human", "inertia") for e, p in body]
-        # Each fit's intervals by its own lag; a difference of both fits is no surer than the less sure of them.
-        own, either = held.critical, max(alone.critical, held.critical)
-        critical = np.concatenate([critical, np.repeat([own, either], len(body))])
-    table = _table(rows, values, covariance, critical)
-    final = {kind: _of_run(model.for_run(kind), table, kind) for kind in runs.kinds}
+    if extension.effects:
+        runs = Runs(tuple(run.whole() for run in runs.motions))
+    model = _model(runs, extension.checked(runs.kinds))
+    training = Training(tuple(runs.of("train")), model, extension.own, reversals)
+    steps = {kind: Step(one.problem, estimated(one.fit)) for kind, one in _in_steps(training, estimator, runs).items()}
+    values = _values(steps)
+    rows = list(_rows(model, extension, values))
+    covariance = _covariance(rows, steps, extension, _answer_to_shapes(training, extension, runs))
+    table = _table(rows, covariance, _critical(rows, steps))
+    everything = Problem(training, runs.kinds, np.arange(len(values)), np.zeros(len(values)))
     return Identified(
         parameters=table,
         covariance=covariance,
-        one_step=_one_step(Problem(training, runs.kinds, np.arange(len(columns)), nothing), estimator, rows),
-        validation=validate(runs.of("validate"), final),
-        models=final,
+        one_step=np.array([row.value for row in _rows(model, extension, estimator.fit(everything).values)]),
+        validation=validate(runs.of("validate"), lambda run: _found(training, values, run)),
+        runs=runs.motions,
+        training=training,
+        values=values,
+        extension=extension,
         collinear=[
-            f"{kind}: {s}" for kind, fit in fits.items() for s in collinearities(fit.normal, problems[kind].names)
+            f"{kind}: {sentence}"
+            for kind, step in steps.items()
+            for sentence in collinearities(step.fit.normal, step.problem.names)
         ],
         unrealizable=_unrealizable(table, runs),
-        method=_method(estimator, fits),
+        method=_method(estimator, steps, training),
         remarks=[
-            *(f"{kind}: {remark}" for kind, fit in fits.items() for remark in fit.remarks),
+            *(f"{kind}: {remark}" for kind, step in steps.items() for remark in step.fit.remarks),
             *upside_down(table, runs.motions[0].machine),
+            *extension.remarks,
         ],
         angle_noise=[BIASED] * is_loud(training.runs),
     )
 
 
-def _model(runs: Runs) -> Model:
-    effects = baseline(runs.motions[0].machine, runs.kinds)
-    return Model(tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects))
+def _model(runs: Runs, extension: Extension) -> Model:
+    machine = runs.motions[0].machine
+    effects = baseline(machine, runs.kinds)
+    if "with_human" in runs.kinds and any(effect.at_cuff for effect in extension.effects):
+        # Machine and limb move apart: each needs its own body.
+        effects = (RigidBody(on=machine), RigidBody(run="with_human", on=machine), *effects[2:])
+    return Model((*(Term(effect, np.zeros(len(effect.linear))) for effect in effects), *extension.terms))
 
 
-def _columns(model: Model, kind: str | None) -> NDArray:
-    """Return the columns of what is there in one kind of run alone, or, for None, in all."""
-    return np.flatnonzero([effect.run == kind for effect, _ in model.linear_parameters])
+def _found(training: Training, values: NDArray, run: Run) -> Model | None:
+    if all(run.run != trained.run for trained in training.runs):
+        return None
+    return training.model_of(run, values).for_run(run.run)
 
 
-def _method(estimator: Estimator, fits: Mapping[str, Estimate]) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Step(Generic[Found]):
+    """One of the two steps."""
+
+    problem: Problem
+    fit: Found
+
+
+def _in_steps(training: Training, estimator: Estimator, runs: Runs) -> dict[str, Step[Fit]]:
+    """Fit what is there in the empty exoskeleton, then, that being held, what comes with a human."""
+    empty = np.array(
+        [
+            "exo_alone" in effect.acts_in and effect.run in (None, "exo_alone")
+            for effect, _ in training.model.linear_parameters
+        ]
+    )
+    values = np.zeros(len(empty))
+    steps = {}
+    for kind in runs.kinds:
+        fitted = np.flatnonzero(empty if kind == "exo_alone" else ~empty)
+        problem = Problem(training, (kind,), fitted, values)
+        steps[kind] = Step(problem, estimator.fit(problem))
+        values = _values(steps)
+    return steps
+
+
+def _values(steps: Mapping[str, Step[Any]]) -> NDArray:
+    """Return the model's linear values, (p,)."""
+    last = list(steps.values())[-1]
+    return last.problem.completed(last.fit.values)
+
+
+def _method(estimator: Estimator, steps: Mapping[str, Step[Estimate]], training: Training) -> dict[str, Any]:
     return {
         "name": f"two-step {estimator.title}",
         "estimator": estimator.name,
+        "samples": "all" if training.reversals else f"all but {mask_in_words(training.runs[0].machine)}",
         "covariance": "sandwich with Bartlett-weighted long-run scores, Andrews' lag",
         "interval": "95 %, critical value after Kiefer and Vogelsang",
-        "steps": {kind: fit.told for kind, fit in fits.items()},
+        "steps": {kind: step.fit.told for kind, step in steps.items()},
     }
 
 
-def _joined(alone: Estimate, second: Estimate, first: Problem) -> tuple[NDArray, NDArray]:
-    """Stack (step 1, with_human, human) and propagate step 1's covariance into the rest."""
-    p, b = len(alone.values), len(second.values)
-    to_body = second.carry[:, first.fitted]
-    covariance = np.zeros((p + b, p + b))
-    covariance[:p, :p] = alone.covariance
-    covariance[p:, :p] = to_body @ alone.covariance
-    covariance[:p, p:] = covariance[p:, :p].T
-    covariance[p:, p:] = second.covariance + to_body @ alone.covariance @ to_body.T
-    # The human is with_human less exo_alone.
-    human = np.hstack([-np.eye(b, p), np.eye(b)])
-    stack = np.vstack([np.eye(p + b), human])
-    values = np.concatenate([alone.values, second.values])
-    return stack @ values, stack @ covariance @ stack.T
+def _answer_to_shapes(training: Training, extension: Extension, runs: Runs) -> NDArray:
+    """Return how least-squares values answer to the shapes that are held, (p, s)."""
+    model, shapes = training.model, extension.shapes
+    answer = np.zeros((len(model.linear_parameters), len(shapes)))
+    for i, variance in enumerate(np.diag(extension.shape_covariance)):
+        if variance > 0.0:
+            step = np.zeros(len(shapes))
+            step[i] = STEP * np.sqrt(variance)
+            either = [
+                replace(training, model=_model(runs, extension.with_shapes(moved)))
+                for moved in (shapes + step, shapes - step)
+            ]
+            ahead, behind = (_values(_in_steps(one, WeightedLeastSquares(), runs)) for one in either)
+            answer[:, i] = (ahead - behind) / (2.0 * step[i])
+    return answer
 
 
-def _table(rows: Sequence[Row], values: NDArray, covariance: NDArray, critical: NDArray) -> pd.DataFrame:
-    error = np.sqrt(np.diag(covariance))
-    return pd.DataFrame(
+def _covariance(
+    rows: Sequence[Row], steps: Mapping[str, Step[Estimate]], extension: Extension, to_shapes: NDArray
+) -> NDArray:
+    """Return the covariance of some rows; what is not sure of step 1, or of a shape, is not sure of the rest.
+
+    A shape and the amplitudes beside it are estimated from what each explains beyond the others: given the shape,
+    the error of an amplitude does not go with that of the shape.
+    """
+    p, s = to_shapes.shape
+    of_linear = np.zeros((p, p))
+    for step in steps.values():
+        onto = np.eye(p)[step.problem.fitted]
+        carried = np.eye(p) + onto.T @ step.fit.carry
+        of_linear = carried @ of_linear @ carried.T + onto.T @ step.fit.covariance @ onto
+    through = np.vstack([to_shapes, np.eye(s)])
+    covariance = through @ extension.shape_covariance @ through.T
+    covariance[:p, :p] += of_linear
+    slopes = np.array([row.slope for row in rows])
+    return slopes @ covariance @ slopes.T
+
+
+def _critical(rows: Sequence[Row], steps: Mapping[str, Step[Estimate]]) -> NDArray:
+    """Return the half-width of each row's interval in standard errors: that of its fit, of several the least sure."""
+    slopes = np.array([row.slope for row in rows])
+    own = [np.where(slopes[:, s.problem.fitted].any(axis=1), s.fit.critical, 0.0) for s in steps.values()]
+    largest = np.max(own, axis=0)
+    return np.where(largest > 0.0, largest, max(step.fit.critical for step in steps.values()))
+
+
+def _rows(model: Model, extension: Extension, values: NDArray) -> Iterator[Row]:
+    """Yield the rows of ``parameters/1`` for some linear values of the model, (p,)."""
+    every = np.append(values, extension.shapes)
+    slopes = list(zip(model, _slopes(model, len(every)), strict=True))
+
+    def rows(effect: Effect, slope: NDArray, step: str) -> Iterator[Row]:
+        return _rows_of(Term(effect, slope @ every), slope, step)
+
+    for kind, slope in _bodies([one for one in slopes if isinstance(one[0].effect, RigidBody)]).items():
+        body = RigidBody(run=kind, on=model.terms[0].effect.on)
+        yield from rows(body, slope, "friction" if kind == "exo_alone" else "inertia")
+        if kind == "exo_alone":
+            for term, slope in slopes:
+                if isinstance(term.effect, Friction):
+                    yield from rows(term.effect, slope, "friction")
+    for term, slope in slopes:
+        if term.effect.name not in BASELINE:
+            yield from rows(term.effect, slope, "extension")
+    for term in extension.held:
+        yield from _rows_of(term, np.zeros((len(term.values), len(every))), "extension")
+
+
+def _slopes(model: Model, size: int) -> Iterator[NDArray]:
+    """Yield which of all linear values, and all shapes after them, are each term's, (v, size) of ones and noughts."""
+    units, linear = np.eye(size), 0
+    shape = len(model.linear_parameters)
+    for term in model:
+        ends = linear + len(term.linear), shape + len(term.shape)
+        yield np.vstack([units[linear : ends[0]], units[shape : ends[1]]])
+        linear, shape = ends
+
+
+def _bodies(bodies: Sequence[tuple[Term, NDArray]]) -> dict[str, NDArray]:
+    """Return how the rigid body of each kind of run, and the wearer's own, go with all values, (k, size) each."""
+    (term, first), *others = bodies
+    if not others:
+        return {"exo_alone": first}
+    ((_, second),) = others
+    if term.effect.run is None:
+        return {"exo_alone": first, "with_human": first + second, "human": second}
+    return {"exo_alone": first, "with_human": second, "human": second - first}
+
+
+def _rows_of(term: Term, slope: NDArray, step: str) -> Iterator[Row]:
+    """Yield the rows of a term whose values change with all values by ``slope`` (v, size)."""
+    effect = term.effect
+    slopes = effect.jacobian(term.values) @ slope
+    for parameter, value, of_parameter in zip(effect.parameters, effect.physical(term.values), slopes, strict=True):
+        yield Row(effect, parameter, step, float(value), of_parameter)
+
+
+def _table(rows: Sequence[Row], covariance: NDArray, critical: NDArray) -> pd.DataFrame:
+    value = np.array([row.value for row in rows])
+    variance = np.diag(covariance)
+    error = np.where(variance > 0.0, np.sqrt(np.maximum(variance, 0.0)), np.nan)
+    table = pd.DataFrame(
         {
             "name": [row.parameter.name for row in rows],
             "symbol": [row.parameter.symbol for row in rows],
             "joint": [row.effect.joint for row in rows],
-            "run": [row.run for row in rows],
-            "value": values,
+            "run": [row.effect.run for row in rows],
+            "value": value,
             "unit": [row.parameter.unit for row in rows],
             "std_error": error,
-            "ci95_low": values - critical * error,
-            "ci95_high": values + critical * error,
+            "ci95_low": value - critical * error,
+            "ci95_high": value + critical * error,
             "step": [row.step for row in rows],
             "effect": [row.effect.name for row in rows],
         }
     )
-
-
-def _of_run(model: Model, table: pd.DataFrame, kind: str) -> Model:
-    """Fill a model with the values that hold for a kind of run: its rigid body, then the shared friction."""
-    body = table[(table["effect"] == "rigid_body") & (table["run"] == kind)]
-    friction = table[table["effect"] == "friction"]
-    return model.with_linear(np.concatenate([body["value"], friction["value"]]))
-
-
-def _one_step(problem: Problem, estimator: Estimator, rows: Sequence[Row]) -> NDArray:
-    """Fit all runs at once, friction shared, and return the values in the order of ``rows``."""
-    found = {
-        (effect.name, effect.joint, parameter.name, effect.run): value
-        for (effect, parameter), value in zip(
-            problem.model.linear_parameters, estimator.fit(problem).values, strict=True
-        )
-    }
-
-    def of_run(row: Row, run: str | None) -> float:
-        return found[row.effect.name, row.effect.joint, row.parameter.name, run]
-
-    return np.array(
-        [
-            of_run(row, "with_human") - of_run(row, "exo_alone") if row.run == "human" else of_run(row, row.run)
-            for row in rows
-        ]
-    )
+    own = [row.parameter.per_run for row in rows]
+    return table.assign(each_run=own) if any(own) else table
 
 
 def _unrealizable(table: pd.DataFrame, runs: Runs) -> list[str]:

@@ -1,6 +1,6 @@
 """How well a model predicts the torque of runs that no fit has seen."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -49,14 +49,20 @@ class Validation:
         }
 
 
-def validate(motions: Sequence[Run], models: Mapping[str, Model]) -> Validation:
-    """Score each kind of run's model on its motions; runs of a kind that has no model are left out."""
+ModelOf = Callable[[Run], Model | None]
+"""Returns the model of a run, None where its kind has none."""
+
+
+def validate(motions: Sequence[Run], model_of: ModelOf) -> Validation:
+    """Score each run's model on it, by kind of run; runs without one are left out."""
     joints = motions[0].joints
-    sums = {run: _Sums.none(len(joints)) for run in models if any(m.run == run for m in motions)}
+    sums: dict[str, _Sums] = {}
     for motion in motions:
-        if motion.run in sums:
-            for r in regressions(motion, models[motion.run]):
-                sums[motion.run] += _Sums.of(r, residual_of(r, models[motion.run].linear_values))
+        model = model_of(motion)
+        if model is not None:
+            before = sums.get(motion.run, _Sums.none(len(joints)))
+            of_run = (_Sums.of(r, residual_of(r, model.linear_values)) for r in regressions(motion, model))
+            sums[motion.run] = sum(of_run, before)
     pooled = sum(sums.values(), _Sums.none(len(joints)))
     return Validation(joints=joints, pooled=pooled.score(), by_run={run: s.score() for run, s in sums.items()})
 
@@ -102,15 +108,16 @@ def _root(squares: NDArray, count: int) -> NDArray:
     return np.sqrt(squares / count) if count else np.full(len(squares), np.nan)
 
 
-def residuals(motions: Sequence[Run], models: Mapping[str, Model], name: str) -> Iterator[pa.Table]:
+def residuals(motions: Sequence[Run], model_of: ModelOf, name: str) -> Iterator[pa.Table]:
     """Yield the rows of ``residuals/1``, piece by piece, of all runs that have a model.
 
     ``name`` is ``baseline`` or ``extended``.
     """
     for motion in motions:
-        if motion.run in models:
-            for r in regressions(motion, models[motion.run]):
-                yield _residual_rows(r, motion, models[motion.run], name)
+        model = model_of(motion)
+        if model is not None:
+            for r in regressions(motion, model):
+                yield _residual_rows(r, motion, model, name)
 
 
 def _residual_rows(r: Regression, motion: Run, model: Model, name: str) -> pa.Table:

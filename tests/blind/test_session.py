@@ -40,7 +40,7 @@ def test_exoid_fits_a_faultless_session_to_its_noise(faultless):
     session, paths = faultless
     runs = read_motions(paths)
     found = identify(runs)
-    left = pa.concat_tables(residuals(runs, found.models, "baseline")).to_pandas()
+    left = pa.concat_tables(residuals(runs, found.model_of, "baseline")).to_pandas()
     scored = left[left["scored"] & (left["purpose"] == "validate")]
     floor = noise_floor(session.rig, session.of("validate"))
     for joint, noise in zip(("hip", "knee"), floor, strict=True):

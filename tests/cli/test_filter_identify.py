@@ -253,3 +253,53 @@ def test_a_motion_says_its_filter(exoid, recordings, tmp_path):
     assert metadata["filter"]["cutoff_hz"] == 9.0
     assert metadata["filter"]["why"] == "set by hand"
     assert isinstance(MOTION.read(target).frame, pd.DataFrame)
+
+
+def test_what_a_diagnosis_named_is_fitted_with_its_shapes_held_and_never_over_the_fit_without(
+    exoid, recordings, tmp_path
+):
+    """The rig's knee has an elastic transmission of 900 N·m/rad, says the file; its amplitudes are none."""
+    quiet = tmp_path / "exoid.toml"
+    quiet.write_text("[identify]\nfigures = false\n")
+    files, given = sorted(recordings.iterdir()), ("--config", quiet)
+    assert exoid("identify", *files, "-o", tmp_path / "plain", *given).code == 0
+    plain = PARAMETERS.read(tmp_path / "plain" / "parameters.parquet")
+    elastic = plain.frame.iloc[[0]].assign(
+        name="stiffness", symbol="k", joint="knee", run=None, value=900.0, unit="N·m/rad", std_error=40.0,
+        ci95_low=820.0, ci95_high=980.0, step="extension", effect="joint_elasticity",
+    )  # fmt: skip
+    frame = pd.concat([plain.frame, elastic], ignore_index=True)
+    metadata = {key: value for key, value in plain.metadata.items() if key not in ("covariance", "contract")}
+    PARAMETERS.write(tmp_path / "named.parquet", frame, metadata)
+    asked = ("--causes", tmp_path / "named.parquet", "--effect", "torque_offset@hip", *given)
+    refused = exoid("identify", *files, *asked)
+    assert refused.code == 2
+    assert "--causes: no folder is given; name one with -o" in refused.err
+    outcome = exoid("identify", *files, "-o", tmp_path / "refitted", *asked, "--json")
+    assert outcome.code == 0, outcome.err
+    rows = json.loads(outcome.out, parse_constant=pytest.fail)["parameters"]
+    assert [(row["effect"], row["name"], row["step"]) for row in rows[16:]] == [
+        ("joint_elasticity", "stiffness", "extension"),
+        ("joint_elasticity", "hardening", "extension"),
+        ("torque_offset", "offset", "extension"),
+    ]
+    assert rows[16]["std_error"] == pytest.approx(40.0)
+    assert rows[17]["std_error"] is None
+    found = PARAMETERS.read(tmp_path / "refitted" / "parameters.parquet")
+    assert np.array(found.metadata["covariance"]).shape == (19, 19)
+    assert found.metadata["inputs"][-1]["name"] == "named.parquet"
+    assert set(RESIDUALS.read(tmp_path / "refitted" / "residuals.parquet").frame["model"]) == {"extended"}
+    replayed = ("--replay", files[0], "-o", tmp_path / "replay.parquet")
+    outcome = exoid("simulate", tmp_path / "refitted" / "parameters.parquet", *replayed)
+    assert outcome.code == 0, outcome.err
+
+
+def test_the_settings_can_name_effects_and_ask_for_every_sample(exoid, recordings, tmp_path):
+    chosen = '[identify]\nfigures = false\neffects = ["rotor_inertia@knee"]\nreversals = true\n'
+    (tmp_path / "exoid.toml").write_text(chosen)
+    outcome = exoid("identify", *sorted(recordings.iterdir()), "-o", tmp_path, "--config", tmp_path / "exoid.toml")
+    assert outcome.code == 0, outcome.err
+    assert "knee J" in outcome.out
+    found = PARAMETERS.read(tmp_path / "parameters.parquet").metadata
+    assert found["method"]["samples"] == "all"
+    assert found["config"]["identify"]["effects"] == ["rotor_inertia@knee"]

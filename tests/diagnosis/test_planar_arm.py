@@ -46,7 +46,7 @@ def test_its_three_inertial_parameters_and_its_friction_are_recovered(found):
 
 
 def test_it_moves_as_it_was_recorded(arm, found):
-    assert replay(found.models["exo_alone"], arm[1]).rmse.max() < 0.01
+    assert replay(found.model_of(arm[1]), arm[1]).rmse.max() < 0.01
 
 
 def test_nothing_is_missing_of_it_and_a_spring_at_its_elbow_is_named_with_its_size(arm):

@@ -48,7 +48,7 @@ def test_pieces_change_nothing_but_rounding(recordings, monkeypatch):
     assert_allclose(found.validation.pooled.rmse, whole.validation.pooled.rmse, rtol=1e-9)
     assert found.validation.pooled.samples == whole.validation.pooled.samples
     left = [
-        pa.concat_tables(residuals(some, whole.models, "baseline")).to_pandas().reset_index(drop=True)
+        pa.concat_tables(residuals(some, whole.model_of, "baseline")).to_pandas().reset_index(drop=True)
         for some in (runs, motions)
     ]
     assert_frame_equal(*left, rtol=1e-8, atol=1e-8)

@@ -13,7 +13,6 @@ from exoid_cli.app import run
 from pipelines.contracts import PARAMETERS, RESIDUALS
 from pipelines.dynamics.replay import replay
 from pipelines.effects.rotor_inertia import RotorInertia
-from pipelines.effects.torque_offset import TorqueOffset
 from pipelines.label import cause_label
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.motion import Motion
@@ -123,6 +122,19 @@ class Diagnosed:
         rms = np.array([np.sqrt(np.mean(here[f"{joint}_residual_nm"] ** 2)) for joint in motion.joints])
         return TorqueError(rms, error.percent * rms / error.rms)
 
+    def identify(self, name: str, *asked: str) -> Model:
+        """Return what ``exoid identify`` finds in the recordings, asked for something besides; ``name`` is its folder."""
+        recorded = [str(self.folder.parent / "recordings" / motion.file) for motion in self.motions]
+        out = self.folder.parent / name
+        _exoid("identify", *recorded, "-o", str(out), *asked)
+        return model_from_parameters(
+            PARAMETERS.read(out / "parameters.parquet").frame, self.motions[0].run, self.motions[0].machine
+        )
+
+    def identified(self) -> Model:
+        """Return the named causes as ``exoid identify`` fits them to every sample, those near reversals too."""
+        return self.identify("refitted", "--causes", str(self.folder / "parameters.parquet"), "--reversals")
+
     def refitted(self, order: int = ORDER) -> dict[str, Model]:
         """Return the extended model of each run, by its file, by least squares below 5 Hz on the runs to train on.
 
@@ -174,9 +186,7 @@ def with_rotor(motion: Motion) -> Model:
     return Model(tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects))
 
 
-def symmetric(motion: Motion) -> Model:
-    """Return the model every lab starts with and a drive's offset at each joint, without values."""
-    machine = motion.machine
-    offsets = [TorqueOffset(name, on=machine) for name in machine.names]
-    effects = [*baseline(machine, [motion.run]), *offsets]
-    return Model(tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects))
+def symmetric(d: Diagnosed) -> Model:
+    """Return rigid body, friction and a drive's offset at each joint as ``exoid identify`` fits them to every sample."""
+    offsets = [word for name in d.motions[0].joints for word in ("--effect", f"torque_offset@{name}")]
+    return d.identify("symmetric", *offsets, "--reversals")

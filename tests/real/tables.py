@@ -53,8 +53,7 @@ def emps(found: Mapping[str, Diagnosed]) -> str:
     """Return parameters and errors beside the published ones."""
     d = found["emps"]
     (train,), (pulses,) = of_purpose(d.motions, "train"), of_purpose(d.motions, "validate")
-    plain = fitted(symmetric(train), train)
-    named = fitted(d.model, train)
+    plain = symmetric(d)
     values = dict(zip((p.symbol for _, p in plain.linear_parameters), plain.linear_values, strict=True))
     rows = [
         (symbol, f"{theirs:.4f}", f"{values[symbol]:.4f}", f"{100 * (values[symbol] / theirs - 1):+.2f} %")
@@ -62,8 +61,10 @@ def emps(found: Mapping[str, Diagnosed]) -> str:
     ]
     said = [
         ("symmetric friction", plain, "symmetric"),
+        ("the same, fitted behind this filter", fitted(plain, train), "symmetric"),
         ("what diagnose names, its own values", d.model, "asymmetric"),
-        ("what diagnose names, refitted behind this filter", named, "asymmetric"),
+        ("what diagnose names, refitted by identify", d.identified(), "asymmetric"),
+        ("the same, refitted behind this filter", fitted(d.model, train), "asymmetric"),
     ]
     where = [
         (title, *(f"{error:.2f}" for run in (train, pulses) for error in error_by_place(model, run)))

@@ -184,7 +184,7 @@ def test_a_run_that_no_diagnosis_has_seen_is_replayed_with_the_first_one_s_value
     assert effects["encoder_offset@knee"] == {"offset": 0.1} and strayed > 1e-3
     assert err == (
         f"warning: encoder_offset@knee: each run has its own offset, and {parameters} tells none of {recording}; "
-        "simulated with that of recording.parquet, the first run it tells of, and as much as they differ the errors "
+        "taken is that of recording.parquet, the first run it tells of, and as much as they differ the errors "
         "are not the model's"
     )
 
@@ -208,7 +208,7 @@ def test_a_model_that_tells_of_no_run_is_replayed_with_the_values_it_holds_and_t
     _, _, err = replayed(exoid, parameters, quick(), recording, tmp_path / "replay.parquet")
     assert err.startswith(
         f"warning: payload_change@knee: each run has its own time, and {parameters} tells none of {recording}; "
-        "simulated with that of its rows, "
+        "taken is that of its rows, "
     )
 
 
