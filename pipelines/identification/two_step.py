@@ -85,6 +85,12 @@ class Identified:
         """Return what was found, as it is in a run; None where none of its kind was trained on."""
         return _found(self.training, self.values, run)
 
+    @property
+    def models(self) -> dict[str, Model]:
+        """What was found, for each kind of run; what each run has for itself is as in the first trained on."""
+        first = {run.run: run for run in reversed(self.training.runs)}
+        return {kind: self.training.model_of(run, self.values).for_run(kind) for kind, run in first.items()}
+
 
 def identify(
     motions: Sequence[Run],

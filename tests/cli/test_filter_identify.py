@@ -255,9 +255,7 @@ def test_a_motion_says_its_filter(exoid, recordings, tmp_path):
     assert isinstance(MOTION.read(target).frame, pd.DataFrame)
 
 
-def test_what_a_diagnosis_named_is_fitted_with_its_shapes_held_and_never_over_the_fit_without(
-    exoid, recordings, tmp_path
-):
+def test_what_a_diagnosis_named_is_fitted_with_its_shapes_held_beside_the_fit_without(exoid, recordings, tmp_path):
     """The rig's knee has an elastic transmission of 900 N·m/rad, says the file; its amplitudes are none."""
     quiet = tmp_path / "exoid.toml"
     quiet.write_text("[identify]\nfigures = false\n")

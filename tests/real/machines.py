@@ -123,7 +123,7 @@ class Diagnosed:
         return TorqueError(rms, error.percent * rms / error.rms)
 
     def identify(self, name: str, *asked: str) -> Model:
-        """Return what ``exoid identify`` finds in the recordings, asked for something besides; ``name`` is its folder."""
+        """Return what ``exoid identify`` finds, asked for something besides, in a folder of some ``name``."""
         recorded = [str(self.folder.parent / "recordings" / motion.file) for motion in self.motions]
         out = self.folder.parent / name
         _exoid("identify", *recorded, "-o", str(out), *asked)
@@ -187,6 +187,6 @@ def with_rotor(motion: Motion) -> Model:
 
 
 def symmetric(d: Diagnosed) -> Model:
-    """Return rigid body, friction and a drive's offset at each joint as ``exoid identify`` fits them to every sample."""
+    """Return rigid body, friction and each drive's offset as ``exoid identify`` fits them to every sample."""
     offsets = [word for name in d.motions[0].joints for word in ("--effect", f"torque_offset@{name}")]
     return d.identify("symmetric", *offsets, "--reversals")

@@ -28,7 +28,7 @@ def _errors(model, runs):
 
 @pytest.mark.parametrize("fit", ["command", "benchmark"])
 def test_the_symmetric_model_is_the_published_one(diagnosis, fit):
-    """All four parameters within 1 %, errors no larger than those of the authors: by exoid's blocks and their filter."""
+    """All four parameters within 1 %, errors no larger than the authors': by exoid's blocks and their filter."""
     runs = diagnosis.motions
     (train,) = of_purpose(runs, "train")
     found = symmetric(diagnosis) if fit == "command" else fitted(symmetric(diagnosis), train)
