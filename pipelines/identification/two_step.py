@@ -7,7 +7,7 @@ A fit of everything at once is computed beside it as a check. Least squares goes
 compress its rows, from which every fit follows, and twice for the covariance of what the fit left.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
@@ -15,8 +15,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipelines.effects import Effect, Parameter
-from pipelines.effects.friction import Friction
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.estimation.angle_noise import CUTOFF_HZ, IN_WORDS, is_loud
 from pipelines.estimation.collinearity import collinearities
@@ -25,11 +23,12 @@ from pipelines.estimation.least_squares import WeightedLeastSquares
 from pipelines.estimation.problem import Problem, Training
 from pipelines.estimation.regression import mask_in_words
 from pipelines.identification.extension import Extension
+from pipelines.identification.parameter_rows import Row, rows, table_of
 from pipelines.identification.runs import Runs, checked
 from pipelines.identification.validation import Validation, validate
 from pipelines.mechanics.run import Run
 from pipelines.mechanics.scale import on_one_scale
-from pipelines.model import BASELINE, Model, Term, baseline, unrealizable, upside_down
+from pipelines.model import Model, Term, baseline, unrealizable, upside_down
 
 BIASED = (
     f"{IN_WORDS}, which lets every fit take the machine for too light; set filter.cutoff_hz = {CUTOFF_HZ:g}, and see "
@@ -39,18 +38,6 @@ STEP = 0.25
 """Standard errors by which a shape is moved to see what the values make of it."""
 
 Found = TypeVar("Found", bound=Fit, covariant=True)
-
-
-@dataclass(frozen=True)
-class Row:
-    """One row of ``parameters/1``."""
-
-    effect: Effect
-    parameter: Parameter
-    step: str
-    value: float
-    slope: NDArray
-    """(p + s,) how it changes with the model's linear values and the shapes that are held."""
 
 
 @dataclass(frozen=True)
@@ -127,14 +114,14 @@ def identify(
     training = Training(tuple(runs.of("train")), model, extension.own, reversals)
     steps = {kind: Step(one.problem, estimated(one.fit)) for kind, one in _in_steps(training, estimator, runs).items()}
     values = _values(steps)
-    rows = list(_rows(model, extension, values))
-    covariance = _covariance(rows, steps, extension, _answer_to_shapes(training, extension, runs))
-    table = _table(rows, covariance, _critical(rows, steps))
+    told = list(rows(model, extension, values))
+    covariance = _covariance(told, steps, extension, _answer_to_shapes(training, extension, runs))
+    table = table_of(told, covariance, _critical(told, steps))
     everything = Problem(training, runs.kinds, np.arange(len(values)), np.zeros(len(values)))
     return Identified(
         parameters=table,
         covariance=covariance,
-        one_step=np.array([row.value for row in _rows(model, extension, estimator.fit(everything).values)]),
+        one_step=np.array([row.value for row in rows(model, extension, estimator.fit(everything).values)]),
         validation=validate(runs.of("validate"), lambda run: _found(training, values, run)),
         runs=runs.motions,
         training=training,
@@ -221,7 +208,8 @@ def _answer_to_shapes(training: Training, extension: Extension, runs: Runs) -> N
     for i, variance in enumerate(np.diag(extension.shape_covariance)):
         if variance > 0.0:
             step = np.zeros(len(shapes))
-            step[i] = STEP * np.sqrt(variance)
+            # A play or a stiffness of which little is known must not fall below nought.
+            step[i] = min(STEP * np.sqrt(variance), 0.5 * abs(shapes[i]) or np.inf)
             either = [
                 replace(training, model=_model(runs, extension.with_shapes(moved)))
                 for moved in (shapes + step, shapes - step)
@@ -232,7 +220,7 @@ def _answer_to_shapes(training: Training, extension: Extension, runs: Runs) -> N
 
 
 def _covariance(
-    rows: Sequence[Row], steps: Mapping[str, Step[Estimate]], extension: Extension, to_shapes: NDArray
+    told: Sequence[Row], steps: Mapping[str, Step[Estimate]], extension: Extension, to_shapes: NDArray
 ) -> NDArray:
     """Return the covariance of some rows; what is not sure of step 1, or of a shape, is not sure of the rest.
 
@@ -248,90 +236,16 @@ def _covariance(
     through = np.vstack([to_shapes, np.eye(s)])
     covariance = through @ extension.shape_covariance @ through.T
     covariance[:p, :p] += of_linear
-    slopes = np.array([row.slope for row in rows])
+    slopes = np.array([row.slope for row in told])
     return slopes @ covariance @ slopes.T
 
 
-def _critical(rows: Sequence[Row], steps: Mapping[str, Step[Estimate]]) -> NDArray:
+def _critical(told: Sequence[Row], steps: Mapping[str, Step[Estimate]]) -> NDArray:
     """Return the half-width of each row's interval in standard errors: that of its fit, of several the least sure."""
-    slopes = np.array([row.slope for row in rows])
+    slopes = np.array([row.slope for row in told])
     own = [np.where(slopes[:, s.problem.fitted].any(axis=1), s.fit.critical, 0.0) for s in steps.values()]
     largest = np.max(own, axis=0)
     return np.where(largest > 0.0, largest, max(step.fit.critical for step in steps.values()))
-
-
-def _rows(model: Model, extension: Extension, values: NDArray) -> Iterator[Row]:
-    """Yield the rows of ``parameters/1`` for some linear values of the model, (p,)."""
-    every = np.append(values, extension.shapes)
-    slopes = list(zip(model, _slopes(model, len(every)), strict=True))
-
-    def rows(effect: Effect, slope: NDArray, step: str) -> Iterator[Row]:
-        return _rows_of(Term(effect, slope @ every), slope, step)
-
-    for kind, slope in _bodies([one for one in slopes if isinstance(one[0].effect, RigidBody)]).items():
-        body = RigidBody(run=kind, on=model.terms[0].effect.on)
-        yield from rows(body, slope, "friction" if kind == "exo_alone" else "inertia")
-        if kind == "exo_alone":
-            for term, slope in slopes:
-                if isinstance(term.effect, Friction):
-                    yield from rows(term.effect, slope, "friction")
-    for term, slope in slopes:
-        if term.effect.name not in BASELINE:
-            yield from rows(term.effect, slope, "extension")
-    for term in extension.held:
-        yield from _rows_of(term, np.zeros((len(term.values), len(every))), "extension")
-
-
-def _slopes(model: Model, size: int) -> Iterator[NDArray]:
-    """Yield which of all linear values, and all shapes after them, are each term's, (v, size) of ones and noughts."""
-    units, linear = np.eye(size), 0
-    shape = len(model.linear_parameters)
-    for term in model:
-        ends = linear + len(term.linear), shape + len(term.shape)
-        yield np.vstack([units[linear : ends[0]], units[shape : ends[1]]])
-        linear, shape = ends
-
-
-def _bodies(bodies: Sequence[tuple[Term, NDArray]]) -> dict[str, NDArray]:
-    """Return how the rigid body of each kind of run, and the wearer's own, go with all values, (k, size) each."""
-    (term, first), *others = bodies
-    if not others:
-        return {"exo_alone": first}
-    ((_, second),) = others
-    if term.effect.run is None:
-        return {"exo_alone": first, "with_human": first + second, "human": second}
-    return {"exo_alone": first, "with_human": second, "human": second - first}
-
-
-def _rows_of(term: Term, slope: NDArray, step: str) -> Iterator[Row]:
-    """Yield the rows of a term whose values change with all values by ``slope`` (v, size)."""
-    effect = term.effect
-    slopes = effect.jacobian(term.values) @ slope
-    for parameter, value, of_parameter in zip(effect.parameters, effect.physical(term.values), slopes, strict=True):
-        yield Row(effect, parameter, step, float(value), of_parameter)
-
-
-def _table(rows: Sequence[Row], covariance: NDArray, critical: NDArray) -> pd.DataFrame:
-    value = np.array([row.value for row in rows])
-    variance = np.diag(covariance)
-    error = np.where(variance > 0.0, np.sqrt(np.maximum(variance, 0.0)), np.nan)
-    table = pd.DataFrame(
-        {
-            "name": [row.parameter.name for row in rows],
-            "symbol": [row.parameter.symbol for row in rows],
-            "joint": [row.effect.joint for row in rows],
-            "run": [row.effect.run for row in rows],
-            "value": value,
-            "unit": [row.parameter.unit for row in rows],
-            "std_error": error,
-            "ci95_low": value - critical * error,
-            "ci95_high": value + critical * error,
-            "step": [row.step for row in rows],
-            "effect": [row.effect.name for row in rows],
-        }
-    )
-    own = [row.parameter.per_run for row in rows]
-    return table.assign(each_run=own) if any(own) else table
 
 
 def _unrealizable(table: pd.DataFrame, runs: Runs) -> list[str]:
