@@ -77,7 +77,6 @@ def identify(
     from pipelines.estimation.estimators import estimator_named
     from pipelines.identification import identify as fit
     from pipelines.mechanics.read import geometry_from, read_runs, refuse_another_mechanism
-    from pipelines.mechanics.scale import on_one_scale
 
     if not files and output is None and (method, causes, effect, reversals) == (None,) * 4:
         only(context, place_of(config, lacking="no motion is given"), "identify", again=again)
@@ -88,7 +87,7 @@ def identify(
     settings = settings_in_force(config)
     estimator = estimator_named(settings.identify.method if method is None else method)
     asked = settings.identify.changed(method=estimator.name, effects=effect or None, reversals=reversals)
-    runs = on_one_scale(read_runs(files, settings.filter, geometry_from(settings)))
+    runs = read_runs(files, settings.filter, geometry_from(settings))
     refuse_another_mechanism(settings.mechanism, runs)
     with console.working("fitting"):
         found = fit(runs, estimator, _extension(asked.effects, causes, runs, files), reversals=asked.reversals)
@@ -106,15 +105,13 @@ def _extension(
 ) -> "Extension":
     """Return what the model has beside rigid body and friction."""
     from pipelines.contracts import PARAMETERS
-    from pipelines.identification.extension import chosen, named
+    from pipelines.identification.extension import Extension, chosen, named
 
     beside = chosen(labels, runs[0].machine)
-    if not causes:
-        return beside
-    of_diagnosis = named(PARAMETERS.read(causes), runs, files)
-    if not of_diagnosis.effects:
+    of_diagnosis = named(PARAMETERS.read(causes), runs, files) if causes else Extension()
+    if causes and not of_diagnosis.terms:
         console.say(f"{causes}: names nothing beside rigid body and friction.")
-    return of_diagnosis | beside
+    return of_diagnosis.with_terms(beside)
 
 
 def _write(found: "Identified", output: Path, shared: "dict[str, Any]", *, figures: bool) -> list[str]:
@@ -136,12 +133,12 @@ def _write(found: "Identified", output: Path, shared: "dict[str, Any]", *, figur
         "remarks": found.remarks,
         "angle_noise": found.angle_noise,
     }
-    if found.extension.each_run:
-        described["each_run"] = found.extension.each_run
+    if found.each_run:
+        described["each_run"] = found.each_run
     PARAMETERS.write(output / "parameters.parquet", found.parameters, shared | described)
     left = output / "residuals.parquet"
     with console.working("predicting every run"):
-        model = "extended" if found.extension.effects else "baseline"
+        model = "extended" if found.extension.terms else "baseline"
         RESIDUALS.write_pieces(left, residuals(found.runs, found.model_of, model), shared)
     if not figures:
         return []

@@ -227,14 +227,8 @@ def like_trained(run: Run, baseline: Baseline) -> Run:
 
 
 def with_load(run: Run, baseline: Baseline, values: NDArray) -> Run:
-    """Return the run with the loads of links and limb estimated from the baseline's rigid bodies in ``values`` (b,).
-
-    The measured torques would not do: their noise would stand on both sides of the regression.
-    """
+    """Return the run with the loads of links and limb estimated from the baseline's rigid bodies in ``values`` (b,)."""
     bodies = values[: baseline.body * len(baseline.bodies)].reshape(-1, baseline.body)
     # The first body is the machine's, which alone is there in runs without a wearer.
     body = bodies.sum(axis=0) if run.motion.run == "with_human" else bodies[0]
-    m = run.motion
-    columns = baseline.machine.mechanism.regressor(m.q, m.dq, m.ddq, m.geometry)
-    limb = bodies[-1]
-    return replace(run, motion=replace(m, load=columns @ body, limb_load=columns @ limb, body=body, limb_body=limb))
+    return replace(run, motion=run.motion.loaded(body, bodies[-1]))

@@ -9,7 +9,6 @@ from pipelines.contracts import PARAMETERS, Joint, joints_of
 from pipelines.contracts.table import Table
 from pipelines.dynamics.assembly import Assembly, assemble
 from pipelines.dynamics.mobility import masses
-from pipelines.dynamics.own_values import with_own_values
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
@@ -17,6 +16,7 @@ from pipelines.mechanics.machine import Machine, machine_of
 from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.mechanics.motion import geometry_of
 from pipelines.model import Model, model_from_parameters
+from pipelines.own_values import with_own_values
 
 
 @dataclass(frozen=True)

@@ -232,8 +232,12 @@ class Effect(ABC):
         return self.side is Side.HUMAN or self.run == "with_human"
 
     def explains(self, motion: Motion) -> bool:
-        """Tell whether the effect is there in this kind of run."""
-        return motion.run in self.acts_in and self.run in (None, motion.run)
+        """Tell whether the effect is there in this run."""
+        return self.acts(motion.run)
+
+    def acts(self, kind: str) -> bool:
+        """Tell whether the effect is there in a kind of run."""
+        return kind in self.acts_in and self.run in (None, kind)
 
     def column(self, motion: Motion) -> int:
         """Return the column of its joint in a motion's arrays, -1 for the whole leg."""

@@ -56,6 +56,8 @@ class Estimator(ABC):
     """What papers call it for short, where they do: ``--method`` takes that too."""
     title: ClassVar[str]
     """In the words of a sentence."""
+    masks: ClassVar[bool] = True
+    """Whether it leaves out samples near reversals, where not told otherwise."""
 
     @abstractmethod
     def fit(self, problem: Problem) -> Fit:

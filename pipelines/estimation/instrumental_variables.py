@@ -82,7 +82,8 @@ class _Rows:
 def _rows(problem: Problem, measured: Sequence[Regression], values: NDArray) -> list[_Rows]:
     training, every, rows = problem.training, problem.completed(values), []
     for (_, run), r in zip(problem.runs, measured, strict=True):
-        (simulated,) = training.regressions(closed_loop(training.model_of(run, every), run.whole()))
+        moved = closed_loop(training.model_of(run, every), run.whole())
+        (simulated,) = training.regressions(training.loaded(moved))
         rows.append(_Rows(r, simulated.regressor, r.usable & simulated.usable))
     return rows
 

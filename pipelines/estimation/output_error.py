@@ -44,6 +44,7 @@ class OutputError(Estimator):
     name = "output_error"
     short = "oe"
     title = "output error"
+    masks = False
 
     def fit(self, problem: Problem) -> Fit:
         """Fit all runs at once, beginning with the least-squares model that can exist."""

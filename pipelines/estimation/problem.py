@@ -1,17 +1,30 @@
 """What is to be estimated from what: some columns of a model, from the training runs of some kinds."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.effects import Effect, Parameter
 from pipelines.estimation.compressed import Compressed, compress, together
-from pipelines.estimation.regression import Regression, regressions, residual_of
+from pipelines.estimation.regression import Regression, regressions
 from pipelines.mechanics.run import Run
 from pipelines.mechanics.silence import silent_torque
 from pipelines.model import Model, Term
+
+
+@dataclass(frozen=True)
+class Column:
+    """One linear parameter of a model: what all runs share, or what one run has for itself."""
+
+    term: int
+    """Its place in the model."""
+    linear: int
+    """Its place among the term's linear parameters."""
+    file: str | None = None
+    """Of the run that has it for itself."""
 
 
 @dataclass(frozen=True)
@@ -21,25 +34,107 @@ class Training:
     runs: tuple[Run, ...]
     model: Model
     """Of all kinds of run; what a run has not is a column of zeros there."""
-    own: Mapping[str, tuple[Term, ...]] = field(default_factory=dict)
-    """By a run's file, terms that it has for itself; they are held as they are."""
+    own: Mapping[str, tuple[Term | None, ...]] = field(default_factory=dict)
+    """By a run's file, the model's terms as they are there: another zero, another onset; None of what never came."""
+    bodies: Mapping[str, tuple[NDArray, NDArray]] = field(default_factory=dict)
+    """By the kind of run, whose loads a term may go with: what hangs behind the drive trains, and the limb."""
     reversals: bool = False
     """Whether samples near reversals are fitted, too."""
 
+    @cached_property
+    def columns(self) -> list[Column]:
+        """The p linear parameters; one that differs from run to run is there for each run that has it."""
+        made = []
+        for i, term in enumerate(self.model):
+            for k, parameter in enumerate(term.effect.linear):
+                of = [run.file for run in self.runs if self.has(run, i)] if parameter.per_run else [None]
+                made += [Column(i, k, file) for file in of]
+        return made
+
+    @property
+    def parameters(self) -> list[tuple[Effect, Parameter]]:
+        """Effect and parameter of each column."""
+        effects = [self.model.terms[column.term].effect for column in self.columns]
+        return [(effect, effect.linear[c.linear]) for effect, c in zip(effects, self.columns, strict=True)]
+
+    def terms_of(self, run: Run) -> tuple[Term | None, ...]:
+        """Return the model's terms as they are in a run."""
+        return self.own.get(run.file, self.model.terms)
+
+    def has(self, run: Run, term: int) -> bool:
+        """Tell whether a term acts in a run, and came there."""
+        return self.terms_of(run)[term] is not None and self.model.terms[term].effect.acts(run.run)
+
+    def place(self, term: int, linear: int, run: Run) -> int | None:
+        """Return the column of a linear parameter in a run, None where no run to train on tells of it."""
+        return self._places.get((term, linear, None), self._places.get((term, linear, run.file)))
+
+    @cached_property
+    def _places(self) -> dict[tuple[int, int, str | None], int]:
+        return {(c.term, c.linear, c.file): place for place, c in enumerate(self.columns)}
+
     def model_of(self, run: Run, values: NDArray) -> Model:
-        """Return the model of one run with some linear values, (p,), and what the run has for itself."""
-        return Model((*self.model.with_linear(values), *self.own.get(run.file, ())))
+        """Return the model of one run with the columns' values, (p,)."""
+        terms = []
+        for i, term in enumerate(self.terms_of(run)):
+            if term is not None:
+                places = [self.place(i, k, run) for k in range(len(term.linear))]
+                linear = [own if at is None else values[at] for at, own in zip(places, term.linear, strict=True)]
+                terms.append(Term(term.effect, np.append(linear, term.shape)))
+        return Model(tuple(terms))
+
+    def term_of(self, run: Run, term: int, values: NDArray) -> dict[str, float]:
+        """Return what files say of a term that a run has, by name, at some values of the columns, (p,)."""
+        terms = self.terms_of(run)
+        place = sum(one is not None for one in terms[:term])
+        found = self.model_of(run, values).terms[place]
+        named = zip(found.effect.parameters, found.effect.physical(found.values), strict=True)
+        return {parameter.name: float(value) for parameter, value in named}
+
+    def acts_in(self, place: int, kind: str) -> bool:
+        """Tell whether a column is there in a kind of run."""
+        column = self.columns[place]
+        if column.file:
+            return any(run.file == column.file and run.run == kind for run in self.runs)
+        return self.model.terms[column.term].effect.acts(kind)
+
+    def reshaped(self, term: int, shape: int, step: float, files: Sequence[str]) -> "Training":
+        """Return the same with one shape of a term larger by a step in some runs."""
+        own = {run.file: list(self.terms_of(run)) for run in self.runs}
+        for file in files:
+            before = own[file][term]
+            if before is not None:
+                moved = before.values.copy()
+                moved[len(before.linear) + shape] += step
+                own[file][term] = Term(before.effect, moved)
+        return replace(self, own={file: tuple(terms) for file, terms in own.items()})
+
+    def loaded(self, run: Run) -> Run:
+        """Return a run with the loads that are known."""
+        return run.whole().loaded(*self.bodies[run.run]) if self.bodies else run
+
+    def with_bodies(self, bodies: Mapping[str, tuple[NDArray, NDArray]]) -> "Training":
+        """Return the same with the loads of other rigid bodies."""
+        made = replace(self, bodies=bodies)
+        return replace(made, runs=tuple(made.loaded(run) for run in self.runs))
 
     def regressions(self, run: Run) -> Iterator[Regression]:
-        """Yield a run's regression on the p columns, less the torque of what it has for itself, piece by piece."""
-        p = len(self.model.linear_parameters)
-        whole = self.model_of(run, np.zeros(p))
-        own = whole.linear_values
-        for r in regressions(run, whole):
-            yield replace(
-                r, regressor=r.regressor[:, :, :p], torque=residual_of(r, own),
-                usable=np.broadcast_to(r.valid[:, np.newaxis], r.usable.shape) if self.reversals else r.usable,
-            )  # fmt: skip
+        """Yield a run's regression on the p columns, piece by piece."""
+        p = len(self.columns)
+        here = [
+            self.place(i, k, run)
+            for i, term in enumerate(self.terms_of(run))
+            if term is not None
+            for k in range(len(term.linear))
+        ]
+        # What has no column acts in no run of this kind.
+        kept = {n: at for n, at in enumerate(here) if at is not None}
+        for r in regressions(run, self.model_of(run, np.zeros(p))):
+            if here != list(range(p)):
+                regressor = np.zeros((*r.torque.shape, p))
+                regressor[:, :, list(kept.values())] = r.regressor[:, :, list(kept)]
+                r = replace(r, regressor=regressor)
+            yield replace(r, usable=np.repeat(r.valid[:, np.newaxis], r.torque.shape[1], 1)) if self.reversals else r
 
     @cached_property
     def compressed(self) -> tuple[Compressed, ...]:
@@ -83,8 +178,9 @@ class Problem:
     @property
     def names(self) -> list[str]:
         """What messages call the fitted parameters."""
-        chosen = [self.model.linear_parameters[column] for column in self.fitted]
-        return [f"{effect.joint} {p.name}" if effect.joint else p.name for effect, p in chosen]
+        chosen = [(*self.training.parameters[place], self.training.columns[place].file) for place in self.fitted]
+        named = [(f"{effect.joint} {p.name}" if effect.joint else p.name, file) for effect, p, file in chosen]
+        return [f"{name} of {file}" if file else name for name, file in named]
 
     @property
     def runs(self) -> list[tuple[int, Run]]:

@@ -104,18 +104,15 @@ def _constraints(problem: Problem, values: NDArray, size: NDArray) -> Iterator[C
 
 
 def _takes_energy(problem: Problem, column: int) -> bool:
-    effect, _ = problem.model.linear_parameters[column]
+    effect, _ = problem.training.parameters[column]
     return effect.dissipative
 
 
 def _inertia_forms(problem: Problem) -> Iterator[NDArray]:
-    """Yield for each body that is fitted (p, m, m): of all parameters, a matrix that a real body has positive definite.
-
-    The wearer is what the machine has more with them than without.
-    """
+    """Yield for each body that is fitted (p, m, m): of all parameters, what is positive definite of a real one."""
     run = problem.training.runs[0]
     forms = run.machine.mechanism.inertia_forms(run.geometry)
-    effects = [effect for effect, _ in problem.model.linear_parameters]
+    effects = [effect for effect, _ in problem.training.parameters]
     of_kind: dict[str | None, NDArray] = {}
     for kind in dict.fromkeys(effect.run for effect in effects if isinstance(effect, RigidBody)):
         form = np.zeros((len(effects), *forms.shape[1:]))
@@ -123,8 +120,6 @@ def _inertia_forms(problem: Problem) -> Iterator[NDArray]:
         of_kind[kind] = form
     fitted = {effects[column].run for column in problem.fitted if isinstance(effects[column], RigidBody)}
     yield from (form for kind, form in of_kind.items() if kind in fitted)
-    if "with_human" in fitted and "exo_alone" in of_kind:
-        yield of_kind["with_human"] - of_kind["exo_alone"]
 
 
 def _triangle(matrix: NDArray) -> Sequence[float]:

@@ -1,28 +1,27 @@
 """What a model has beside rigid body and friction: chosen by name, or named by a diagnosis.
 
-Amplitudes, which torques are linear in, are fitted; shapes, as a stiffness or an encoder's offset, are held at what the
-diagnosis found, and are as sure as it was. What each run has for itself, as an onset or a zero that is set anew, is
-held whole.
+Amplitudes, which torques are linear in, are fitted, in each run where each run has its own. Shapes, as a stiffness or
+an encoder's offset, are held at what the diagnosis found, and are as sure as it was.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipelines.contracts.joints import joints_of
+from pipelines.contracts.provenance import recording_behind
 from pipelines.contracts.table import Table
-from pipelines.dynamics.own_values import with_own_values
-from pipelines.effects import Effect
+from pipelines.effects import RUNS, Effect
+from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
 from pipelines.label import effect_at
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.run import Run
-from pipelines.model import BASELINE, Model, Term, terms_beside_bodies
+from pipelines.model import BASELINE, Term, terms_beside_bodies
+from pipelines.own_values import guess, own_term
 
 
 @dataclass(frozen=True)
@@ -30,63 +29,39 @@ class Extension:
     """Terms beside rigid body and friction."""
 
     terms: tuple[Term, ...] = ()
-    """Of every run that they act in; their amplitudes are fitted."""
-    held: tuple[Term, ...] = ()
-    """Of which each run has values for itself; here those of the first."""
-    shape_covariance: NDArray = field(default_factory=lambda: np.zeros((0, 0)))
-    """(s, s) of the shapes of ``terms``, one after the other; nought where it is not known."""
-    own: Mapping[str, tuple[Term, ...]] = field(default_factory=dict)
-    """By a run's file, the held terms as that run has them; what never came there is left out."""
-    each_run: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
-    """What ``parameters/1`` tells of the runs' own values, by the cause's label."""
+    """Of what each run has for itself, as the first run has it."""
+    shape_covariance: NDArray | None = None
+    """(s, s) of the terms' shapes, one after the other; None where they are taken for certain."""
+    critical: float = 1.96
+    """Half-width of a shape's 95 % interval in standard errors."""
+    own: Mapping[str, tuple[Term | None, ...]] = field(default_factory=dict)
+    """By a run's file, the terms as they are there; None of what never came."""
+    bodies: Mapping[str, NDArray] = field(default_factory=dict)
+    """By kind of run, and ``human``: the rigid bodies, (k,), whose loads the shapes were found with."""
+    recordings: Mapping[str, str] = field(default_factory=dict)
+    """By a run's file, the hash of its recording."""
     remarks: tuple[str, ...] = ()
-    """Which runs' own values are not known, and which were learnt from runs to validate on, a sentence each."""
+    """What was left out or guessed of runs, and what was learnt from runs to validate on, a sentence each."""
 
     @property
-    def effects(self) -> list[Effect]:
-        """All of them."""
-        return [term.effect for term in (*self.terms, *self.held)]
+    def covariance(self) -> NDArray:
+        """Covariance of the shapes, (s, s)."""
+        s = sum(len(term.shape) for term in self.terms)
+        return np.zeros((s, s)) if self.shape_covariance is None else self.shape_covariance
 
-    @property
-    def shapes(self) -> NDArray:
-        """Shapes of ``terms``, (s,), one after the other."""
-        return np.concatenate([np.zeros(0), *(term.shape for term in self.terms)])
-
-    def with_shapes(self, shapes: NDArray) -> "Extension":
-        """Return it with other shapes of ``terms``, (s,)."""
-        parts = np.split(shapes, np.cumsum([len(term.shape) for term in self.terms])[:-1])
-        terms = (replace(t, values=np.append(t.linear, part)) for t, part in zip(self.terms, parts, strict=True))
-        return replace(self, terms=tuple(terms))
-
-    def checked(self, kinds: Sequence[str]) -> "Extension":
-        """Return it, where all of it acts in runs of some ``kinds``.
-
-        Raises
-        ------
-        InputError
-            Where something acts in none.
-        """
-        for effect in self.effects:
-            acts_in = [run for run in effect.acts_in if effect.run in (None, run)]
-            if not set(acts_in) & set(kinds):
-                raise InputError(
-                    f"{effect.label} acts in {' or '.join(acts_in)} runs, and none to train on is given; give one, or "
-                    "identify without it"
-                )
-        return self
-
-    def __or__(self, other: "Extension") -> "Extension":
-        """Return what is in either; of an effect in both, what this one tells."""
-        have = {(effect.label, effect.run) for effect in self.effects}
-        more = tuple(term for term in other.terms if (term.effect.label, term.effect.run) not in have)
+    def with_terms(self, terms: Iterable[Term]) -> "Extension":
+        """Return it with more terms, those that it has already left out."""
+        have = {(term.effect.label, term.effect.run) for term in self.terms}
+        more = tuple(term for term in terms if (term.effect.label, term.effect.run) not in have)
         added = sum(len(term.shape) for term in more)
+        own = {file: (*own, *more) for file, own in self.own.items()}
         return replace(
-            self, terms=(*self.terms, *more), shape_covariance=np.pad(self.shape_covariance, (0, added))
+            self, terms=(*self.terms, *more), own=own, shape_covariance=np.pad(self.covariance, (0, added))
         )  # fmt: skip
 
 
-def chosen(labels: Iterable[str], machine: Machine) -> Extension:
-    """Return the extension by the effects of some labels, ``rotor_inertia@knee``.
+def chosen(labels: Iterable[str], machine: Machine) -> tuple[Term, ...]:
+    """Return the effects of some labels, ``rotor_inertia@knee``, without amplitudes.
 
     Raises
     ------
@@ -94,15 +69,14 @@ def chosen(labels: Iterable[str], machine: Machine) -> Extension:
         Where there is none of this name or at this joint, or its shape would have to be known.
     """
     effects = [effect_at(label, machine, _shapeless, "identify.effects") for label in dict.fromkeys(labels)]
-    return Extension() | Extension(tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects))
+    return tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects)
 
 
 def _shapeless(effect: type[Effect]) -> bool:
     """Tell whether amplitudes are all that is to be known of an effect, and are the same in every run."""
     told = all(p.default is not None for p in effect.shape)
-    return effect.name not in BASELINE and bool(effect.linear) and told and not any(
-        p.per_run for p in (*effect.linear, *effect.shape)
-    )  # fmt: skip
+    alike = not any(p.per_run for p in (*effect.linear, *effect.shape))
+    return effect.name not in BASELINE and bool(effect.linear) and told and alike
 
 
 def named(table: Table, runs: Sequence[Run], recordings: Sequence[Path]) -> Extension:
@@ -122,36 +96,50 @@ def named(table: Table, runs: Sequence[Run], recordings: Sequence[Path]) -> Exte
     InputError
         Where the table is of another machine.
     """
-    machine = runs[0].machine
-    joints = tuple(joint.name for joint in joints_of(table.metadata))
-    if joints != machine.names:
-        raise InputError(
-            f"{table.path}: has the joints {', '.join(joints)}, the runs have {', '.join(machine.names)}; give the "
-            "parameters.parquet of a diagnosis of the same machine"
-        )
-    told = [one for one in terms_beside_bodies(table.frame, machine) if one[0].effect.name not in BASELINE]
-    shared = [one for one in told if not one[0].effect.per_run]
-    held = tuple(term for term, _ in told if term.effect.per_run)
-    own, remarks = {}, list[str]()
-    for run, path in zip(runs, recordings, strict=True) if held else ():
-        model, guesses = with_own_values(Model(held), table, path)
-        own[run.file] = model.terms
-        remarks += guesses
-        if run.purpose == "validate" and len(guesses) < len(held):
-            remarks.append(
-                f"{run.file}: {' and '.join(term.effect.label for term in held)} were learnt from this run itself, so "
-                "its error is not quite that of a run no fit has seen; the verdict's is"
-            )
-    each_run: dict[str, Any] = table.metadata.get("each_run") or {}
-    labels = {term.effect.label for term in held}
+    _refuse_another_machine(table, runs[0])
+    kinds = {run.run for run in runs if run.purpose == "train"}
+    told = [one for one in terms_beside_bodies(table.frame, runs[0].machine) if one[0].effect.name not in BASELINE]
+    acting = [one for one in told if any(one[0].effect.acts(kind) for kind in kinds)]
+    remarks = [
+        f"{term.effect.label} is left out: it acts in none of these runs to train on"
+        for term, _ in told
+        if all(term is not other for other, _ in acting)
+    ]
+    terms = tuple(term for term, _ in acting)
+    own, hashes = {}, {}
+    for run, path in zip(runs, recordings, strict=True) if any(term.effect.per_run for term in terms) else ():
+        this = hashes[run.file] = recording_behind(path)
+        own[run.file] = tuple(own_term(term, table, this) for term in terms)
+        remarks += _about(run, path, [term for term in terms if term.effect.acts(run.run)], table, this)
     return Extension(
-        terms=tuple(term for term, _ in shared),
-        held=held,
-        shape_covariance=_of_shapes(table, shared),
-        own=own,
-        each_run={label: of_runs for label, of_runs in each_run.items() if label in labels},
-        remarks=tuple(dict.fromkeys(remarks)),
+        terms, _of_shapes(table, acting), _critical(table), own, _bodies(table), hashes, tuple(dict.fromkeys(remarks))
     )
+
+
+def _refuse_another_machine(table: Table, run: Run) -> None:
+    mechanism = table.metadata.get("mechanism") or run.machine.mechanism.name
+    theirs = [*(f"{one['name']} ({one['kind']})" for one in table.metadata.get("joints") or run.joint_metadata)]
+    ours = [f"{one['name']} ({one['kind']})" for one in run.joint_metadata]
+    if theirs != ours or mechanism != run.machine.mechanism.name:
+        raise InputError(
+            f"{table.path}: is of a {mechanism} with the joints {', '.join(theirs)}, the runs are of a "
+            f"{run.machine.mechanism.name} with {', '.join(ours)}; give the parameters.parquet of a diagnosis of the "
+            "same machine"
+        )
+
+
+def _about(run: Run, path: Path, terms: Sequence[Term], table: Table, sha256: str) -> list[str]:
+    """Say what is guessed of a run's own values, and what was learnt from a run that is to judge."""
+    own = [term for term in terms if term.effect.per_run]
+    guesses = [guess(term, table, sha256, path) for term in own]
+    learnt = [term.effect.label for term, guessed in zip(own, guesses, strict=True) if not guessed]
+    said = [guessed for guessed in guesses if guessed]
+    if learnt and run.purpose == "validate":
+        said.append(
+            f"{run.file}: what it has for itself of {' and '.join(learnt)} was learnt from this run, so its error is "
+            "not quite that of a run no fit has seen; the verdict's is"
+        )
+    return said
 
 
 def _of_shapes(table: Table, terms: Sequence[tuple[Term, pd.DataFrame]]) -> NDArray:
@@ -163,11 +151,23 @@ def _of_shapes(table: Table, terms: Sequence[tuple[Term, pd.DataFrame]]) -> NDAr
     for term, rows in terms:
         effect, place = term.effect, dict(zip(rows["name"], rows.index, strict=True))
         back = np.linalg.pinv(effect.jacobian(term.values))[len(effect.linear) :]
-        columns = [place.get(p.name) for p in effect.parameters]
         onto = np.zeros((len(back), len(covariance)))
-        for i, row in enumerate(columns):
-            if row is not None:
-                onto[:, row] = back[:, i]
+        for i, parameter in enumerate(effect.parameters):
+            if parameter.name in place:
+                onto[:, place[parameter.name]] = back[:, i]
         maps.append(onto)
     onto = np.concatenate(maps)
     return onto @ covariance @ onto.T
+
+
+def _critical(table: Table) -> float:
+    """Return the half-width of the table's intervals in standard errors."""
+    frame = table.frame
+    width = ((frame["ci95_high"] - frame["value"]) / frame["std_error"]).replace([np.inf, 0.0], np.nan).median()
+    return float(width) if np.isfinite(width) else 1.96
+
+
+def _bodies(table: Table) -> dict[str, NDArray]:
+    frame = table.frame[table.frame["effect"] == RigidBody.name]
+    return {kind: frame.loc[frame["run"] == kind, "value"].to_numpy(float) for kind in (*RUNS, "human")
+            if (frame["run"] == kind).any()}  # fmt: skip

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from pipelines.effects import Effect, Parameter
 from pipelines.effects.friction import Friction
 from pipelines.effects.rigid_body import RigidBody
-from pipelines.identification.extension import Extension
-from pipelines.model import BASELINE, Model, Term
+from pipelines.estimation.problem import Training
+from pipelines.model import BASELINE, Term
 
 
 @dataclass(frozen=True)
@@ -23,82 +23,83 @@ class Row:
     step: str
     value: float
     slope: NDArray
-    """(p + s,) how it changes with the model's linear values and the shapes that are held."""
+    """(p + s,) how it changes with the training's columns and the shapes that are held."""
 
 
-def rows(model: Model, extension: Extension, values: NDArray) -> Iterator[Row]:
-    """Yield the rows of ``parameters/1`` for some linear values of the model, (p,)."""
-    every = np.append(values, extension.shapes)
-    slopes = list(zip(model, _slopes(model, len(every)), strict=True))
-
-    def of(effect: Effect, slope: NDArray, step: str) -> Iterator[Row]:
-        return _rows_of(Term(effect, slope @ every), slope, step)
-
-    for kind, slope in _bodies([one for one in slopes if isinstance(one[0].effect, RigidBody)]).items():
-        body = RigidBody(run=kind, on=model.terms[0].effect.on)
-        yield from of(body, slope, "friction" if kind == "exo_alone" else "inertia")
-        if kind == "exo_alone":
-            for term, slope in slopes:
-                if isinstance(term.effect, Friction):
-                    yield from of(term.effect, slope, "friction")
-    for term, slope in slopes:
+def rows(training: Training, values: NDArray) -> Iterator[Row]:
+    """Yield the rows for some values of the columns, (p,)."""
+    terms = list(_sloped(training, values))
+    bodies = [one for one in terms if isinstance(one[0].effect, RigidBody)]
+    machine, *wearer = bodies
+    yield from _of_body([machine], "exo_alone", "friction")
+    for term, slope in terms:
+        if isinstance(term.effect, Friction):
+            yield from _rows_of(term, slope, "friction")
+    if wearer:
+        yield from _of_body(bodies, "with_human", "inertia")
+        yield from _of_body(wearer, "human", "inertia")
+    for term, slope in terms:
         if term.effect.name not in BASELINE:
-            yield from of(term.effect, slope, "extension")
-    for term in extension.held:
-        yield from _rows_of(term, np.zeros((len(term.values), len(every))), "extension")
+            yield from _rows_of(term, slope, "extension")
 
 
-def _slopes(model: Model, size: int) -> Iterator[NDArray]:
-    """Yield which of all linear values, and all shapes after them, are each term's, (v, size) of ones and noughts."""
-    units, linear = np.eye(size), 0
-    shape = len(model.linear_parameters)
-    for term in model:
-        ends = linear + len(term.linear), shape + len(term.shape)
-        yield np.vstack([units[linear : ends[0]], units[shape : ends[1]]])
-        linear, shape = ends
+def _sloped(training: Training, values: NDArray) -> Iterator[tuple[Term, NDArray]]:
+    """Yield each term, as the first run to train on that has it has it, and how its values change, (v, p + s)."""
+    p, shape = len(values), len(values)
+    s = sum(len(term.shape) for term in training.model)
+    for i, term in enumerate(training.model):
+        slope = np.zeros((len(term.values), p + s))
+        having = next((run for run in training.runs if training.has(run, i)), None)
+        linear = term.linear.copy()
+        for k in range(len(linear)):
+            at = training.place(i, k, having) if having else None
+            if at is not None:
+                slope[k, at], linear[k] = 1.0, values[at]
+        for k in range(len(term.shape)):
+            slope[len(linear) + k, shape + k] = 1.0
+        shape += len(term.shape)
+        yield Term(term.effect, np.append(linear, term.shape)), slope
 
 
-def _bodies(bodies: Sequence[tuple[Term, NDArray]]) -> dict[str, NDArray]:
-    """Return how the rigid body of each kind of run, and the wearer's own, go with all values, (k, size) each."""
-    (term, first), *others = bodies
-    if not others:
-        return {"exo_alone": first}
-    ((_, second),) = others
-    if term.effect.run is None:
-        return {"exo_alone": first, "with_human": first + second, "human": second}
-    return {"exo_alone": first, "with_human": second, "human": second - first}
+def _of_body(bodies: Sequence[tuple[Term, NDArray]], run: str, step: str) -> Iterator[Row]:
+    """Yield the rows of the sum of some rigid bodies."""
+    on = bodies[0][0].effect.on
+    term = Term(RigidBody(run=run, on=on), np.sum([term.values for term, _ in bodies], axis=0))
+    yield from _rows_of(term, np.sum([slope for _, slope in bodies], axis=0), step)
 
 
 def _rows_of(term: Term, slope: NDArray, step: str) -> Iterator[Row]:
-    """Yield the rows of a term whose values change with all values by ``slope`` (v, size)."""
     effect = term.effect
     slopes = effect.jacobian(term.values) @ slope
     for parameter, value, of_parameter in zip(effect.parameters, effect.physical(term.values), slopes, strict=True):
         yield Row(effect, parameter, step, float(value), of_parameter)
 
 
-def table_of(rows: Sequence[Row], covariance: NDArray, critical: NDArray) -> pd.DataFrame:
+def table_of(told: Sequence[Row], covariance: NDArray, critical: NDArray) -> pd.DataFrame:
     """Return ``parameters/1`` of r rows with their covariance (r, r) and half-widths (r,) in standard errors.
 
-    What has no variance was held, and has no error.
+    What has no variance was held, and has no error. What is one way, as play or a stiffness of a cause, is never
+    negative, however little is known of it.
     """
-    value = np.array([row.value for row in rows])
+    value = np.array([row.value for row in told])
     variance = np.diag(covariance)
     error = np.where(variance > 0.0, np.sqrt(np.maximum(variance, 0.0)), np.nan)
+    one_way = np.array([row.step == "extension" and row.parameter.typical[0] >= 0 for row in told])
+    low = value - critical * error
     table = pd.DataFrame(
         {
-            "name": [row.parameter.name for row in rows],
-            "symbol": [row.parameter.symbol for row in rows],
-            "joint": [row.effect.joint for row in rows],
-            "run": [row.effect.run for row in rows],
+            "name": [row.parameter.name for row in told],
+            "symbol": [row.parameter.symbol for row in told],
+            "joint": [row.effect.joint for row in told],
+            "run": [row.effect.run for row in told],
             "value": value,
-            "unit": [row.parameter.unit for row in rows],
+            "unit": [row.parameter.unit for row in told],
             "std_error": error,
-            "ci95_low": value - critical * error,
+            "ci95_low": np.where(one_way, np.minimum(np.maximum(low, 0.0), value), low),
             "ci95_high": value + critical * error,
-            "step": [row.step for row in rows],
-            "effect": [row.effect.name for row in rows],
+            "step": [row.step for row in told],
+            "effect": [row.effect.name for row in told],
         }
     )
-    own = [row.parameter.per_run for row in rows]
+    own = [row.parameter.per_run for row in told]
     return table.assign(each_run=own) if any(own) else table

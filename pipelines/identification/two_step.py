@@ -1,20 +1,22 @@
 """The two-step fit, by whatever estimator.
 
-Step 1 fits the rigid body and the friction of the empty exoskeleton. Step 2 holds that friction and
-fits the rigid body of human and exoskeleton; step 1's covariance is carried into step 2's intervals.
-What the model has beside both is fitted in step 1, or in step 2 where it acts with a human only.
-A fit of everything at once is computed beside it as a check. Least squares goes through each training run once to
-compress its rows, from which every fit follows, and twice for the covariance of what the fit left.
+Step 1 fits the rigid body and the friction of the empty exoskeleton. Step 2 holds both and fits the rigid body of the
+wearer; step 1's covariance is carried into step 2's intervals. What the model has beside them is fitted in step 1, or
+in step 2 where it acts with a human only. A fit of everything at once is computed beside it as a check. Least squares
+goes through each training run once to compress its rows, from which every fit follows, and twice for the covariance of
+what the fit left.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipelines.effects import RUNS
+from pipelines.effects.friction import Friction
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.estimation.angle_noise import CUTOFF_HZ, IN_WORDS, is_loud
 from pipelines.estimation.collinearity import collinearities
@@ -28,7 +30,7 @@ from pipelines.identification.runs import Runs, checked
 from pipelines.identification.validation import Validation, validate
 from pipelines.mechanics.run import Run
 from pipelines.mechanics.scale import on_one_scale
-from pipelines.model import Model, Term, baseline, unrealizable, upside_down
+from pipelines.model import Model, Term, unrealizable, upside_down
 
 BIASED = (
     f"{IN_WORDS}, which lets every fit take the machine for too light; set filter.cutoff_hz = {CUTOFF_HZ:g}, and see "
@@ -36,6 +38,8 @@ BIASED = (
 )
 STEP = 0.25
 """Standard errors by which a shape is moved to see what the values make of it."""
+ROUNDS, RESTS = 3, 1e-3
+"""In which loads follow the rigid bodies that they are of, and the relative change at which these are at rest."""
 
 Found = TypeVar("Found", bound=Fit, covariant=True)
 
@@ -55,7 +59,7 @@ class Identified:
     """As they were fitted and judged."""
     training: Training
     values: NDArray
-    """(p,) of the training's model."""
+    """(p,) of the training's columns."""
     extension: Extension
     collinear: list[str]
     """What this motion cannot separate, a sentence each."""
@@ -77,6 +81,22 @@ class Identified:
         """What was found, for each kind of run; what each run has for itself is as in the first trained on."""
         first = {run.run: run for run in reversed(self.training.runs)}
         return {kind: self.training.model_of(run, self.values).for_run(kind) for kind, run in first.items()}
+
+    @property
+    def each_run(self) -> dict[str, list[dict[str, Any]]]:
+        """What each run has for itself, by the effect's label, as ``parameters/1`` tells it."""
+        told: dict[str, list[dict[str, Any]]] = {}
+        for run in self.runs if self.extension.recordings else ():
+            of_run = zip(self.training.model, self.training.own[run.file], strict=True)
+            for i, (term, own) in enumerate(of_run):
+                names = [p.name for p in term.effect.parameters if p.per_run]
+                if names and term.effect.acts(run.run):
+                    values = None if own is None else self.training.term_of(run, i, self.values)
+                    told.setdefault(term.effect.label, []).append(
+                        {"name": run.file, "sha256": self.extension.recordings[run.file],
+                         "values": {name: None if values is None else values[name] for name in names}}
+                    )  # fmt: skip
+        return told
 
 
 def identify(
@@ -108,22 +128,20 @@ def identify(
     """
     estimator, extension = estimator or WeightedLeastSquares(), extension or Extension()
     runs = checked(on_one_scale(motions))
-    if extension.effects:
-        runs = Runs(tuple(run.whole() for run in runs.motions))
-    model = _model(runs, extension.checked(runs.kinds))
-    training = Training(tuple(runs.of("train")), model, extension.own, reversals)
-    steps = {kind: Step(one.problem, estimated(one.fit)) for kind, one in _in_steps(training, estimator, runs).items()}
+    training = _training(runs, extension, reversals)
+    judged = [training.loaded(run) for run in runs.of("validate")]
+    steps = {kind: Step(one.problem, estimated(one.fit)) for kind, one in _in_steps(training, estimator).items()}
     values = _values(steps)
-    told = list(rows(model, extension, values))
-    covariance = _covariance(told, steps, extension, _answer_to_shapes(training, extension, runs))
-    table = table_of(told, covariance, _critical(told, steps))
+    told = list(rows(training, values))
+    covariance = _covariance(told, steps, extension, training)
+    table = table_of(told, covariance, _critical(told, steps, extension))
     everything = Problem(training, runs.kinds, np.arange(len(values)), np.zeros(len(values)))
     return Identified(
         parameters=table,
         covariance=covariance,
-        one_step=np.array([row.value for row in rows(model, extension, estimator.fit(everything).values)]),
-        validation=validate(runs.of("validate"), lambda run: _found(training, values, run)),
-        runs=runs.motions,
+        one_step=np.array([row.value for row in rows(training, estimator.fit(everything).values)]),
+        validation=validate(judged, lambda run: _found(training, values, run)),
+        runs=(*training.runs, *judged),
         training=training,
         values=values,
         extension=extension,
@@ -143,13 +161,43 @@ def identify(
     )
 
 
-def _model(runs: Runs, extension: Extension) -> Model:
+def _training(runs: Runs, extension: Extension, reversals: bool) -> Training:
+    """Return what is fitted to what, with the loads that terms of the extension may go with."""
+    train = tuple(runs.of("train"))
+    plain = _baseline(runs)
+    model = Model((*plain, *extension.terms))
+    own = {file: (*plain, *terms) for file, terms in extension.own.items()}
+    training = Training(train, model, own, reversals=reversals)
+    if not extension.terms:
+        return training
+    bodies = dict(extension.bodies)
+    if not set(runs.kinds) <= set(bodies):
+        alone = Training(tuple(run.whole() for run in train), plain, reversals=reversals)
+        bodies = _bodies(alone, _values(_in_steps(alone, WeightedLeastSquares())))
+    for _ in range(ROUNDS):
+        before = bodies
+        training = training.with_bodies(
+            {kind: (before[kind], before.get("human", before[kind])) for kind in runs.kinds}
+        )  # fmt: skip
+        bodies = _bodies(training, _values(_in_steps(training, WeightedLeastSquares())))
+        if all(np.allclose(bodies[kind], before[kind], rtol=RESTS) for kind in runs.kinds):
+            break
+    return training
+
+
+def _baseline(runs: Runs) -> Model:
+    """Return the machine's rigid body, the wearer's where there is one, and friction, without values."""
     machine = runs.motions[0].machine
-    effects = baseline(machine, runs.kinds)
-    if "with_human" in runs.kinds and any(effect.at_cuff for effect in extension.effects):
-        # Machine and limb move apart: each needs its own body.
-        effects = (RigidBody(on=machine), RigidBody(run="with_human", on=machine), *effects[2:])
-    return Model((*(Term(effect, np.zeros(len(effect.linear))) for effect in effects), *extension.terms))
+    wearer = [RigidBody(run="with_human", on=machine)] * ("with_human" in runs.kinds)
+    friction = [Friction(joint=joint, on=machine) for joint in machine.names]
+    return Model(tuple(Term(e, np.zeros(len(e.linear))) for e in (RigidBody(on=machine), *wearer, *friction)))
+
+
+def _bodies(training: Training, values: NDArray) -> dict[str, NDArray]:
+    """Return the rigid body behind the drive trains in each kind of run, and the wearer's own, (k,) each."""
+    found = [row for row in rows(training, values) if isinstance(row.effect, RigidBody)]
+    kinds = dict.fromkeys(row.effect.run for row in found)
+    return {str(kind): np.array([row.value for row in found if row.effect.run == kind]) for kind in kinds}
 
 
 def _found(training: Training, values: NDArray, run: Run) -> Model | None:
@@ -166,17 +214,13 @@ class Step(Generic[Found]):
     fit: Found
 
 
-def _in_steps(training: Training, estimator: Estimator, runs: Runs) -> dict[str, Step[Fit]]:
+def _in_steps(training: Training, estimator: Estimator) -> dict[str, Step[Fit]]:
     """Fit what is there in the empty exoskeleton, then, that being held, what comes with a human."""
-    empty = np.array(
-        [
-            "exo_alone" in effect.acts_in and effect.run in (None, "exo_alone")
-            for effect, _ in training.model.linear_parameters
-        ]
-    )
+    kinds = [kind for kind in RUNS if any(run.run == kind for run in training.runs)]
+    empty = np.array([training.acts_in(place, "exo_alone") for place in range(len(training.columns))])
     values = np.zeros(len(empty))
     steps = {}
-    for kind in runs.kinds:
+    for kind in kinds:
         fitted = np.flatnonzero(empty if kind == "exo_alone" else ~empty)
         problem = Problem(training, (kind,), fitted, values)
         steps[kind] = Step(problem, estimator.fit(problem))
@@ -185,67 +229,101 @@ def _in_steps(training: Training, estimator: Estimator, runs: Runs) -> dict[str,
 
 
 def _values(steps: Mapping[str, Step[Any]]) -> NDArray:
-    """Return the model's linear values, (p,)."""
+    """Return the values of the training's columns, (p,)."""
     last = list(steps.values())[-1]
     return last.problem.completed(last.fit.values)
 
 
 def _method(estimator: Estimator, steps: Mapping[str, Step[Estimate]], training: Training) -> dict[str, Any]:
+    away = f"all but {mask_in_words(training.runs[0].machine)}"
     return {
         "name": f"two-step {estimator.title}",
         "estimator": estimator.name,
-        "samples": "all" if training.reversals else f"all but {mask_in_words(training.runs[0].machine)}",
+        "samples": "all" if training.reversals or not estimator.masks else away,
         "covariance": "sandwich with Bartlett-weighted long-run scores, Andrews' lag",
         "interval": "95 %, critical value after Kiefer and Vogelsang",
         "steps": {kind: step.fit.told for kind, step in steps.items()},
     }
 
 
-def _answer_to_shapes(training: Training, extension: Extension, runs: Runs) -> NDArray:
-    """Return how least-squares values answer to the shapes that are held, (p, s)."""
-    model, shapes = training.model, extension.shapes
-    answer = np.zeros((len(model.linear_parameters), len(shapes)))
-    for i, variance in enumerate(np.diag(extension.shape_covariance)):
-        if variance > 0.0:
-            step = np.zeros(len(shapes))
-            # A play or a stiffness of which little is known must not fall below nought.
-            step[i] = min(STEP * np.sqrt(variance), 0.5 * abs(shapes[i]) or np.inf)
-            either = [
-                replace(training, model=_model(runs, extension.with_shapes(moved)))
-                for moved in (shapes + step, shapes - step)
-            ]
-            ahead, behind = (_values(_in_steps(one, WeightedLeastSquares(), runs)) for one in either)
-            answer[:, i] = (ahead - behind) / (2.0 * step[i])
-    return answer
+def _answers(training: Training, covariance: NDArray) -> tuple[NDArray, NDArray]:
+    """Return how least-squares values answer to shapes that are held, (p, h), and the shapes' covariance, (h, h).
+
+    ``covariance`` (s, s) is that of the terms' shapes, one after the other; of what each run has for itself, as its
+    first run has it. Other runs' are taken to be as sure, and for themselves.
+    """
+    error = np.sqrt(np.diag(covariance))
+    shapes = [(i, k) for i, term in enumerate(training.model) for k in range(len(term.shape))]
+    moves: list[tuple[int, int, float, list[str]]] = []
+    for (i, k), e in zip(shapes, error, strict=True):
+        having = [run.file for run in training.runs if training.has(run, i)]
+        apart = training.model.terms[i].effect.shape[k].per_run
+        moves.append((i, k, e, having[:1] if apart else having))
+    for (i, k), e in zip(shapes, error, strict=True):
+        if training.model.terms[i].effect.shape[k].per_run:
+            having = [run.file for run in training.runs if training.has(run, i)]
+            moves += [(i, k, e, [file]) for file in having[1:]]
+    others = np.array([e**2 for *_, e, _ in moves[len(shapes) :]])
+    every = np.block(
+        [
+            [covariance, np.zeros((len(shapes), len(others)))],
+            [np.zeros((len(others), len(shapes))), np.diag(others)],
+        ]
+    )
+    answers = [np.zeros((len(training.columns), 0))]
+    for i, k, e, files in moves:
+        answers.append(_answer(training, i, k, e, files)[:, np.newaxis])
+    return np.concatenate(answers, axis=1), every
+
+
+def _answer(training: Training, term: int, shape: int, error: float, files: Sequence[str]) -> NDArray:
+    """Return how least-squares values, (p,), change with a term's shape in some runs."""
+    if error == 0.0 or not files:
+        return np.zeros(len(training.columns))
+    now = abs(training.model.terms[term].shape[shape])
+    # A play or a stiffness of which little is known must not fall below nought.
+    step = min(STEP * error, 0.5 * now or np.inf)
+    ahead, behind = (
+        _values(_in_steps(training.reshaped(term, shape, moved, files), WeightedLeastSquares()))
+        for moved in (step, -step)
+    )
+    return (ahead - behind) / (2.0 * step)
 
 
 def _covariance(
-    told: Sequence[Row], steps: Mapping[str, Step[Estimate]], extension: Extension, to_shapes: NDArray
+    told: Sequence[Row], steps: Mapping[str, Step[Estimate]], extension: Extension, training: Training
 ) -> NDArray:
     """Return the covariance of some rows; what is not sure of step 1, or of a shape, is not sure of the rest.
 
     A shape and the amplitudes beside it are estimated from what each explains beyond the others: given the shape,
-    the error of an amplitude does not go with that of the shape.
+    the error of an amplitude hardly goes with that of the shape, and not at all in white noise.
     """
-    p, s = to_shapes.shape
+    to_shapes, of_shapes = _answers(training, extension.covariance)
+    p, h = to_shapes.shape
     of_linear = np.zeros((p, p))
     for step in steps.values():
         onto = np.eye(p)[step.problem.fitted]
         carried = np.eye(p) + onto.T @ step.fit.carry
         of_linear = carried @ of_linear @ carried.T + onto.T @ step.fit.covariance @ onto
-    through = np.vstack([to_shapes, np.eye(s)])
-    covariance = through @ extension.shape_covariance @ through.T
+    through = np.vstack([to_shapes, np.eye(h)])
+    covariance = through @ of_shapes @ through.T
     covariance[:p, :p] += of_linear
+    size = len(told[0].slope)
     slopes = np.array([row.slope for row in told])
-    return slopes @ covariance @ slopes.T
+    return slopes @ covariance[:size, :size] @ slopes.T
 
 
-def _critical(told: Sequence[Row], steps: Mapping[str, Step[Estimate]]) -> NDArray:
-    """Return the half-width of each row's interval in standard errors: that of its fit, of several the least sure."""
+def _critical(told: Sequence[Row], steps: Mapping[str, Step[Estimate]], extension: Extension) -> NDArray:
+    """Return the half-width of each row's interval in standard errors.
+
+    What is fitted with a human is no surer than the less sure of both steps, what is held as sure as it was found.
+    """
     slopes = np.array([row.slope for row in told])
-    own = [np.where(slopes[:, s.problem.fitted].any(axis=1), s.fit.critical, 0.0) for s in steps.values()]
-    largest = np.max(own, axis=0)
-    return np.where(largest > 0.0, largest, max(step.fit.critical for step in steps.values()))
+    critical, least = np.full(len(told), extension.critical), 0.0
+    for step in steps.values():
+        least = max(least, step.fit.critical)
+        critical[slopes[:, step.problem.fitted].any(axis=1)] = least
+    return critical
 
 
 def _unrealizable(table: pd.DataFrame, runs: Runs) -> list[str]:

@@ -187,6 +187,14 @@ class Motion:
             curvature[stretch] = derivative(smooth[stretch], self.sample_rate_hz, 2)
         return smooth, rate, curvature
 
+    def loaded(self, body: NDArray, limb: NDArray) -> "Motion":
+        """Return the run with the loads of rigid bodies, (p,) each: all behind the drive trains, and the limb alone.
+
+        The measured torques would not do: their noise would stand on both sides of a regression.
+        """
+        columns = self.machine.mechanism.regressor(self.q, self.dq, self.ddq, self.geometry)
+        return replace(self, load=columns @ body, limb_load=columns @ limb, body=body, limb_body=limb)
+
     def with_state(self, q: NDArray, dq: NDArray, ddq: NDArray) -> "Motion":
         """Return the same run with other kinematics, (n, J) each, as a corrected measurement has."""
         made = replace(self, q=q, dq=dq, ddq=ddq)

@@ -14,7 +14,7 @@ from pipelines.contracts.table import Table
 from pipelines.effects.cuff_compliance import CuffCompliance
 from pipelines.effects.encoder_offset import EncoderOffset
 from pipelines.effects.passive_joint_torque import PassiveJointTorque
-from pipelines.effects.torque_offset import TorqueOffset
+from pipelines.effects.torque_gain import TorqueGain
 from pipelines.errors import InputError
 from pipelines.estimation.compressed import residual_rms
 from pipelines.estimation.estimators import ESTIMATORS
@@ -26,11 +26,12 @@ from pipelines.identification.extension import chosen, named
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.machine import THE_LEG
 from pipelines.mechanics.motion import motion_from_table
-from pipelines.model import Model, Term, baseline
+from pipelines.model import Model, Term, baseline, model_from_parameters
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
 from pipelines.settings.filter import FilterSettings
 from pipelines.settings.plant import CuffSettings, PlantEffect, PlantSettings
+from tests.effects.catalogue import TERMS
 from tests.estimation import pendulum
 from tests.identification.conftest import RICH
 from tests.identification.test_two_step import with_noise
@@ -46,7 +47,7 @@ SIZES = {
     ("parallel_spring", "rest_angle"): -0.6,
     ("rotor_inertia", "inertia"): 0.12,
 }
-CUFFS = Extension() | Extension((Term(CuffCompliance("knee"), np.array([120.0])),))
+CUFFS = Extension((Term(CuffCompliance("knee"), np.array([120.0])),))
 LABELS = ("coulomb_asymmetry@hip", "parallel_spring@knee", "rotor_inertia@knee")
 
 
@@ -73,7 +74,7 @@ def sizes(found):
 
 
 def test_the_sizes_of_effects_that_are_named_are_recovered_and_the_body_with_them(hidden, truth):
-    found = identify(hidden, extension=chosen(LABELS, THE_LEG))
+    found = identify(hidden, extension=Extension(chosen(LABELS, THE_LEG)))
     assert sizes(found) == pytest.approx(SIZES, rel=0.02)
     body = found.parameters[found.parameters["step"] != "extension"]
     assert_allclose(body["value"], truth, rtol=0.02, atol=0.01)
@@ -84,8 +85,10 @@ def test_the_sizes_of_effects_that_are_named_are_recovered_and_the_body_with_the
 def test_the_truth_of_an_extension_lies_in_its_intervals_95_times_in_100(hidden, truth):
     """Those of the rest angle too, which is a quotient of what is fitted."""
     inside = []
-    for seed in range(40):
-        table = identify(with_noise(hidden, "20 ms", (0.6, 0.4), seed), extension=chosen(LABELS, THE_LEG)).parameters
+    for seed in range(25):
+        table = identify(
+            with_noise(hidden, "20 ms", (0.6, 0.4), seed), extension=Extension(chosen(LABELS, THE_LEG))
+        ).parameters
         true = np.append(truth, list(SIZES.values()))
         inside.append((table["ci95_low"] <= true) & (true <= table["ci95_high"]))
     print(f"\ncovered {np.mean(inside):.3f}; each {np.mean(inside, axis=0).round(2)}")
@@ -98,7 +101,7 @@ def test_every_method_finds_what_is_named(estimator):
     runs = [replace(pendulum.motion(pendulum.Disturbed(torque_nm=0.05), seed, purpose=p), file=f"{p}.parquet")
             for seed, p in enumerate(("train", "validate"))]  # fmt: skip
     runs = [replace(run, torque=run.torque + 0.4) for run in runs]
-    found = identify(runs, estimator(), chosen(["torque_offset@joint"], runs[0].machine))
+    found = identify(runs, estimator(), Extension(chosen(["torque_offset@joint"], runs[0].machine)))
     assert sizes(found)["torque_offset", "offset"] == pytest.approx(0.4, abs=0.03)
     assert_allclose(found.parameters["value"][:2], pendulum.TRUTH[:2], rtol=0.05)
 
@@ -109,7 +112,7 @@ def test_what_acts_with_a_human_only_is_fitted_in_the_second_step_and_leaves_the
     )
     runs = session((ligament,))
     term = Term(PassiveJointTorque("knee"), np.array([1.0, -0.8, 0.25]))
-    found, without = identify(runs, extension=Extension() | Extension((term,))), identify(runs)
+    found, without = identify(runs, extension=Extension((term,))), identify(runs)
     assert sizes(found)["passive_joint_torque", "stiffness"] == pytest.approx(14.0, rel=0.02)
     first = without.parameters["step"] == "friction"
     assert_allclose(found.parameters["value"][: first.sum()], without.parameters["value"][first], rtol=1e-9)
@@ -154,25 +157,29 @@ def shape_and_error(run):
 
 def test_what_is_not_sure_of_a_held_shape_is_not_sure_of_the_parameters():
     """Behind an encoder 0.08 rad off, known as well as its run tells: gravity's moment goes with it, and would be too
-    sure of itself were the offset certain."""
+    sure of itself were the offset certain.
+    """
     noise = pendulum.Disturbed(torque_nm=0.3, correlation_s=1e-4)
     judged = replace(pendulum.motion(noise, 1000, purpose="validate"), file="validate.parquet")
     judged = replace(judged, q=judged.q + 0.08)
-    carried, certain = [], []
-    for seed in range(120):
+    inside, found, errors = [], [], {True: [], False: []}
+    for seed in range(60):
         run = replace(pendulum.motion(noise, seed), file="train.parquet")
         run = replace(run, q=run.q + 0.08)
         offset, error = shape_and_error(run)
         term = Term(EncoderOffset("joint", on=run.machine), np.array([offset]))
-        for variance, inside in ((error**2, carried), (0.0, certain)):
-            known = Extension((term,), shape_covariance=np.array([[variance]]))
+        for certain, own in errors.items():
+            known = Extension((term,), None if certain else np.array([[error**2]]))
             table = identify([run, judged], extension=known).parameters[:4]
-            inside.append((table["ci95_low"] <= pendulum.TRUTH) & (pendulum.TRUTH <= table["ci95_high"]))
-    moment, of_certain = np.mean(carried, axis=0)[1], np.mean(certain, axis=0)[1]
-    print(f"\ncovered {np.mean(carried):.3f}; the moment {moment:.3f}, the offset taken for certain {of_certain:.3f}")
-    assert 0.91 <= np.mean(carried) <= 0.99
-    assert moment >= 0.88
-    assert of_certain < moment - 0.05
+            own.append(table["std_error"])
+        inside.append((table["ci95_low"] <= pendulum.TRUTH) & (pendulum.TRUTH <= table["ci95_high"]))
+        found.append(table["value"])
+    scatter = np.std(found, axis=0)[1]
+    carried, certain = (np.mean(errors[key], axis=0)[1] / scatter for key in (False, True))
+    print(f"\ncovered {np.mean(inside):.3f}; error of the moment over its scatter {carried:.2f}, {certain:.2f} without")
+    assert 0.91 <= np.mean(inside) <= 0.99
+    assert carried == pytest.approx(1.0, abs=0.2)
+    assert certain < 0.8
 
 
 def test_with_reversals_the_fit_is_least_squares_on_every_valid_block(hidden):
@@ -228,26 +235,80 @@ def told_of(files, told, folder):
     return PARAMETERS.read(folder / "parameters.parquet")
 
 
-def test_what_each_run_has_for_itself_is_held_as_the_diagnosis_found_it(tared, truth, tmp_path):
+def test_what_each_run_has_for_itself_is_fitted_in_each(tared, truth, tmp_path):
     runs, files = tared
     extension = named(told_of(files, lambda f: True, tmp_path), runs, files)
     found = identify(runs, extension=extension)
     assert_allclose(found.parameters["value"][:16], truth, rtol=0.01, atol=0.005)
     last = found.parameters.iloc[-1]
-    assert (last["effect"], last["value"], bool(last["each_run"])) == ("torque_offset", 1.5, True)
-    assert np.isnan(last["std_error"])
+    assert (last["effect"], bool(last["each_run"])) == ("torque_offset", True)
+    assert last["value"] == pytest.approx(1.5, abs=0.01)
+    told = {one["name"]: one["values"]["offset"] for one in found.each_run["torque_offset@hip"]}
+    assert told == pytest.approx({f"{name}.parquet": zero for name, zero in ZEROS.items()}, abs=0.01)
     assert found.validation.pooled.rmse.max() < 0.05
-    assert [r for r in found.remarks if "learnt from this run itself" in r and r.startswith("exo_alone_validate")]
+    assert [r for r in found.remarks if "was learnt from this run" in r and r.startswith("exo_alone_validate")]
     assert identify(runs).validation.pooled.rmse[0] > 1.0
+
+
+def test_intervals_hold_where_a_sensor_is_tared_anew_in_each_run(tared, truth, tmp_path):
+    """Gravity's moment goes with such an offset: were it held for certain, a third of its intervals would hold."""
+    runs, files = tared
+    extension = named(told_of(files, lambda f: True, tmp_path), runs, files)
+    true = np.append(truth, 1.5)
+    inside = []
+    for seed in range(25):
+        table = identify(with_noise(runs, "20 ms", (0.6, 0.4), seed), extension=extension).parameters
+        inside.append((table["ci95_low"] <= true) & (true <= table["ci95_high"]))
+    print(f"\ncovered {np.mean(inside):.3f}; the moments {np.mean(inside, axis=0)[[3, 11, 15]].round(2)}")
+    assert 0.91 <= np.mean(inside) <= 0.99
+    assert np.mean(inside, axis=0)[[3, 11, 15]].min() > 0.8
 
 
 def test_a_run_that_the_diagnosis_did_not_see_is_told_to_have_anothers_zero(tared, tmp_path):
     runs, files = tared
     extension = named(told_of(files, lambda f: "train" in f.stem, tmp_path), runs, files)
-    assert [TorqueOffset] * 4 == [type(extension.own[run.file][0].effect) for run in runs]
     told = [r for r in identify(runs, extension=extension).remarks if "tells none of" in r]
     assert len(told) == 2
     assert "exo_alone_validate.parquet" in told[0]
+
+
+SMALL = {"joint_elasticity": 0.12, "backlash": 0.12, "cuff_compliance": 0.06}
+"""How far the rigid bodies may be off behind what is undone approximately; all others are within 1.5 %."""
+
+
+@pytest.mark.parametrize("term", [t for t in TERMS if t.effect.joint == (t.effect.joints or ("hip",))[-1]],
+                         ids=lambda term: term.effect.label)  # fmt: skip
+def test_behind_every_effect_of_known_shape_body_and_amplitudes_are_the_true_ones(term, truth):
+    """Those too whose torque goes with the load, which is not measured: the drive's own friction is in what is."""
+    effect = term.effect
+    if effect.name in ("rigid_body", "friction") or effect.goes_with_time:
+        pytest.skip("is fitted anyway, or differs from run to run")
+    if effect.name == "friction_warmup":
+        pytest.skip("warms while the machine moves to where the run begins")
+    names = [p.name for p in effect.parameters]
+    true = dict(zip(names, map(float, effect.physical(term.values)), strict=True))
+    runs = session((PlantEffect(effect=effect.name, joint=effect.joint, values=true),), seconds=20.0)
+    held = Term(effect, np.append(np.zeros(len(effect.linear)), term.shape))
+    found, without = identify(runs, extension=Extension((held,))), identify(runs)
+    assert sizes(found) == pytest.approx({(effect.name, name): value for name, value in true.items()}, rel=0.02)
+    body = found.parameters[found.parameters["effect"] == "rigid_body"]
+    assert_allclose(body["value"], np.delete(truth, np.s_[4:8]), rtol=SMALL.get(effect.name, 0.015))
+    assert np.all(found.validation.pooled.rmse <= without.validation.pooled.rmse + 0.03)
+
+
+def test_the_table_tells_the_model_that_was_fitted(tared, tmp_path):
+    """Of two things that a torque sensor does, the order counts: simulation takes them as identification did."""
+    runs, files = tared
+    extension = named(told_of(files, lambda f: True, tmp_path), runs, files)
+    gained = extension.with_terms([Term(TorqueGain("hip"), np.array([1.3]))])
+    found = identify([replace(run, torque=run.torque * [1.3, 1.0]) for run in runs], extension=gained)
+    for kind in ("exo_alone", "with_human"):
+        run = next(run for run in found.training.runs if run.run == kind)
+        told = {one["name"]: one["values"] for one in found.each_run["torque_offset@hip"]}[run.file]
+        frame = found.parameters.copy()
+        frame.loc[frame["effect"] == "torque_offset", "value"] = told["offset"]
+        again = model_from_parameters(frame, kind).for_run(kind)
+        assert_allclose(again.torque(run), found.model_of(run).torque(run), atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -264,15 +325,20 @@ def test_what_cannot_be_fitted_by_its_name_alone_is_refused(label, said):
         chosen([label], THE_LEG)
 
 
-def test_a_cause_of_a_human_is_refused_where_nobody_is_in_the_machine(hidden):
-    alone = [m for m in hidden if m.run == "exo_alone"]
-    with pytest.raises(InputError, match="cuff_compliance@knee acts in with_human runs, and none to train on is given"):
-        identify(alone, extension=CUFFS)
+def test_a_cause_of_a_human_is_left_out_where_nobody_is_in_the_machine_and_that_is_told(tared, tmp_path):
+    runs, files = tared
+    table = told_of(files, lambda f: True, tmp_path)
+    cuffs = table.frame.assign(effect="cuff_compliance", joint="knee", name="stiffness", value=120.0, each_run=False)
+    frame = pd.concat([table.frame, cuffs], ignore_index=True)
+    extension = named(replace(table, frame=frame), runs[:2], files[:2])
+    assert [term.effect.label for term in extension.terms] == ["torque_offset@hip"]
+    found = identify(runs[:2], extension=extension)
+    assert "cuff_compliance@knee is left out: it acts in none of these runs to train on" in found.remarks
 
 
 def test_a_diagnosis_of_another_machine_is_refused(tared, tmp_path):
     runs, files = tared
     table = told_of(files, lambda f: True, tmp_path)
     other = replace(table, metadata=table.metadata | {"joints": [{"name": "axis", "kind": "prismatic"}]})
-    with pytest.raises(InputError, match=r"has the joints axis, the runs have hip, knee"):
+    with pytest.raises(InputError, match=r"with the joints axis \(prismatic\), the runs are of a leg with hip \(rev"):
         named(other, runs, files)
