@@ -95,7 +95,8 @@ def identify(
     config_used = heeded | {"identify": asked.model_dump(mode="json")}
     inputs = [*files, causes] if causes else files
     shared = {"joints": runs[0].joint_metadata} | describe(inputs=inputs, config=config_used)
-    figures = _write(found, output, shared, figures=asked.figures)
+    of_causes = {"causes": describe([causes])["inputs"][0]} if causes else {}
+    figures = _write(found, output, shared | {"method": found.method | of_causes}, figures=asked.figures)
     _report(found, runs[0].machine)
     console.wrote(output, "parameters.parquet", "residuals.parquet", *figures)
 
@@ -125,7 +126,6 @@ def _write(found: "Identified", output: Path, shared: "dict[str, Any]", *, figur
         "covariance": found.covariance.tolist(),
         "mechanism": run.machine.mechanism.name,
         "geometry": run.machine.told(run.geometry),
-        "method": found.method,
         "one_step": found.one_step.tolist(),
         "validation": found.validation.as_json(),
         "collinear": found.collinear,

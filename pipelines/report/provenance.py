@@ -252,7 +252,10 @@ def _identify(session: Session, artifact: Artifact) -> Words | None:
     if artifact is session.extended:
         return None  # the diagnosis's
     config, needs = _config(session, artifact)
-    return ["identify", *_inputs(session, artifact), *config, "-o", _folder(artifact.path)], needs
+    causes = [_path_of(session, artifact.causes)] if artifact.causes else []
+    runs = [path for path in _inputs(session, artifact) if path not in causes]
+    told = [word for path in causes for word in ("--causes", path)]
+    return ["identify", *runs, *told, *config, "-o", _folder(artifact.path)], needs
 
 
 def _diagnose(session: Session, artifact: Artifact) -> Words | None:

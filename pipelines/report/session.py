@@ -38,6 +38,12 @@ class Artifact:
         """Name and SHA-256 of every file that it was computed from."""
         return self.metadata.get("inputs") or []
 
+    @property
+    def causes(self) -> dict[str, str] | None:
+        """Name and hash of the diagnosis' file whose causes a model refits; None of any other."""
+        method = self.metadata.get("method")
+        return method.get("causes") if isinstance(method, dict) else None
+
     def is_made_of(self, other: "Artifact") -> bool:
         """Tell whether the other file, byte for byte, is one of its inputs."""
         return any(one["sha256"] == other.sha256 for one in self.inputs)
@@ -125,9 +131,15 @@ class Session:
         return self._beside_verdict("parameters")
 
     @cached_property
+    def identified(self) -> list[Artifact]:
+        """The other models, as ``exoid identify`` writes them: the baselines, then what refits a diagnosis' causes."""
+        others = [one for one in self.of_kind("parameters") if one is not self.extended]
+        return sorted(others, key=lambda one: one.causes is not None)
+
+    @property
     def baselines(self) -> list[Artifact]:
-        """The other models, as ``exoid identify`` writes them."""
-        return [one for one in self.of_kind("parameters") if one is not self.extended]
+        """The models that no diagnosis has told of."""
+        return [one for one in self.identified if one.causes is None]
 
     @cached_property
     def residuals(self) -> Table | None:

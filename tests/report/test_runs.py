@@ -4,7 +4,9 @@ import pandas as pd
 import pytest
 
 from pipelines.contracts import PARAMETERS, RESIDUALS, Joint
+from pipelines.contracts.provenance import sha256
 from pipelines.report.measured import scores
+from pipelines.report.parameters import models
 from pipelines.report.report import report
 from pipelines.report.session import find
 from pipelines.report.tiles import tiles
@@ -78,3 +80,21 @@ def test_the_row_in_which_the_causes_make_a_run_worse_says_so_and_whether_only_a
     assert ("only" in notes["knee torque, computed, reversals included, N·m"]) == (away < 1)
     assert bool(notes["knee torque, computed, away from reversals, N·m"]) == (away > 1)
     assert not any(note for words, note in notes.items() if words.startswith("hip"))
+
+
+def test_a_refit_of_the_causes_is_called_that_and_taken_for_no_baseline(tmp_path):
+    write_session(tmp_path)
+    diagnosed = tmp_path / "diagnosed" / "parameters.parquet"
+    table = PARAMETERS.read(diagnosed)
+    of = {"name": "parameters.parquet", "sha256": sha256(diagnosed)}
+    inputs = [*table.metadata["inputs"], of]
+    about = {k: v for k, v in table.metadata.items() if k != "contract"} | {"inputs": inputs, "method": {"causes": of}}
+    PARAMETERS.write(tmp_path / "a_refit" / "parameters.parquet", table.frame, about)
+    session = find([tmp_path])
+    assert [model.title for model in models(session)] == [
+        "Rigid body and friction",
+        "Named causes, refitted",
+        "Extended by the named causes",
+    ]
+    assert [one.path.parent.name for one in session.baselines] == ["identified"]
+    assert "--causes" in report(session)
