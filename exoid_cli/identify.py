@@ -52,7 +52,7 @@ def identify(
         list[str] | None,
         typer.Option(
             help="What the model has besides, as rotor_inertia@knee; more than once for more.",
-            show_default="[identify] effects, nothing",
+            show_default="nothing",
         ),
     ] = None,
     reversals: Annotated[
@@ -72,8 +72,9 @@ def identify(
       exoid identify motions/*.parquet -o identified/
       exoid identify motions/*.parquet -o iv/ --method instrumental_variables
       exoid identify recordings/*.parquet -o refitted/ --causes diagnosed/parameters.parquet
+      exoid identify recordings/*.parquet -o rotor/ --effect rotor_inertia@knee
     """
-    from pipelines.contracts import describe
+    from pipelines.contracts import PARAMETERS, RESIDUALS, describe
     from pipelines.estimation.estimators import estimator_named
     from pipelines.identification import identify as fit
     from pipelines.mechanics.read import geometry_from, read_runs, refuse_another_mechanism
@@ -81,22 +82,28 @@ def identify(
     if not files and output is None and (method, causes, effect, reversals) == (None,) * 4:
         only(context, place_of(config, lacking="no motion is given"), "identify", again=again)
         return
-    if causes and output is None:
-        raise InputError("--causes: no folder is given; name one with -o, for identified/ is without them")
+    if (causes or effect) and output is None:
+        option = "--causes" if causes else "--effect"
+        raise InputError(f"{option}: no folder is given; name one with -o, for identified/ is of the model without")
+    if causes and output and (output / "parameters.parquet").resolve() == causes.resolve():
+        raise InputError(f"-o: {output} is the folder of {causes}, which would be overwritten; name another folder")
     files, output = inputs_and_folder("identify", files, output, config, "no motion is given")
+    for contract, name in ((PARAMETERS, "parameters"), (RESIDUALS, "residuals")):
+        contract.refuse_place(output / f"{name}.parquet")
     settings = settings_in_force(config)
     estimator = estimator_named(settings.identify.method if method is None else method)
-    asked = settings.identify.changed(method=estimator.name, effects=effect or None, reversals=reversals)
+    asked = settings.identify.changed(method=estimator.name, reversals=reversals)
     runs = read_runs(files, settings.filter, geometry_from(settings))
     refuse_another_mechanism(settings.mechanism, runs)
     with console.working("fitting"):
-        found = fit(runs, estimator, _extension(asked.effects, causes, runs, files), reversals=asked.reversals)
+        found = fit(runs, estimator, _extension(effect or [], causes, runs, files), reversals=asked.reversals)
     heeded = settings.sections_about(runs[0].machine.is_exoskeleton, "mechanism", "filter")
     config_used = heeded | {"identify": asked.model_dump(mode="json")}
     inputs = [*files, causes] if causes else files
     shared = {"joints": runs[0].joint_metadata} | describe(inputs=inputs, config=config_used)
-    of_causes = {"causes": describe([causes])["inputs"][0]} if causes else {}
-    figures = _write(found, output, shared | {"method": found.method | of_causes}, figures=asked.figures)
+    besides = {"effects": effect} if effect else {}
+    besides |= {"causes": describe([causes])["inputs"][0]} if causes else {}
+    figures = _write(found, output, shared | {"method": found.method | besides}, figures=asked.figures)
     _report(found, runs[0].machine)
     console.wrote(output, "parameters.parquet", "residuals.parquet", *figures)
 
@@ -139,7 +146,7 @@ def _write(found: "Identified", output: Path, shared: "dict[str, Any]", *, figur
     left = output / "residuals.parquet"
     with console.working("predicting every run"):
         model = "extended" if found.extension.terms else "baseline"
-        RESIDUALS.write_pieces(left, residuals(found.runs, found.model_of, model), shared)
+        RESIDUALS.write_pieces(left, residuals(found.runs, found.model_of, model, found.training.cutoff_hz), shared)
     if not figures:
         return []
     with console.working("drawing"):

@@ -5,7 +5,7 @@ from typing import Any
 
 from pipelines.contracts.joints import the
 from pipelines.effects import EFFECTS, Effect
-from pipelines.errors import InputError
+from pipelines.errors import InputError, about
 from pipelines.mechanics.machine import Machine
 from pipelines.model import effect_named
 
@@ -32,20 +32,24 @@ def effect_labelled(label: str) -> Effect:
     return effect_named(name)(joint=joint or None)
 
 
-def effect_at(label: str, machine: Machine, fits: Callable[[type[Effect]], bool], setting: str) -> Effect:
-    """Return the effect of a label at a machine, if it ``fits`` what a ``setting`` may hold.
+def effect_at(
+    label: str, machine: Machine, fits: Callable[[type[Effect]], bool], setting: str, why: str = ""
+) -> Effect:
+    """Return the effect of a label at a machine, if it ``fits`` what a ``setting`` may hold; ``why`` others do not.
 
     Raises
     ------
     InputError
         Where there is none of this name or at this joint, or it does not fit.
     """
-    told = effect_labelled(label)
+    with about(setting):
+        told = effect_labelled(label)
     if fits(type(told)) and told.joint in told.possible(machine):
         return type(told)(joint=told.joint, on=machine)
     can_be = [one(joint=place, on=machine).label for one in EFFECTS if fits(one) for place in one.possible(machine)]
     raise InputError(
-        f"{setting}: found {label}, expected {' or '.join(can_be) or 'nothing'}; correct it or leave it out"
+        f"{setting}: found {label}, expected {' or '.join(can_be) or 'nothing'}"
+        f"{f' ({why})' if why else ''}; correct it or leave it out"
     )
 
 

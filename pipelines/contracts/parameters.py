@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from pipelines.contracts.metadata import Finite, Geometry, InputKeys, Matrix, TableKeys
@@ -40,6 +41,24 @@ def _covariance_has_the_rows_shape(frame: pd.DataFrame, metadata: Mapping[str, A
         )
 
 
+def _errors_are_errors(frame: pd.DataFrame, metadata: Mapping[str, Any], source: str) -> None:
+    below = np.flatnonzero(frame["std_error"].to_numpy(float) < 0.0)
+    if len(below):
+        found = frame["std_error"].iloc[below[0]]
+        raise ContractError(
+            f"{source}: column std_error, row {below[0]}: found {found:g}, expected 0 or more; write null where it is "
+            "not known"
+        )
+    covariance = np.array(metadata.get("covariance") or np.zeros((0, 0)), dtype=float)
+    size = np.sqrt(np.abs(np.diag(covariance)))
+    off = np.abs(covariance - covariance.T) > 1e-6 * np.outer(size, size)
+    if off.any() or (np.diag(covariance) < 0.0).any():
+        raise ContractError(
+            f"{source}: metadata covariance: found variances below 0, or a matrix that is not its own transpose; "
+            "write the covariance of the rows"
+        )
+
+
 PARAMETERS = Contract(
     name="parameters",
     version=1,
@@ -66,5 +85,5 @@ PARAMETERS = Contract(
         ),
     ),
     metadata=ParametersKeys,
-    rules=(_covariance_has_the_rows_shape,),
+    rules=(_covariance_has_the_rows_shape, _errors_are_errors),
 )  # fmt: skip

@@ -40,6 +40,8 @@ class Training:
     """By the kind of run, whose loads a term may go with: what hangs behind the drive trains, and the limb."""
     reversals: bool = False
     """Whether samples near reversals are fitted, too."""
+    cutoff_hz: float | None = None
+    """Above which nothing is fitted, if there is one."""
 
     @cached_property
     def columns(self) -> list[Column]:
@@ -129,7 +131,7 @@ class Training:
         ]
         # What has no column acts in no run of this kind.
         kept = {n: at for n, at in enumerate(here) if at is not None}
-        for r in regressions(run, self.model_of(run, np.zeros(p))):
+        for r in regressions(run, self.model_of(run, np.zeros(p)), self.cutoff_hz):
             if here != list(range(p)):
                 regressor = np.zeros((*r.torque.shape, p))
                 regressor[:, :, list(kept.values())] = r.regressor[:, :, list(kept)]

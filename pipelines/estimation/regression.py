@@ -10,6 +10,7 @@ from pipelines.errors import InputError
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.motion import Motion, Piece
 from pipelines.mechanics.run import Run
+from pipelines.mechanics.slow_motion import edge, filtered, unsure
 from pipelines.model import Model
 from pipelines.signals.blocks import BlockAverage, dilate
 
@@ -113,27 +114,33 @@ def turns(motion: Motion) -> NDArray:
     return turned
 
 
-def regressions(run: Run, model: Model) -> Iterator[Regression]:
-    """Yield a run as one linear regression, piece by piece."""
-    for piece in run.pieces(block_average(run).decimation + padding(run)):
-        yield regress(piece, model)
+def regressions(run: Run, model: Model, cutoff_hz: float | None = None) -> Iterator[Regression]:
+    """Yield a run as one linear regression, piece by piece; where there is a cut-off, only what is slower."""
+    felt = edge(run.sample_rate_hz, cutoff_hz) if cutoff_hz else 0
+    for piece in run.pieces(block_average(run).decimation + padding(run) + felt):
+        yield regress(piece, model, cutoff_hz)
 
 
-def regress(piece: Piece, model: Model) -> Regression:
+def regress(piece: Piece, model: Model, cutoff_hz: float | None = None) -> Regression:
     """Compute the regressor at full rate, then average it and the torque over the same blocks.
 
-    A block belongs to the piece in whose core it begins; what it needs beyond stands in the margin.
+    Both go through the same low-pass before, where there is a cut-off. A block belongs to the piece in whose core it
+    begins; what it needs beyond stands in the margin.
     """
     motion, core = piece.motion, piece.core
     block = block_average(motion)
     starts = block.starts(motion.segment, piece.before)
     starts = starts[(starts >= core.start) & (starts < core.stop)]
-    valid = block.all(motion.valid, starts)
+    regressor, torque, trusted = model.regressor(motion), motion.torque, motion.valid
+    if cutoff_hz:
+        regressor, torque = (filtered(motion, np.nan_to_num(x), cutoff_hz) for x in (regressor, torque))
+        trusted = trusted & ~unsure(motion, cutoff_hz)
+    valid = block.all(trusted, starts)
     return Regression(
         time=block.mean(motion.time, starts),
         segment=motion.segment[starts],
-        regressor=block.mean(model.regressor(motion), starts),
-        torque=block.mean(motion.torque, starts),
+        regressor=block.mean(regressor, starts),
+        torque=block.mean(torque, starts),
         valid=valid,
         usable=valid[:, np.newaxis] & block.all(away_from_reversals(motion), starts),
         state=(block.mean(motion.q, starts), block.mean(motion.dq, starts), block.mean(motion.ddq, starts)),

@@ -16,12 +16,14 @@ from pipelines.contracts.provenance import recording_behind
 from pipelines.contracts.table import Table
 from pipelines.effects import RUNS, Effect
 from pipelines.effects.rigid_body import RigidBody
-from pipelines.errors import InputError
+from pipelines.errors import InputError, about
 from pipelines.label import effect_at
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.run import Run
 from pipelines.model import BASELINE, Term, terms_beside_bodies
 from pipelines.own_values import guess, own_term
+
+WHY = "others have shapes that a diagnosis finds (--causes), or cannot be told from rigid body and friction"
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,7 @@ def chosen(labels: Iterable[str], machine: Machine) -> tuple[Term, ...]:
     InputError
         Where there is none of this name or at this joint, or its shape would have to be known.
     """
-    effects = [effect_at(label, machine, _shapeless, "identify.effects") for label in dict.fromkeys(labels)]
+    effects = [effect_at(label, machine, _shapeless, "--effect", WHY) for label in dict.fromkeys(labels)]
     return tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects)
 
 
@@ -98,7 +100,9 @@ def named(table: Table, runs: Sequence[Run], recordings: Sequence[Path]) -> Exte
     """
     _refuse_another_machine(table, runs[0])
     kinds = {run.run for run in runs if run.purpose == "train"}
-    told = [one for one in terms_beside_bodies(table.frame, runs[0].machine) if one[0].effect.name not in BASELINE]
+    with about(table.path):
+        beside = terms_beside_bodies(table.frame, runs[0].machine)
+    told = [one for one in beside if one[0].effect.name not in BASELINE]
     acting = [one for one in told if any(one[0].effect.acts(kind) for kind in kinds)]
     remarks = [
         f"{term.effect.label} is left out: it acts in none of these runs to train on"
@@ -120,12 +124,16 @@ def _refuse_another_machine(table: Table, run: Run) -> None:
     mechanism = table.metadata.get("mechanism") or run.machine.mechanism.name
     theirs = [*(f"{one['name']} ({one['kind']})" for one in table.metadata.get("joints") or run.joint_metadata)]
     ours = [f"{one['name']} ({one['kind']})" for one in run.joint_metadata]
+    remedy = "give the parameters.parquet of a diagnosis of the same machine"
     if theirs != ours or mechanism != run.machine.mechanism.name:
         raise InputError(
             f"{table.path}: is of a {mechanism} with the joints {', '.join(theirs)}, the runs are of a "
-            f"{run.machine.mechanism.name} with {', '.join(ours)}; give the parameters.parquet of a diagnosis of the "
-            "same machine"
+            f"{run.machine.mechanism.name} with {', '.join(ours)}; {remedy}"
         )
+    geometry = table.metadata.get("geometry") or {}
+    for name, length in run.machine.told(run.geometry).items():
+        if not np.isclose(geometry.get(name, length), length):
+            raise InputError(f"{table.path}: has {name} {geometry[name]:g}, the runs have {length:g}; {remedy}")
 
 
 def _about(run: Run, path: Path, terms: Sequence[Term], table: Table, sha256: str) -> list[str]:

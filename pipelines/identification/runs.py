@@ -39,5 +39,10 @@ def checked(motions: Sequence[Run]) -> Runs:
             f"found no run to validate on among: {listed}; a fit is judged on data it has not seen: "
             f"{giving('validate', motions)}"
         )
+    if not any(run.run in runs.kinds for run in runs.of("validate")):
+        raise InputError(
+            f"found no run to validate on of a kind that is trained on ({', '.join(runs.kinds)}) among: {listed}; "
+            f"record one, or give a {runs.of('validate')[0].run} run to train on"
+        )
     refuse_several_machines(motions)
     return runs

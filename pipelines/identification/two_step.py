@@ -36,6 +36,7 @@ BIASED = (
     f"{IN_WORDS}, which lets every fit take the machine for too light; set filter.cutoff_hz = {CUTOFF_HZ:g}, and see "
     "to encoder counts and time stamps"
 )
+SLOWLY = f"{IN_WORDS}, so that nothing above {CUTOFF_HZ:g} Hz is fitted or scored, as in the diagnosis"
 STEP = 0.25
 """Standard errors by which a shape is moved to see what the values make of it."""
 ROUNDS, RESTS = 3, 1e-3
@@ -140,7 +141,7 @@ def identify(
         parameters=table,
         covariance=covariance,
         one_step=np.array([row.value for row in rows(training, estimator.fit(everything).values)]),
-        validation=validate(judged, lambda run: _found(training, values, run)),
+        validation=validate(judged, lambda run: _found(training, values, run), training.cutoff_hz),
         runs=(*training.runs, *judged),
         training=training,
         values=values,
@@ -156,8 +157,9 @@ def identify(
             *(f"{kind}: {remark}" for kind, step in steps.items() for remark in step.fit.remarks),
             *upside_down(table, runs.motions[0].machine),
             *extension.remarks,
+            *[SLOWLY] * (training.cutoff_hz is not None),
         ],
-        angle_noise=[BIASED] * is_loud(training.runs),
+        angle_noise=[BIASED] * (training.cutoff_hz is None and is_loud(training.runs)),
     )
 
 
@@ -167,12 +169,14 @@ def _training(runs: Runs, extension: Extension, reversals: bool) -> Training:
     plain = _baseline(runs)
     model = Model((*plain, *extension.terms))
     own = {file: (*plain, *terms) for file, terms in extension.own.items()}
-    training = Training(train, model, own, reversals=reversals)
     if not extension.terms:
-        return training
+        return Training(train, model, reversals=reversals)
+    train = tuple(run.whole() for run in train)
+    cutoff_hz = CUTOFF_HZ if is_loud(train) else None
+    training = Training(train, model, own, reversals=reversals, cutoff_hz=cutoff_hz)
     bodies = dict(extension.bodies)
     if not set(runs.kinds) <= set(bodies):
-        alone = Training(tuple(run.whole() for run in train), plain, reversals=reversals)
+        alone = Training(train, plain, reversals=reversals, cutoff_hz=cutoff_hz)
         bodies = _bodies(alone, _values(_in_steps(alone, WeightedLeastSquares())))
     for _ in range(ROUNDS):
         before = bodies

@@ -53,15 +53,15 @@ ModelOf = Callable[[Run], Model | None]
 """Returns the model of a run, None where its kind has none."""
 
 
-def validate(motions: Sequence[Run], model_of: ModelOf) -> Validation:
-    """Score each run's model on it, by kind of run; runs without one are left out."""
+def validate(motions: Sequence[Run], model_of: ModelOf, cutoff_hz: float | None = None) -> Validation:
+    """Score each run's model on it, by kind of run; runs without one are left out, and what is above a cut-off."""
     joints = motions[0].joints
     sums: dict[str, _Sums] = {}
     for motion in motions:
         model = model_of(motion)
         if model is not None:
             before = sums.get(motion.run, _Sums.none(len(joints)))
-            of_run = (_Sums.of(r, residual_of(r, model.linear_values)) for r in regressions(motion, model))
+            of_run = (_Sums.of(r, residual_of(r, model.linear_values)) for r in regressions(motion, model, cutoff_hz))
             sums[motion.run] = sum(of_run, before)
     pooled = sum(sums.values(), _Sums.none(len(joints)))
     return Validation(joints=joints, pooled=pooled.score(), by_run={run: s.score() for run, s in sums.items()})
@@ -108,7 +108,9 @@ def _root(squares: NDArray, count: int) -> NDArray:
     return np.sqrt(squares / count) if count else np.full(len(squares), np.nan)
 
 
-def residuals(motions: Sequence[Run], model_of: ModelOf, name: str) -> Iterator[pa.Table]:
+def residuals(
+    motions: Sequence[Run], model_of: ModelOf, name: str, cutoff_hz: float | None = None
+) -> Iterator[pa.Table]:
     """Yield the rows of ``residuals/1``, piece by piece, of all runs that have a model.
 
     ``name`` is ``baseline`` or ``extended``.
@@ -116,7 +118,7 @@ def residuals(motions: Sequence[Run], model_of: ModelOf, name: str) -> Iterator[
     for motion in motions:
         model = model_of(motion)
         if model is not None:
-            for r in regressions(motion, model):
+            for r in regressions(motion, model, cutoff_hz):
                 yield _residual_rows(r, motion, model, name)
 
 

@@ -71,7 +71,7 @@ class Model:
 
 def models(session: Session) -> list[Model]:
     """Return every model of a session, those of ``exoid identify`` first."""
-    made = [(one, "Named causes, refitted" if one.causes else "Rigid body and friction") for one in session.identified]
+    made = [(one, f"With {one.besides}" if one.besides else "Rigid body and friction") for one in session.identified]
     if session.extended:
         named = bool(session.verdict and session.verdict["causes"])
         made.append((session.extended, "Extended by the named causes" if named else "As the diagnosis fitted it"))

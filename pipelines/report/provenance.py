@@ -255,6 +255,7 @@ def _identify(session: Session, artifact: Artifact) -> Words | None:
     causes = [_path_of(session, artifact.causes)] if artifact.causes else []
     runs = [path for path in _inputs(session, artifact) if path not in causes]
     told = [word for path in causes for word in ("--causes", path)]
+    told += [word for label in artifact.effects for word in ("--effect", label)]
     return ["identify", *runs, *told, *config, "-o", _folder(artifact.path)], needs
 
 

@@ -41,8 +41,23 @@ class Artifact:
     @property
     def causes(self) -> dict[str, str] | None:
         """Name and hash of the diagnosis' file whose causes a model refits; None of any other."""
-        method = self.metadata.get("method")
-        return method.get("causes") if isinstance(method, dict) else None
+        return self.method.get("causes")
+
+    @property
+    def effects(self) -> list[str]:
+        """Labels of what a model was told to have beside rigid body and friction."""
+        return list(self.method.get("effects") or [])
+
+    @property
+    def besides(self) -> str:
+        """What a model of ``exoid identify`` has beside rigid body and friction, in words; nothing of a baseline."""
+        return ", ".join([*(["the named causes, refitted"] if self.causes else []), *self.effects])
+
+    @property
+    def method(self) -> dict[str, Any]:
+        """How a model was found."""
+        told = self.metadata.get("method")
+        return told if isinstance(told, dict) else {}
 
     def is_made_of(self, other: "Artifact") -> bool:
         """Tell whether the other file, byte for byte, is one of its inputs."""
@@ -132,14 +147,14 @@ class Session:
 
     @cached_property
     def identified(self) -> list[Artifact]:
-        """The other models, as ``exoid identify`` writes them: the baselines, then what refits a diagnosis' causes."""
+        """The other models, as ``exoid identify`` writes them: the baselines, then those that have more."""
         others = [one for one in self.of_kind("parameters") if one is not self.extended]
-        return sorted(others, key=lambda one: one.causes is not None)
+        return sorted(others, key=lambda one: bool(one.besides))
 
     @property
     def baselines(self) -> list[Artifact]:
-        """The models that no diagnosis has told of."""
-        return [one for one in self.identified if one.causes is None]
+        """Those of rigid body and friction alone."""
+        return [one for one in self.identified if not one.besides]
 
     @cached_property
     def residuals(self) -> Table | None:

@@ -25,12 +25,6 @@ class IdentifySettings(Settings):
         description="Estimator of both steps; docs/estimators.md says which to use when. Instrumental variables need "
         "set-points in the recording; they and output error hold whole runs in memory.",
     )
-    effects: tuple[str, ...] = Field(
-        (),
-        description='What the model has beside rigid body and friction, as "rotor_inertia@knee" or '
-        '"torque_offset@hip": effects whose torque is linear in all that is not known of them. Whole runs are then '
-        "held in memory.",
-    )
     reversals: bool = Field(
         False,
         description="Fit samples near a joint's reversals, too. No friction of the model describes what is there, so "

@@ -3,6 +3,7 @@ from typing import get_args
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -292,12 +293,65 @@ def test_what_a_diagnosis_named_is_fitted_with_its_shapes_held_beside_the_fit_wi
     assert outcome.code == 0, outcome.err
 
 
-def test_the_settings_can_name_effects_and_ask_for_every_sample(exoid, recordings, tmp_path):
-    chosen = '[identify]\nfigures = false\neffects = ["rotor_inertia@knee"]\nreversals = true\n'
-    (tmp_path / "exoid.toml").write_text(chosen)
-    outcome = exoid("identify", *sorted(recordings.iterdir()), "-o", tmp_path, "--config", tmp_path / "exoid.toml")
+def test_every_sample_can_be_asked_for_and_effects_by_their_names(exoid, recordings, tmp_path):
+    (tmp_path / "exoid.toml").write_text("[identify]\nfigures = false\nreversals = true\n")
+    asked = (*sorted(recordings.iterdir()), "--config", tmp_path / "exoid.toml", "--effect", "rotor_inertia@knee")
+    outcome = exoid("identify", *asked, "-o", tmp_path)
     assert outcome.code == 0, outcome.err
     assert "knee J" in outcome.out
-    found = PARAMETERS.read(tmp_path / "parameters.parquet").metadata
-    assert found["method"]["samples"] == "all"
-    assert found["config"]["identify"]["effects"] == ["rotor_inertia@knee"]
+    found = PARAMETERS.read(tmp_path / "parameters.parquet").metadata["method"]
+    assert found["samples"] == "all"
+    assert found["effects"] == ["rotor_inertia@knee"]
+    outcome = exoid("identify", *asked)
+    assert outcome.code == 2
+    assert "--effect: no folder is given" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (lambda f: pd.concat([f, f.tail(1)], ignore_index=True), "row 17 tells stiffness of joint_elasticity again"),
+        (lambda f: f.assign(std_error=-0.1), "column std_error, row 0: found -0.1, expected 0 or more"),
+        (lambda f: f.assign(effect=f["effect"].replace("joint_elasticity", "joint_elastic")), "there is no effect"),
+    ],
+)
+def test_a_damaged_table_of_causes_is_refused_with_its_name(exoid, recordings, tmp_path, damage, said):
+    files = sorted(recordings.iterdir())
+    (tmp_path / "exoid.toml").write_text("[identify]\nfigures = false\n")
+    given = ("--config", tmp_path / "exoid.toml")
+    assert exoid("identify", *files, "-o", tmp_path / "plain", *given).code == 0
+    plain = PARAMETERS.read(tmp_path / "plain" / "parameters.parquet")
+    metadata = {key: value for key, value in plain.metadata.items() if key not in ("covariance", "contract")}
+    elastic = plain.frame.iloc[[0]].assign(
+        name="stiffness", joint="knee", run=None, value=900.0, effect="joint_elasticity", step="extension"
+    )  # fmt: skip
+    frame = damage(pd.concat([plain.frame, elastic], ignore_index=True))
+    table = pa.Table.from_pandas(frame, preserve_index=False)
+    about = {b"exoid": json.dumps(metadata | {"contract": "parameters/1"}).encode()}
+    pq.write_table(table.replace_schema_metadata(about), tmp_path / "named.parquet")
+    outcome = exoid("identify", *files, "-o", tmp_path / "out", "--causes", tmp_path / "named.parquet", *given)
+    assert outcome.code == 2
+    assert f"{tmp_path / 'named.parquet'}" in outcome.err
+    assert said in outcome.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_causes_own_folder_is_no_place_for_a_refit(exoid, recordings, tmp_path):
+    files = sorted(recordings.iterdir())
+    (tmp_path / "exoid.toml").write_text("[identify]\nfigures = false\n")
+    given = ("--config", tmp_path / "exoid.toml")
+    assert exoid("identify", *files, "-o", tmp_path / "plain", *given).code == 0
+    causes = tmp_path / "plain" / "parameters.parquet"
+    before = causes.read_bytes()
+    outcome = exoid("identify", *files, "-o", tmp_path / "plain", "--causes", causes, *given)
+    assert outcome.code == 2
+    assert "would be overwritten" in outcome.err
+    assert causes.read_bytes() == before
+
+
+def test_runs_to_validate_on_are_of_a_kind_that_is_trained_on(exoid, recordings, tmp_path):
+    outcome = exoid(
+        "identify", recordings / "exo_alone_train.parquet", recordings / "with_human_validate.parquet", "-o", tmp_path
+    )
+    assert outcome.code == 2
+    assert "found no run to validate on of a kind that is trained on (exo_alone)" in outcome.err

@@ -314,10 +314,10 @@ def test_the_table_tells_the_model_that_was_fitted(tared, tmp_path):
 @pytest.mark.parametrize(
     ("label", "said"),
     [
-        ("encoder_offset@hip", r"identify\.effects: found encoder_offset@hip, expected coulomb_asymmetry@hip or "),
-        ("friction@hip", r"identify\.effects: found friction@hip, expected"),
-        ("cogging@knee", r"identify\.effects: found cogging@knee, expected"),
-        ("torque_offset@ankle", r"identify\.effects: found torque_offset@ankle, expected"),
+        ("encoder_offset@hip", r"--effect: found encoder_offset@hip, expected coulomb_asymmetry@hip or "),
+        ("friction@hip", r"--effect: found friction@hip, expected"),
+        ("cogging@knee", r"--effect: found cogging@knee, expected"),
+        ("torque_offset@ankle", r"--effect: found torque_offset@ankle, expected"),
     ],
 )
 def test_what_cannot_be_fitted_by_its_name_alone_is_refused(label, said):

@@ -93,7 +93,7 @@ def test_a_refit_of_the_causes_is_called_that_and_taken_for_no_baseline(tmp_path
     session = find([tmp_path])
     assert [model.title for model in models(session)] == [
         "Rigid body and friction",
-        "Named causes, refitted",
+        "With the named causes, refitted",
         "Extended by the named causes",
     ]
     assert [one.path.parent.name for one in session.baselines] == ["identified"]
