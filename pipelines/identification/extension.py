@@ -39,7 +39,7 @@ class Extension:
     own: Mapping[str, tuple[Term | None, ...]] = field(default_factory=dict)
     """By a run's file, the terms as they are there; None of what never came."""
     bodies: Mapping[str, NDArray] = field(default_factory=dict)
-    """By kind of run, and ``human``: the rigid bodies, (k,), whose loads the shapes were found with."""
+    """By kind of run, and ``human``: the rigid bodies, (k,), that a diagnosis found beside them; empty without one."""
     recordings: Mapping[str, str] = field(default_factory=dict)
     """By a run's file, the hash of its recording."""
     remarks: tuple[str, ...] = ()

@@ -39,7 +39,7 @@ BIASED = (
 SLOWLY = f"{IN_WORDS}, so that nothing above {CUTOFF_HZ:g} Hz is fitted or scored, as in the diagnosis"
 STEP = 0.25
 """Standard errors by which a shape is moved to see what the values make of it."""
-ROUNDS, RESTS = 3, 1e-3
+ROUNDS, RESTS = 5, 1e-3
 """In which loads follow the rigid bodies that they are of, and the relative change at which these are at rest."""
 
 Found = TypeVar("Found", bound=Fit, covariant=True)
@@ -169,7 +169,7 @@ def _training(runs: Runs, extension: Extension, reversals: bool) -> Training:
     plain = _baseline(runs)
     model = Model((*plain, *extension.terms))
     own = {file: (*plain, *terms) for file, terms in extension.own.items()}
-    if not extension.terms:
+    if not extension.terms and not extension.bodies:
         return Training(train, model, reversals=reversals)
     train = tuple(run.whole() for run in train)
     cutoff_hz = CUTOFF_HZ if is_loud(train) else None

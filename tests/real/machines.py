@@ -18,6 +18,7 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.read import read_motions
 from pipelines.model import Model, Term, baseline, model_from_parameters, term_from
+from pipelines.own_values import with_own_values
 from pipelines.settings.datasets import datasets
 from pipelines.settings.filter import FilterSettings
 from pipelines.signals.low_pass import ORDER
@@ -122,17 +123,20 @@ class Diagnosed:
         rms = np.array([np.sqrt(np.mean(here[f"{joint}_residual_nm"] ** 2)) for joint in motion.joints])
         return TorqueError(rms, error.percent * rms / error.rms)
 
-    def identify(self, name: str, *asked: str) -> Model:
-        """Return what ``exoid identify`` finds, asked for something besides, in a folder of some ``name``."""
-        recorded = [str(self.folder.parent / "recordings" / motion.file) for motion in self.motions]
-        out = self.folder.parent / name
-        _exoid("identify", *recorded, "-o", str(out), *asked)
-        return model_from_parameters(
-            PARAMETERS.read(out / "parameters.parquet").frame, self.motions[0].run, self.motions[0].machine
-        )
+    def identify(self, name: str, *asked: str) -> dict[str, Model]:
+        """Return what ``exoid identify`` finds, asked for something besides, of each run by its file.
 
-    def identified(self) -> Model:
-        """Return the named causes as ``exoid identify`` fits them to every sample, those near reversals too."""
+        ``name`` is that of a folder for it.
+        """
+        recorded = {motion.file: self.folder.parent / "recordings" / motion.file for motion in self.motions}
+        out = self.folder.parent / name
+        _exoid("identify", *map(str, recorded.values()), "-o", str(out), *asked)
+        table = PARAMETERS.read(out / "parameters.parquet")
+        model = model_from_parameters(table.frame, self.motions[0].run, self.motions[0].machine)
+        return {file: with_own_values(model, table, path)[0] for file, path in recorded.items()}
+
+    def identified(self) -> dict[str, Model]:
+        """Return what is named as ``exoid identify`` fits it to every sample, those near reversals too."""
         return self.identify("refitted", "--causes", str(self.folder / "parameters.parquet"), "--reversals")
 
     def refitted(self, order: int = ORDER) -> dict[str, Model]:
@@ -186,7 +190,7 @@ def with_rotor(motion: Motion) -> Model:
     return Model(tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects))
 
 
-def symmetric(d: Diagnosed) -> Model:
+def symmetric(d: Diagnosed) -> dict[str, Model]:
     """Return rigid body, friction and each drive's offset as ``exoid identify`` fits them to every sample."""
     offsets = [word for name in d.motions[0].joints for word in ("--effect", f"torque_offset@{name}")]
     return d.identify("symmetric", *offsets, "--reversals")

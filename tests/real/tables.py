@@ -53,7 +53,7 @@ def emps(found: Mapping[str, Diagnosed]) -> str:
     """Return parameters and errors beside the published ones."""
     d = found["emps"]
     (train,), (pulses,) = of_purpose(d.motions, "train"), of_purpose(d.motions, "validate")
-    plain = symmetric(d)
+    plain, named = symmetric(d)[train.file], d.identified()[train.file]
     values = dict(zip((p.symbol for _, p in plain.linear_parameters), plain.linear_values, strict=True))
     rows = [
         (symbol, f"{theirs:.4f}", f"{values[symbol]:.4f}", f"{100 * (values[symbol] / theirs - 1):+.2f} %")
@@ -63,7 +63,7 @@ def emps(found: Mapping[str, Diagnosed]) -> str:
         ("symmetric friction", plain, "symmetric"),
         ("the same, fitted behind this filter", fitted(plain, train), "symmetric"),
         ("what diagnose names, its own values", d.model, "asymmetric"),
-        ("what diagnose names, refitted by identify", d.identified(), "asymmetric"),
+        ("what diagnose names, refitted by identify", named, "asymmetric"),
         ("the same, refitted behind this filter", fitted(d.model, train), "asymmetric"),
     ]
     where = [
@@ -93,7 +93,7 @@ def pendulum(found: Sequence[Diagnosed], published: Path) -> str:
     rows = []
     for d in found:
         trained = of_purpose(d.motions, "train")
-        plain, refitted = slow_fit(with_rotor(d.motions[0]), trained), d.refitted()
+        plain, refitted = slow_fit(with_rotor(d.motions[0]), trained), d.identified()
         for motion in d.motions:
             made = [
                 *(slow_error(torque, motion) for torque in (their_torque(theirs, motion), plain.torque(motion))),
