@@ -12,7 +12,9 @@ from pipelines.diagnosis.fit import Fit
 from pipelines.diagnosis.gain import scored
 from pipelines.diagnosis.observations import Baseline, Run
 from pipelines.diagnosis.uncertainty import Uncertainty
+from pipelines.effects import Effect
 from pipelines.effects.rigid_body import RigidBody
+from pipelines.estimation.parameter_table import Row, interval, table_of
 
 
 def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.DataFrame, NDArray]:
@@ -20,66 +22,38 @@ def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.Data
 
     A rigid body for each kind of run, and the human's.
     """
-    rows: list[dict[str, Any]] = []
-    maps: list[NDArray] = []
-    size = len(sure.covariance)
-    values = np.zeros(size)
-    values[: len(fit.values)] = fit.values
-
-    def add(effect: str, name: str, symbol: str, unit: str, joint: str | None, run: str | None, step: str,
-            slope: NDArray, value: float) -> None:  # fmt: skip
-        rows.append({"name": name, "symbol": symbol, "joint": joint, "run": run, "value": value, "unit": unit,
-                     "step": step, "effect": effect})  # fmt: skip
-        maps.append(slope)
-
+    size, machine = len(sure.covariance), baseline.machine
+    units = np.eye(size)
+    values = np.append(fit.values, np.zeros(size - len(fit.values)))
+    rows: list[Row] = []
     for run, bodies in _bodies(baseline).items():
-        for i, p in enumerate(RigidBody(on=baseline.machine).linear):
-            slope = np.zeros(size)
-            slope[[b * baseline.body + i for b in bodies]] = 1.0
-            add("rigid_body", p.name, p.symbol, p.unit, None, run, "inertia", slope, float(slope @ values))
+        for i, p in enumerate(RigidBody(on=machine).linear):
+            slope = units[[b * baseline.body + i for b in bodies]].sum(axis=0)
+            rows.append(Row(RigidBody(run=run, on=machine), p, "inertia", float(slope @ values), slope))
     at = baseline.body * len(baseline.bodies)
     for effect in baseline.beside_bodies:
-        step = "extension" if effect in baseline.known else "friction"
         places = np.arange(at, at + len(effect.linear))
         held = effect.completed(values[places])
-        slopes = effect.jacobian(held)[:, : len(places)] @ np.eye(size)[places]
-        for p, value, slope in zip(effect.parameters, effect.physical(held), slopes, strict=True):
-            add(effect.name, p.name, p.symbol, p.unit, effect.joint, None, step, slope, float(value))
+        slopes = effect.jacobian(held)[:, : len(places)] @ units[places]
+        step = "extension" if effect in baseline.known else "friction"
+        rows += _rows_of(effect, step, effect.physical(held), slopes)
         at += len(effect.linear)
-    one_way = [False] * len(rows) + [p.typical[0] >= 0 for cause in fit.causes for p in cause.effect.parameters]
     onsets: dict[int, tuple[float, float]] = {}
     for number, cause in enumerate(fit.causes):
-        effect = cause.effect
         first = fit.acting(cause)[0]
         onsets |= {len(rows) + at: ends for at, ends in _onsets(fit, sure, number, first).items()}
-        for p, value, slope in zip(effect.parameters, *_in_run(fit, sure, number, first), strict=True):
-            add(effect.name, p.name, p.symbol, p.unit, effect.joint, effect.run, "extension", slope, float(value))
-    frame = pd.DataFrame(rows)
-    T = np.array(maps)
+        rows += _rows_of(cause.effect, "extension", *_in_run(fit, sure, number, first))
+    T = np.array([row.slope for row in rows])
     covariance = T @ sure.covariance @ T.T
-    frame["std_error"] = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    ends = _ends(frame["value"].to_numpy(), frame["std_error"].to_numpy(), sure, np.array(one_way), onsets)
-    frame["ci95_low"], frame["ci95_high"] = ends.T
-    own = {(c.effect.name, c.effect.joint, p.name) for c in fit.causes for p in c.effect.parameters if p.per_run}
-    if own:
-        frame["each_run"] = [row in own for row in zip(frame["effect"], frame["joint"], frame["name"], strict=True)]
+    frame = table_of(rows, np.sqrt(np.maximum(np.diag(covariance), 0.0)), sure.critical)
+    for row, ends in onsets.items():
+        frame.loc[row, ["ci95_low", "ci95_high"]] = ends
     return frame, covariance
 
 
-def _ends(
-    value: NDArray, error: NDArray, sure: Uncertainty, one_way: NDArray, onsets: Mapping[int, tuple[float, float]]
-) -> NDArray:
-    """Return the ends of 95 % intervals of values (p,) with standard errors (p,): (p, 2).
-
-    What is ``one_way``, play, a stiffness or a time constant, is never negative, however little is known of it.
-    ``onsets`` have ends of their own, by their place.
-    """
-    half = sure.critical * error
-    low = value - half
-    ends = np.stack([np.where(one_way, np.minimum(np.maximum(low, 0.0), value), low), value + half], axis=1)
-    for at, own in onsets.items():
-        ends[at] = own
-    return ends
+def _rows_of(effect: Effect, step: str, values: NDArray, slopes: NDArray) -> list[Row]:
+    """Return the rows of an effect whose ``parameters`` have some values, (p,), and slopes, (p, size)."""
+    return [Row(effect, *one) for one in zip(effect.parameters, [step] * len(values), values, slopes, strict=True)]
 
 
 def _onsets(fit: Fit, sure: Uncertainty, number: int, run: int) -> dict[int, tuple[float, float]]:
@@ -116,7 +90,10 @@ def values_in_run(fit: Fit, sure: Uncertainty, number: int, run: int) -> tuple[N
     values, slopes = _in_run(fit, sure, number, run)
     error = np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", slopes, sure.covariance, slopes), 0.0))
     one_way = np.array([p.typical[0] >= 0 for p in fit.causes[number].effect.parameters])
-    return values, _ends(values, error, sure, one_way, _onsets(fit, sure, number, run))
+    ends = interval(values, sure.critical * error, one_way)
+    for at, own in _onsets(fit, sure, number, run).items():
+        ends[at] = own
+    return values, ends
 
 
 def residual_rows(run: Run, residual: NDArray, model: str) -> pd.DataFrame:

@@ -1,29 +1,15 @@
 """The rows of ``parameters/1`` that an identification writes, and how each goes with what was fitted and held."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
-from pipelines.effects import Effect, Parameter
 from pipelines.effects.friction import Friction
 from pipelines.effects.rigid_body import RigidBody
+from pipelines.estimation.parameter_table import Row
 from pipelines.estimation.problem import Training
 from pipelines.model import BASELINE, Term
-
-
-@dataclass(frozen=True)
-class Row:
-    """One row of ``parameters/1``."""
-
-    effect: Effect
-    parameter: Parameter
-    step: str
-    value: float
-    slope: NDArray
-    """(p + s,) how it changes with the training's columns and the shapes that are held."""
 
 
 def rows(training: Training, values: NDArray) -> Iterator[Row]:
@@ -73,33 +59,3 @@ def _rows_of(term: Term, slope: NDArray, step: str) -> Iterator[Row]:
     slopes = effect.jacobian(term.values) @ slope
     for parameter, value, of_parameter in zip(effect.parameters, effect.physical(term.values), slopes, strict=True):
         yield Row(effect, parameter, step, float(value), of_parameter)
-
-
-def table_of(told: Sequence[Row], covariance: NDArray, critical: NDArray) -> pd.DataFrame:
-    """Return ``parameters/1`` of r rows with their covariance (r, r) and half-widths (r,) in standard errors.
-
-    What has no variance was held, and has no error. What is one way, as play or a stiffness of a cause, is never
-    negative, however little is known of it.
-    """
-    value = np.array([row.value for row in told])
-    variance = np.diag(covariance)
-    error = np.where(variance > 0.0, np.sqrt(np.maximum(variance, 0.0)), np.nan)
-    one_way = np.array([row.step == "extension" and row.parameter.typical[0] >= 0 for row in told])
-    low = value - critical * error
-    table = pd.DataFrame(
-        {
-            "name": [row.parameter.name for row in told],
-            "symbol": [row.parameter.symbol for row in told],
-            "joint": [row.effect.joint for row in told],
-            "run": [row.effect.run for row in told],
-            "value": value,
-            "unit": [row.parameter.unit for row in told],
-            "std_error": error,
-            "ci95_low": np.where(one_way, np.minimum(np.maximum(low, 0.0), value), low),
-            "ci95_high": value + critical * error,
-            "step": [row.step for row in told],
-            "effect": [row.effect.name for row in told],
-        }
-    )
-    own = [row.parameter.per_run for row in told]
-    return table.assign(each_run=own) if any(own) else table

@@ -22,10 +22,11 @@ from pipelines.estimation.angle_noise import CUTOFF_HZ, IN_WORDS, is_loud
 from pipelines.estimation.collinearity import collinearities
 from pipelines.estimation.estimator import Estimate, Estimator, Fit, estimated
 from pipelines.estimation.least_squares import WeightedLeastSquares
+from pipelines.estimation.parameter_table import Row, table_of
 from pipelines.estimation.problem import Problem, Training
 from pipelines.estimation.regression import mask_in_words
 from pipelines.identification.extension import Extension
-from pipelines.identification.parameter_rows import Row, rows, table_of
+from pipelines.identification.parameter_rows import rows
 from pipelines.identification.runs import Runs, checked
 from pipelines.identification.validation import Validation, validate
 from pipelines.mechanics.run import Run
@@ -135,7 +136,8 @@ def identify(
     values = _values(steps)
     told = list(rows(training, values))
     covariance = _covariance(told, steps, extension, training)
-    table = table_of(told, covariance, _critical(told, steps, extension))
+    error = np.sqrt(np.diag(covariance))
+    table = table_of(told, np.where(error > 0.0, error, np.nan), _critical(told, steps, extension))
     everything = Problem(training, runs.kinds, np.arange(len(values)), np.zeros(len(values)))
     return Identified(
         parameters=table,
