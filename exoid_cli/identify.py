@@ -85,6 +85,8 @@ def identify(
     if (causes or effect) and output is None:
         option = "--causes" if causes else "--effect"
         raise InputError(f"{option}: no folder is given; name one with -o, for identified/ is of the model without")
+    if output and (output / "verdict.json").exists():
+        raise InputError(f"-o: {output} holds a diagnosis, which would be overwritten; name another folder")
     if causes and output and (output / "parameters.parquet").resolve() == causes.resolve():
         raise InputError(f"-o: {output} is the folder of {causes}, which would be overwritten; name another folder")
     files, output = inputs_and_folder("identify", files, output, config, "no motion is given")

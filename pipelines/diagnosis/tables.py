@@ -12,7 +12,6 @@ from pipelines.diagnosis.fit import Fit
 from pipelines.diagnosis.gain import scored
 from pipelines.diagnosis.observations import Baseline, Run
 from pipelines.diagnosis.uncertainty import Uncertainty
-from pipelines.effects import Effect
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.estimation.parameter_table import Row, interval, table_of
 
@@ -36,24 +35,21 @@ def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.Data
         held = effect.completed(values[places])
         slopes = effect.jacobian(held)[:, : len(places)] @ units[places]
         step = "extension" if effect in baseline.known else "friction"
-        rows += _rows_of(effect, step, effect.physical(held), slopes)
+        fitted = zip(effect.parameters, effect.physical(held), slopes, strict=True)
+        rows += [Row(effect, p, step, float(value), slope) for p, value, slope in fitted]
         at += len(effect.linear)
     onsets: dict[int, tuple[float, float]] = {}
     for number, cause in enumerate(fit.causes):
         first = fit.acting(cause)[0]
         onsets |= {len(rows) + at: ends for at, ends in _onsets(fit, sure, number, first).items()}
-        rows += _rows_of(cause.effect, "extension", *_in_run(fit, sure, number, first))
+        of_first = zip(cause.effect.parameters, *_in_run(fit, sure, number, first), strict=True)
+        rows += [Row(cause.effect, p, "extension", value, slope, p.typical[0] >= 0) for p, value, slope in of_first]
     T = np.array([row.slope for row in rows])
     covariance = T @ sure.covariance @ T.T
     frame = table_of(rows, np.sqrt(np.maximum(np.diag(covariance), 0.0)), sure.critical)
     for row, ends in onsets.items():
         frame.loc[row, ["ci95_low", "ci95_high"]] = ends
     return frame, covariance
-
-
-def _rows_of(effect: Effect, step: str, values: NDArray, slopes: NDArray) -> list[Row]:
-    """Return the rows of an effect whose ``parameters`` have some values, (p,), and slopes, (p, size)."""
-    return [Row(effect, *one) for one in zip(effect.parameters, [step] * len(values), values, slopes, strict=True)]
 
 
 def _onsets(fit: Fit, sure: Uncertainty, number: int, run: int) -> dict[int, tuple[float, float]]:

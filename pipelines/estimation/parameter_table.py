@@ -20,11 +20,8 @@ class Row:
     value: float
     slope: NDArray
     """How it changes with what the covariance is of."""
-
-    @property
-    def one_way(self) -> bool:
-        """Whether it is of a cause, and never negative."""
-        return self.step == "extension" and self.parameter.typical[0] >= 0
+    one_way: bool = False
+    """Whether its interval ends at nought: of a cause that is there, as play or a stiffness."""
 
 
 def table_of(rows: Sequence[Row], error: NDArray, critical: NDArray | float) -> pd.DataFrame:

@@ -113,7 +113,8 @@ def named(table: Table, runs: Sequence[Run], recordings: Sequence[Path]) -> Exte
     own, hashes = {}, {}
     for run, path in zip(runs, recordings, strict=True) if any(term.effect.per_run for term in terms) else ():
         this = hashes[run.file] = recording_behind(path)
-        own[run.file] = tuple(own_term(term, table, this) for term in terms)
+        with about(table.path):
+            own[run.file] = tuple(own_term(term, table, this) for term in terms)
         remarks += _about(run, path, [term for term in terms if term.effect.acts(run.run)], table, this)
     return Extension(
         terms, _of_shapes(table, acting), _critical(table), own, _bodies(table), hashes, tuple(dict.fromkeys(remarks))

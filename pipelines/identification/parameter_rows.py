@@ -44,7 +44,8 @@ def _sloped(training: Training, values: NDArray) -> Iterator[tuple[Term, NDArray
         for k in range(len(term.shape)):
             slope[len(linear) + k, shape + k] = 1.0
         shape += len(term.shape)
-        yield Term(term.effect, np.append(linear, term.shape)), slope
+        had = training.terms_of(having)[i] if having else None
+        yield Term(term.effect, np.append(linear, term.shape if had is None else had.shape)), slope
 
 
 def _of_body(bodies: Sequence[tuple[Term, NDArray]], run: str, step: str) -> Iterator[Row]:
@@ -58,4 +59,5 @@ def _rows_of(term: Term, slope: NDArray, step: str) -> Iterator[Row]:
     effect = term.effect
     slopes = effect.jacobian(term.values) @ slope
     for parameter, value, of_parameter in zip(effect.parameters, effect.physical(term.values), slopes, strict=True):
-        yield Row(effect, parameter, step, float(value), of_parameter)
+        one_way = parameter in effect.shape and parameter.typical[0] >= 0
+        yield Row(effect, parameter, step, float(value), of_parameter, one_way)

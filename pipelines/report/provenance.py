@@ -8,6 +8,7 @@ from typing import Any
 
 from pipelines.report.session import Artifact, Session, simulated
 from pipelines.settings import Experiment
+from pipelines.settings.identify import IdentifySettings
 
 SECTIONS = ("mechanism", "design", "filter", "identify", "simulate")
 """Sections of exoid.toml that a stage's file repeats; runs and rigs stand in the recordings."""
@@ -256,6 +257,10 @@ def _identify(session: Session, artifact: Artifact) -> Words | None:
     runs = [path for path in _inputs(session, artifact) if path not in causes]
     told = [word for path in causes for word in ("--causes", path)]
     told += [word for label in artifact.effects for word in ("--effect", label)]
+    asked = resolved(artifact).get("identify") or {}
+    if asked.get("method", IdentifySettings().method) != IdentifySettings().method:
+        told += ["--method", asked["method"]]
+    told += ["--reversals"] * bool(asked.get("reversals"))
     return ["identify", *runs, *told, *config, "-o", _folder(artifact.path)], needs
 
 

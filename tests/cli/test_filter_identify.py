@@ -347,6 +347,11 @@ def test_the_causes_own_folder_is_no_place_for_a_refit(exoid, recordings, tmp_pa
     assert outcome.code == 2
     assert "would be overwritten" in outcome.err
     assert causes.read_bytes() == before
+    (tmp_path / "plain" / "verdict.json").write_text("{}")
+    outcome = exoid("identify", *files, "-o", tmp_path / "plain", "--effect", "rotor_inertia@knee", *given)
+    assert outcome.code == 2
+    assert "holds a diagnosis" in outcome.err
+    assert causes.read_bytes() == before
 
 
 def test_runs_to_validate_on_are_of_a_kind_that_is_trained_on(exoid, recordings, tmp_path):

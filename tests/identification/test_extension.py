@@ -342,3 +342,15 @@ def test_a_diagnosis_of_another_machine_is_refused(tared, tmp_path):
     other = replace(table, metadata=table.metadata | {"joints": [{"name": "axis", "kind": "prismatic"}]})
     with pytest.raises(InputError, match=r"with the joints axis \(prismatic\), the runs are of a leg with hip \(rev"):
         named(other, runs, files)
+
+
+def test_rows_of_what_each_run_has_for_itself_are_all_of_the_first_run_that_was_trained_on(noiseless_motions):
+    """The diagnosis' own first run may not be among them."""
+    zeros = {motion.file: zero for motion, zero in zip(noiseless_motions, (0.03, -0.02, 0.05, 0.01), strict=True)}
+    runs = [replace(motion, q=motion.q + np.array([zeros[motion.file], 0.0])) for motion in noiseless_motions]
+    effect = EncoderOffset("hip", each_run=True)
+    own = {file: (Term(effect, np.array([zero])),) for file, zero in zeros.items()}
+    found = identify(runs, extension=Extension((Term(effect, np.array([0.2])),), own=own))
+    last = found.parameters.iloc[-1]
+    assert (last["effect"], last["value"]) == ("encoder_offset", zeros["exo_alone_train.parquet"])
+    assert found.validation.pooled.rmse.max() < 0.05
