@@ -71,8 +71,8 @@ def identify(
       exoid identify
       exoid identify motions/*.parquet -o identified/
       exoid identify motions/*.parquet -o iv/ --method instrumental_variables
-      exoid identify recordings/*.parquet -o refitted/ --causes diagnosed/parameters.parquet
-      exoid identify recordings/*.parquet -o rotor/ --effect rotor_inertia@knee
+      exoid identify -o refitted/ --causes diagnosed/parameters.parquet
+      exoid identify motions/*.parquet -o rotor/ --effect rotor_inertia@knee
     """
     from pipelines.contracts import PARAMETERS, RESIDUALS, describe
     from pipelines.estimation.estimators import estimator_named

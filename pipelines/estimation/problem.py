@@ -116,7 +116,7 @@ class Training:
         return run.whole().loaded(*self.bodies[run.run]) if self.bodies else run
 
     def with_bodies(self, bodies: Mapping[str, tuple[NDArray, NDArray]]) -> "Training":
-        """Return the same with the loads of other rigid bodies."""
+        """Return the same with the loads of other rigid bodies, (k,) each."""
         made = replace(self, bodies=bodies)
         return replace(made, runs=tuple(made.loaded(run) for run in self.runs))
 

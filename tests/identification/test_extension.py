@@ -85,7 +85,7 @@ def test_the_sizes_of_effects_that_are_named_are_recovered_and_the_body_with_the
 def test_the_truth_of_an_extension_lies_in_its_intervals_95_times_in_100(hidden, truth):
     """Those of the rest angle too, which is a quotient of what is fitted."""
     inside = []
-    for seed in range(25):
+    for seed in range(20):
         table = identify(
             with_noise(hidden, "20 ms", (0.6, 0.4), seed), extension=Extension(chosen(LABELS, THE_LEG))
         ).parameters
@@ -163,7 +163,7 @@ def test_what_is_not_sure_of_a_held_shape_is_not_sure_of_the_parameters():
     judged = replace(pendulum.motion(noise, 1000, purpose="validate"), file="validate.parquet")
     judged = replace(judged, q=judged.q + 0.08)
     inside, found, errors = [], [], {True: [], False: []}
-    for seed in range(60):
+    for seed in range(50):
         run = replace(pendulum.motion(noise, seed), file="train.parquet")
         run = replace(run, q=run.q + 0.08)
         offset, error = shape_and_error(run)
@@ -256,7 +256,7 @@ def test_intervals_hold_where_a_sensor_is_tared_anew_in_each_run(tared, truth, t
     extension = named(told_of(files, lambda f: True, tmp_path), runs, files)
     true = np.append(truth, 1.5)
     inside = []
-    for seed in range(25):
+    for seed in range(20):
         table = identify(with_noise(runs, "20 ms", (0.6, 0.4), seed), extension=extension).parameters
         inside.append((table["ci95_low"] <= true) & (true <= table["ci95_high"]))
     print(f"\ncovered {np.mean(inside):.3f}; the moments {np.mean(inside, axis=0)[[3, 11, 15]].round(2)}")
