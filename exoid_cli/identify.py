@@ -104,7 +104,7 @@ def identify(
     inputs = [*files, causes] if causes else files
     shared = {"joints": runs[0].joint_metadata} | describe(inputs=inputs, config=config_used)
     besides = {"effects": effect} if effect else {}
-    besides |= {"causes": describe([causes])["inputs"][0]} if causes else {}
+    besides |= {"causes": shared["inputs"][-1]} if causes else {}
     figures = _write(found, output, shared | {"method": found.method | besides}, figures=asked.figures)
     _report(found, runs[0].machine)
     console.wrote(output, "parameters.parquet", "residuals.parquet", *figures)

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects import Effect, Parameter
+from pipelines.effects import RUNS, Effect, Parameter
 from pipelines.estimation.compressed import Compressed, compress, together
 from pipelines.estimation.regression import Regression, regressions
 from pipelines.mechanics.run import Run
@@ -43,6 +43,11 @@ class Training:
     cutoff_hz: float | None = None
     """Above which nothing is fitted, if there is one."""
 
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The kinds of run there are, exo_alone first."""
+        return tuple(kind for kind in RUNS if any(run.run == kind for run in self.runs))
+
     @cached_property
     def columns(self) -> list[Column]:
         """The p linear parameters; one that differs from run to run is there for each run that has it."""
@@ -77,21 +82,17 @@ class Training:
 
     def model_of(self, run: Run, values: NDArray) -> Model:
         """Return the model of one run with the columns' values, (p,)."""
-        terms = []
-        for i, term in enumerate(self.terms_of(run)):
-            if term is not None:
-                places = [self.place(i, k, run) for k in range(len(term.linear))]
-                linear = [own if at is None else values[at] for at, own in zip(places, term.linear, strict=True)]
-                terms.append(Term(term.effect, np.append(linear, term.shape)))
-        return Model(tuple(terms))
+        found = (self.term_of(run, i, values) for i in range(len(self.model.terms)))
+        return Model(tuple(term for term in found if term is not None))
 
-    def term_of(self, run: Run, term: int, values: NDArray) -> dict[str, float]:
-        """Return what files say of a term that a run has, by name, at some values of the columns, (p,)."""
-        terms = self.terms_of(run)
-        place = sum(one is not None for one in terms[:term])
-        found = self.model_of(run, values).terms[place]
-        named = zip(found.effect.parameters, found.effect.physical(found.values), strict=True)
-        return {parameter.name: float(value) for parameter, value in named}
+    def term_of(self, run: Run, term: int, values: NDArray) -> Term | None:
+        """Return a term as a run has it, with the columns' values, (p,); None where it never came."""
+        own = self.terms_of(run)[term]
+        if own is None:
+            return None
+        places = [self.place(term, k, run) for k in range(len(own.linear))]
+        linear = [value if at is None else values[at] for at, value in zip(places, own.linear, strict=True)]
+        return Term(own.effect, np.append(linear, own.shape))
 
     def acts_in(self, place: int, kind: str) -> bool:
         """Tell whether a column is there in a kind of run."""
@@ -171,11 +172,6 @@ class Problem:
     """(k,) columns that are fitted."""
     held: NDArray
     """(p,) values of the columns that are held; those of the fitted ones say nothing."""
-
-    @property
-    def model(self) -> Model:
-        """The training's."""
-        return self.training.model
 
     @property
     def names(self) -> list[str]:

@@ -36,16 +36,14 @@ def _sloped(training: Training, values: NDArray) -> Iterator[tuple[Term, NDArray
     for i, term in enumerate(training.model):
         slope = np.zeros((len(term.values), p + s))
         having = next((run for run in training.runs if training.has(run, i)), None)
-        linear = term.linear.copy()
-        for k in range(len(linear)):
-            at = training.place(i, k, having) if having else None
+        places = [training.place(i, k, having) for k in range(len(term.linear))] if having else []
+        for k, at in enumerate(places):
             if at is not None:
-                slope[k, at], linear[k] = 1.0, values[at]
+                slope[k, at] = 1.0
         for k in range(len(term.shape)):
-            slope[len(linear) + k, shape + k] = 1.0
+            slope[len(term.linear) + k, shape + k] = 1.0
         shape += len(term.shape)
-        had = training.terms_of(having)[i] if having else None
-        yield Term(term.effect, np.append(linear, term.shape if had is None else had.shape)), slope
+        yield (training.term_of(having, i, values) if having else None) or term, slope
 
 
 def _of_body(bodies: Sequence[tuple[Term, NDArray]], run: str, step: str) -> Iterator[Row]:

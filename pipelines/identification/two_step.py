@@ -14,8 +14,8 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
-from pipelines.effects import RUNS
 from pipelines.effects.friction import Friction
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.estimation.angle_noise import CUTOFF_HZ, IN_WORDS, is_loud
@@ -89,14 +89,14 @@ class Identified:
         """What each run has for itself, by the effect's label, as ``parameters/1`` tells it."""
         told: dict[str, list[dict[str, Any]]] = {}
         for run in self.runs if self.extension.recordings else ():
-            of_run = zip(self.training.model, self.training.own[run.file], strict=True)
-            for i, (term, own) in enumerate(of_run):
-                names = [p.name for p in term.effect.parameters if p.per_run]
-                if names and term.effect.acts(run.run):
-                    values = None if own is None else self.training.term_of(run, i, self.values)
-                    told.setdefault(term.effect.label, []).append(
+            for i, effect in enumerate(term.effect for term in self.training.model):
+                own = [(place, p.name) for place, p in enumerate(effect.parameters) if p.per_run]
+                if own and effect.acts(run.run):
+                    term = self.training.term_of(run, i, self.values)
+                    values = None if term is None else effect.physical(term.values)
+                    told.setdefault(effect.label, []).append(
                         {"name": run.file, "sha256": self.extension.recordings[run.file],
-                         "values": {name: None if values is None else values[name] for name in names}}
+                         "values": {name: None if values is None else float(values[at]) for at, name in own}}
                     )  # fmt: skip
         return told
 
@@ -130,7 +130,8 @@ def identify(
     """
     estimator, extension = estimator or WeightedLeastSquares(), extension or Extension()
     runs = checked(on_one_scale(motions))
-    training = _training(runs, extension, reversals)
+    loud = is_loud(runs.of("train"))
+    training = _training(runs, extension, reversals, CUTOFF_HZ if loud else None)
     judged = [training.loaded(run) for run in runs.of("validate")]
     steps = {kind: Step(one.problem, estimated(one.fit)) for kind, one in _in_steps(training, estimator).items()}
     values = _values(steps)
@@ -161,12 +162,15 @@ def identify(
             *extension.remarks,
             *[SLOWLY.format("fitted or scored" if estimator.masks else "scored")] * (training.cutoff_hz is not None),
         ],
-        angle_noise=[BIASED] * (training.cutoff_hz is None and is_loud(training.runs)),
+        angle_noise=[BIASED] * (loud and training.cutoff_hz is None),
     )
 
 
-def _training(runs: Runs, extension: Extension, reversals: bool) -> Training:
-    """Return what is fitted to what, with the loads that terms of the extension may go with."""
+def _training(runs: Runs, extension: Extension, reversals: bool, cutoff_hz: float | None) -> Training:
+    """Return what is fitted to what, with the loads that terms of the extension may go with.
+
+    The plain model is fitted piece by piece, whatever is above the cut-off.
+    """
     train = tuple(runs.of("train"))
     plain = _baseline(runs)
     model = Model((*plain, *extension.terms))
@@ -174,13 +178,17 @@ def _training(runs: Runs, extension: Extension, reversals: bool) -> Training:
     if not extension.terms and not extension.bodies:
         return Training(train, model, reversals=reversals)
     train = tuple(run.whole() for run in train)
-    cutoff_hz = CUTOFF_HZ if is_loud(train) else None
     training = Training(train, model, own, reversals=reversals, cutoff_hz=cutoff_hz)
-    bodies = dict(extension.bodies)
-    if not set(runs.kinds) <= set(bodies):
+    bodies = extension.bodies
+    if not set(_whose(training)) <= set(bodies):
         alone = Training(train, plain, reversals=reversals, cutoff_hz=cutoff_hz)
         bodies = _bodies(alone, _values(_in_steps(alone, WeightedLeastSquares())))
     return _under_its_own_loads(training, bodies)
+
+
+def _whose(training: Training) -> list[str]:
+    """Return whose rigid bodies are found: each kind of run's, and the wearer's own."""
+    return [*training.kinds, *["human"] * ("with_human" in training.kinds)]
 
 
 def _under_its_own_loads(training: Training, bodies: Mapping[str, NDArray]) -> Training:
@@ -189,13 +197,13 @@ def _under_its_own_loads(training: Training, bodies: Mapping[str, NDArray]) -> T
     Behind an elastic joint what is found overshoots, round after round, so each step is as long as the last two tell
     (Aitken, 1926, Proc. Royal Society of Edinburgh 46).
     """
-    kinds = list(dict.fromkeys([*(run.run for run in training.runs), *bodies]))
+    kinds = _whose(training)
     sizes = np.cumsum([len(bodies[kind]) for kind in kinds])[:-1]
     at, last = np.concatenate([bodies[kind] for kind in kinds]), None
     for _ in range(ROUNDS):
         now = dict(zip(kinds, np.split(at, sizes), strict=True))
         training = training.with_bodies(
-            {kind: (now[kind], now.get("human", now[kind])) for kind in kinds if kind != "human"}
+            {kind: (now[kind], now.get("human", now[kind])) for kind in training.kinds}
         )  # fmt: skip
         found = _bodies(training, _values(_in_steps(training, WeightedLeastSquares())))
         step = np.concatenate([found[kind] for kind in kinds]) - at
@@ -223,7 +231,7 @@ def _bodies(training: Training, values: NDArray) -> dict[str, NDArray]:
 
 
 def _found(training: Training, values: NDArray, run: Run) -> Model | None:
-    if all(run.run != trained.run for trained in training.runs):
+    if run.run not in training.kinds:
         return None
     return training.model_of(run, values).for_run(run.run)
 
@@ -238,11 +246,10 @@ class Step(Generic[Found]):
 
 def _in_steps(training: Training, estimator: Estimator) -> dict[str, Step[Fit]]:
     """Fit what is there in the empty exoskeleton, then, that being held, what comes with a human."""
-    kinds = [kind for kind in RUNS if any(run.run == kind for run in training.runs)]
     empty = np.array([training.acts_in(place, "exo_alone") for place in range(len(training.columns))])
     values = np.zeros(len(empty))
     steps = {}
-    for kind in kinds:
+    for kind in training.kinds:
         fitted = np.flatnonzero(empty if kind == "exo_alone" else ~empty)
         problem = Problem(training, (kind,), fitted, values)
         steps[kind] = Step(problem, estimator.fit(problem))
@@ -276,26 +283,15 @@ def _answers(training: Training, covariance: NDArray) -> tuple[NDArray, NDArray]
     """
     error = np.sqrt(np.diag(covariance))
     shapes = [(i, k) for i, term in enumerate(training.model) for k in range(len(term.shape))]
-    moves: list[tuple[int, int, float, list[str]]] = []
+    told, others = [], []
     for (i, k), e in zip(shapes, error, strict=True):
         having = [run.file for run in training.runs if training.has(run, i)]
         apart = training.model.terms[i].effect.shape[k].per_run
-        moves.append((i, k, e, having[:1] if apart else having))
-    for (i, k), e in zip(shapes, error, strict=True):
-        if training.model.terms[i].effect.shape[k].per_run:
-            having = [run.file for run in training.runs if training.has(run, i)]
-            moves += [(i, k, e, [file]) for file in having[1:]]
-    others = np.array([e**2 for *_, e, _ in moves[len(shapes) :]])
-    every = np.block(
-        [
-            [covariance, np.zeros((len(shapes), len(others)))],
-            [np.zeros((len(others), len(shapes))), np.diag(others)],
-        ]
-    )
-    answers = [np.zeros((len(training.columns), 0))]
-    for i, k, e, files in moves:
-        answers.append(_answer(training, i, k, e, files)[:, np.newaxis])
-    return np.concatenate(answers, axis=1), every
+        told.append((i, k, e, having[:1] if apart else having))
+        others += [(i, k, e, [file]) for file in having[1:]] if apart else []
+    answers = [_answer(training, *moved) for moved in (*told, *others)]
+    every = block_diag(covariance, np.diag([e**2 for _, _, e, _ in others]))
+    return np.reshape(answers, (len(answers), len(training.columns))).T, every
 
 
 def _answer(training: Training, term: int, shape: int, error: float, files: Sequence[str]) -> NDArray:

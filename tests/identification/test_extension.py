@@ -354,3 +354,11 @@ def test_rows_of_what_each_run_has_for_itself_are_all_of_the_first_run_that_was_
     last = found.parameters.iloc[-1]
     assert (last["effect"], last["value"]) == ("encoder_offset", zeros["exo_alone_train.parquet"])
     assert found.validation.pooled.rmse.max() < 0.05
+
+
+def test_the_empty_machine_alone_is_refitted_by_a_diagnosis_that_knew_a_human(hidden):
+    """Its table tells of bodies that are not in these runs."""
+    bodies = {kind: np.array([1.0, 0.22, 0.55, 2.3]) for kind in ("exo_alone", "with_human", "human")}
+    extension = Extension(chosen(LABELS, THE_LEG), bodies=bodies)
+    found = identify([motion for motion in hidden if motion.run == "exo_alone"], extension=extension)
+    assert sizes(found) == pytest.approx(SIZES, rel=0.02)
