@@ -66,7 +66,8 @@ def _outdoes(gram: NDArray, p: int, body: list[int]) -> bool:
     """Fit the slow motion, p columns, and hold what it foretells of the fast part against what was measured of it."""
     slow, fast = gram[:, :p, :p], gram[:, p:-1, p:-1]
     torque = gram[:, -1, -1]
-    weights = 1.0 / np.maximum(torque, np.finfo(float).tiny)
+    # A joint whose torque is nought all along tells nothing; what fits it refuses it.
+    weights = np.divide(1.0, torque, out=np.zeros_like(torque), where=torque > 0.0)
     normal, right = np.einsum("j,jik->ik", weights, slow), weights @ gram[:, :p, -1]
     size = np.sqrt(np.maximum(np.diag(normal), np.finfo(float).tiny))
     values = np.linalg.lstsq(normal / np.outer(size, size), right / size, rcond=None)[0] / size

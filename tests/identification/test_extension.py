@@ -362,3 +362,9 @@ def test_the_empty_machine_alone_is_refitted_by_a_diagnosis_that_knew_a_human(hi
     extension = Extension(chosen(LABELS, THE_LEG), bodies=bodies)
     found = identify([motion for motion in hidden if motion.run == "exo_alone"], extension=extension)
     assert sizes(found) == pytest.approx(SIZES, rel=0.02)
+
+
+def test_a_torque_that_is_nought_all_along_is_refused_beside_effects_too(hidden):
+    silent = [replace(motion, torque=motion.torque * np.array([1.0, 0.0])) for motion in hidden]
+    with pytest.raises(InputError, match=r"the torque of the knee is 0 N·m in every row, expected what a drive exerts"):
+        identify(silent, extension=Extension(chosen(LABELS, THE_LEG)))
