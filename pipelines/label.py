@@ -46,9 +46,10 @@ def effect_at(
         told = effect_labelled(label)
     if fits(type(told)) and told.joint in told.possible(machine):
         return type(told)(joint=told.joint, on=machine)
-    can_be = [one(joint=place, on=machine).label for one in EFFECTS if fits(one) for place in one.possible(machine)]
+    can_be = [one(joint=place, on=machine) for one in EFFECTS if fits(one) for place in one.possible(machine)]
+    expected = [one.label for one in can_be if one.name == told.name] or [one.label for one in can_be]
     raise InputError(
-        f"{setting}: found {label}, expected {' or '.join(can_be) or 'nothing'}"
+        f"{setting}: found {label}, expected {' or '.join(expected) or 'nothing'}"
         f"{f' ({why})' if why else ''}; correct it or leave it out"
     )
 

@@ -43,7 +43,7 @@ class Extension:
     recordings: Mapping[str, str] = field(default_factory=dict)
     """By a run's file, the hash of its recording."""
     remarks: tuple[str, ...] = ()
-    """What was left out or guessed of runs, and what was learnt from runs to validate on, a sentence each."""
+    """What was left out or guessed, and what was learnt from runs to validate on, a sentence each."""
 
     @property
     def covariance(self) -> NDArray:
@@ -52,14 +52,21 @@ class Extension:
         return np.zeros((s, s)) if self.shape_covariance is None else self.shape_covariance
 
     def with_terms(self, terms: Iterable[Term]) -> "Extension":
-        """Return it with more terms, those that it has already left out."""
+        """Return it with more terms; those that it has already are left out, and that is told."""
         have = {(term.effect.label, term.effect.run) for term in self.terms}
-        more = tuple(term for term in terms if (term.effect.label, term.effect.run) not in have)
+        by_name = {(term.effect.label, term.effect.run): term for term in terms}
+        more = tuple(term for name, term in by_name.items() if name not in have)
+        remarks = [f"{label} is among the causes already, and is fitted as it is there"
+                   for label, run in by_name if (label, run) in have]  # fmt: skip
         added = sum(len(term.shape) for term in more)
         own = {file: (*own, *more) for file, own in self.own.items()}
         return replace(
-            self, terms=(*self.terms, *more), own=own, shape_covariance=np.pad(self.covariance, (0, added))
-        )  # fmt: skip
+            self,
+            terms=(*self.terms, *more),
+            shape_covariance=np.pad(self.covariance, (0, added)),
+            own=own,
+            remarks=(*self.remarks, *remarks),
+        )
 
 
 def chosen(labels: Iterable[str], machine: Machine) -> tuple[Term, ...]:

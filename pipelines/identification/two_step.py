@@ -202,9 +202,7 @@ def _under_its_own_loads(training: Training, bodies: Mapping[str, NDArray]) -> T
     at, last = np.concatenate([bodies[kind] for kind in kinds]), None
     for _ in range(ROUNDS):
         now = dict(zip(kinds, np.split(at, sizes), strict=True))
-        training = training.with_bodies(
-            {kind: (now[kind], now.get("human", now[kind])) for kind in training.kinds}
-        )  # fmt: skip
+        training = training.with_bodies({kind: (now[kind], now.get("human", now[kind])) for kind in training.kinds})
         found = _bodies(training, _values(_in_steps(training, WeightedLeastSquares())))
         step = np.concatenate([found[kind] for kind in kinds]) - at
         if np.all(np.abs(step) < RESTS * np.abs(at)):

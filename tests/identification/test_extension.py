@@ -311,13 +311,21 @@ def test_the_table_tells_the_model_that_was_fitted(tared, tmp_path):
         assert_allclose(again.torque(run), found.model_of(run).torque(run), atol=1e-9)
 
 
+def test_what_is_named_twice_is_fitted_once_and_that_is_told():
+    once = Extension(chosen(["rotor_inertia@knee"], THE_LEG))
+    again = once.with_terms(chosen(["rotor_inertia@knee", "torque_offset@hip"], THE_LEG))
+    assert [term.effect.label for term in again.terms] == ["rotor_inertia@knee", "torque_offset@hip"]
+    assert again.remarks == ("rotor_inertia@knee is among the causes already, and is fitted as it is there",)
+
+
 @pytest.mark.parametrize(
     ("label", "said"),
     [
         ("encoder_offset@hip", r"--effect: found encoder_offset@hip, expected coulomb_asymmetry@hip or "),
         ("friction@hip", r"--effect: found friction@hip, expected"),
         ("cogging@knee", r"--effect: found cogging@knee, expected"),
-        ("torque_offset@ankle", r"--effect: found torque_offset@ankle, expected"),
+        ("torque_offset@ankle", r"--effect: found torque_offset@ankle, expected torque_offset@hip or torque_offset@kne"),
+        ("rotor_inertia", r"--effect: found rotor_inertia, expected rotor_inertia@knee \(others"),
     ],
 )
 def test_what_cannot_be_fitted_by_its_name_alone_is_refused(label, said):
