@@ -27,32 +27,36 @@ async def refuse_unkept_rate(machine: Machine, cycle_hz: float) -> None:
         Tells how many cycles came late.
     """
     cycles = max(FEWEST, ceil(REHEARSED_S * cycle_hz))
-    late = await _late(machine, cycle_hz, cycles)
+    late, made = await _late(machine, cycle_hz, cycles)
     if late <= MOST_LATE * cycles:
         return
     less_often = ", raise `every` of the sensors" if machine.sensors else ""
     raise DeviceError(
-        f"{late} of {cycles} cycles in which every device was asked took longer than the {1e3 / cycle_hz:g} ms from "
+        f"{late} of {made} cycles in which every device was asked took longer than the {1e3 / cycle_hz:g} ms from "
         f"one set-point to the next; lower acquire.sample_rate_hz{less_often}, or close what else this computer does; "
         "nothing was moved"
     )
 
 
-async def _late(machine: Machine, cycle_hz: float, cycles: int) -> int:
-    """Make cycles as a run in real time does; return how many of them let a sample go by."""
+async def _late(machine: Machine, cycle_hz: float, cycles: int) -> tuple[int, int]:
+    """Make cycles as a run in real time does, until too many were late; return how many let a sample go by, and all.
+
+    Where answers take longer than a cycle, none may come before its time is up: all of them would take minutes.
+    """
     pace = PhaseLock(cycle_hz, machine.count, machine.rig.safety.watchdog_s)
     sources = sources_of(machine, cycle_hz)
-    late, last = 0, await machine.count()
-    for cycle in range(cycles):
+    late, made, last = 0, 0, await machine.count()
+    while made < cycles and late <= MOST_LATE * cycles:
         found = await pace.wait(last)
         late += found > last + 1
         last = found
-        row = (await machine.cycle(cycle, _look)).row
+        row = (await machine.cycle(made, _look)).row
+        made += 1
         if row and sources:
             await all_answers(source.samples(reading) for source, reading in zip(sources, row.drives, strict=True))
     for source in sources:
         await source.beside.brought()
-    return late
+    return late, made
 
 
 async def _look(drive: Drive) -> Reading:

@@ -191,7 +191,7 @@ def test_in_real_time_no_sample_is_lost_though_cycles_are(record_in_real_time):
 def with_full_queues(rig_file, serve, excitation, monkeypatch):
     """Serve drives in real time whose queues nobody has read since they were switched on; do something with them."""
     excitation.write_text(excitation.read_text().replace("6.283185307179586", "1.2566370614359172"))
-    monkeypatch.setattr(ring, "QUEUE_RECORDS", 1000)
+    monkeypatch.setattr(ring, "QUEUE_RECORDS", 500)
     # Slow, for a busy computer.
     slow = {"record_rate_hz = 1000.0": "record_rate_hz = 200.0", "[plant]\n": "[plant]\nsample_rate_hz = 40.0\n"}
     changes = {"watchdog_s": 1.0, "torque_nm": 300.0, "speed_rad_s": 30.0, "rest_rad": "[0.4, -0.6]", "control_s": 9.0}
@@ -232,7 +232,7 @@ def test_what_comes_to_a_queue_while_the_drives_take_their_time_to_be_enabled_is
     def slowly(servo):
         if not enabled(servo):
             return False
-        return time.monotonic() > since.setdefault(servo, time.monotonic()) + 4.8
+        return time.monotonic() > since.setdefault(servo, time.monotonic()) + 2.3
 
     monkeypatch.setattr(Servo, "enabled", property(slowly))
     assert recorded_from_queues().metadata["gaps"] == []

@@ -21,7 +21,7 @@ LAWS = {
 }
 
 
-@pytest.mark.parametrize("stiffness", [5.0, 7.0])
+@pytest.mark.parametrize("stiffness", [pytest.param(5.0, marks=pytest.mark.slow), 7.0])
 def test_a_cord_over_both_joints_is_no_mass_that_no_machine_has(stiffness):
     """It pulls as the shank's weight does, and weight has inertia: named for a mass it is as likely as not."""
 

@@ -324,7 +324,7 @@ def test_what_is_named_twice_is_fitted_once_and_that_is_told():
         ("encoder_offset@hip", r"--effect: found encoder_offset@hip, expected coulomb_asymmetry@hip or "),
         ("friction@hip", r"--effect: found friction@hip, expected"),
         ("cogging@knee", r"--effect: found cogging@knee, expected"),
-        ("torque_offset@ankle", r"--effect: found torque_offset@ankle, expected torque_offset@hip or torque_offset@kne"),
+        ("torque_offset@ankle", r"--effect: found torque_offset@ankle, expected torque_offset@hip or torque_offset@k"),
         ("rotor_inertia", r"--effect: found rotor_inertia, expected rotor_inertia@knee \(others"),
     ],
 )

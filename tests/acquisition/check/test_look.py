@@ -192,7 +192,7 @@ def test_lines_that_do_not_come_about_are_waited_for_at_once_and_not_one_after_t
     """Six TLS lines to ports that take connections and say nothing."""
     with ExitStack() as stack:
         ports = [stack.enter_context(socket.create_server(("127.0.0.1", 0))).getsockname()[1] for _ in range(6)]
-        rig, number = rig_file("real_time", connect_s=3.0), iter(range(6))
+        rig, number = rig_file("real_time", connect_s=1.0), iter(range(6))
         text = re.sub(r"^(map = .*)$", lambda m: f'{m[1]}\nline = "l{next(number)}"', rig.read_text(), flags=re.M)
         lines = (f'[line.l{k}]\ntransport = "tls"\nport = {port}\n' for k, port in enumerate(ports))
         rig.write_text(text + "".join(lines))
@@ -200,7 +200,7 @@ def test_lines_that_do_not_come_about_are_waited_for_at_once_and_not_one_after_t
         report = check_rig(rig)
         took = time.monotonic() - began
     assert [str(finding).partition(":")[2].count("no TLS connection") for finding in report.findings] == [1] * 6
-    assert took < 20.0, "one line takes six seconds, one after the other they would take 36"
+    assert took < 8.0, "one line takes two seconds, one after the other they would take 12"
 
 
 def test_a_line_that_is_lost_while_its_devices_are_asked_is_told_once(checked, monkeypatch):
