@@ -1,7 +1,11 @@
 """What holds for every test, and the command line for those that use it."""
 
+import os
 import signal
 from dataclasses import dataclass
+
+# Each worker has a core; threads of BLAS, for matrices as narrow as these, would only wait for it. Before numpy comes.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 
