@@ -42,6 +42,10 @@ STEP = 0.25
 """Standard errors by which a shape is moved to see what the values make of it."""
 ROUNDS, RESTS = 12, 1e-3
 """In which loads follow the rigid bodies that they are of, and the relative change at which these are at rest."""
+RESTLESS = (
+    f"the rigid bodies and the loads that they make did not come to agree in {ROUNDS} rounds, so these values are not "
+    "to be trusted: some shape that is held, as a soft spring's, does not go with these runs"
+)
 
 Found = TypeVar("Found", bound=Fit, covariant=True)
 
@@ -131,7 +135,7 @@ def identify(
     estimator, extension = estimator or WeightedLeastSquares(), extension or Extension()
     runs = checked(on_one_scale(motions))
     loud = is_loud(runs.of("train"))
-    training = _training(runs, extension, reversals, CUTOFF_HZ if loud else None)
+    training, at_rest = _training(runs, extension, reversals, CUTOFF_HZ if loud else None)
     judged = [training.loaded(run) for run in runs.of("validate")]
     steps = {kind: Step(one.problem, estimated(one.fit)) for kind, one in _in_steps(training, estimator).items()}
     values = _values(steps)
@@ -160,14 +164,15 @@ def identify(
             *(f"{kind}: {remark}" for kind, step in steps.items() for remark in step.fit.remarks),
             *upside_down(table, runs.motions[0].machine),
             *extension.remarks,
+            *[RESTLESS] * (not at_rest),
             *[SLOWLY.format("fitted or scored" if estimator.masks else "scored")] * (training.cutoff_hz is not None),
         ],
         angle_noise=[BIASED] * (loud and training.cutoff_hz is None),
     )
 
 
-def _training(runs: Runs, extension: Extension, reversals: bool, cutoff_hz: float | None) -> Training:
-    """Return what is fitted to what, with the loads that terms of the extension may go with.
+def _training(runs: Runs, extension: Extension, reversals: bool, cutoff_hz: float | None) -> tuple[Training, bool]:
+    """Return what is fitted to what, with the loads that terms may go with, and whether those are at rest.
 
     The plain model is fitted piece by piece, whatever is above the cut-off.
     """
@@ -176,7 +181,7 @@ def _training(runs: Runs, extension: Extension, reversals: bool, cutoff_hz: floa
     model = Model((*plain, *extension.terms))
     own = {file: (*plain, *terms) for file, terms in extension.own.items()}
     if not extension.terms and not extension.bodies:
-        return Training(train, model, reversals=reversals)
+        return Training(train, model, reversals=reversals), True
     train = tuple(run.whole() for run in train)
     training = Training(train, model, own, reversals=reversals, cutoff_hz=cutoff_hz)
     bodies = extension.bodies
@@ -191,11 +196,11 @@ def _whose(training: Training) -> list[str]:
     return [*training.kinds, *["human"] * ("with_human" in training.kinds)]
 
 
-def _under_its_own_loads(training: Training, bodies: Mapping[str, NDArray]) -> Training:
-    """Return the training with the loads of the rigid bodies that it finds, beginning with those of some.
+def _under_its_own_loads(training: Training, bodies: Mapping[str, NDArray]) -> tuple[Training, bool]:
+    """Return the training with the loads of the rigid bodies that it finds, and whether it found them in the end.
 
-    Behind an elastic joint what is found overshoots, round after round, so each step is as long as the last two tell
-    (Aitken, 1926, Proc. Royal Society of Edinburgh 46).
+    The first round's are of ``bodies``. Behind an elastic joint what is found overshoots, round after round, so each
+    step is as long as the last two tell (Aitken, 1926, Proc. Royal Society of Edinburgh 46).
     """
     kinds = _whose(training)
     sizes = np.cumsum([len(bodies[kind]) for kind in kinds])[:-1]
@@ -206,11 +211,11 @@ def _under_its_own_loads(training: Training, bodies: Mapping[str, NDArray]) -> T
         found = _bodies(training, _values(_in_steps(training, WeightedLeastSquares())))
         step = np.concatenate([found[kind] for kind in kinds]) - at
         if np.all(np.abs(step) < RESTS * np.abs(at)):
-            break
+            return training, True
         growth = 0.0 if last is None else float(step @ last[0] / (last[0] @ last[0])) / last[1] + 1.0 - 1.0 / last[1]
         length = 1.0 / (1.0 - np.clip(growth, -3.0, 0.5))
         last, at = (step, length), at + length * step
-    return training
+    return training, False
 
 
 def _baseline(runs: Runs) -> Model:

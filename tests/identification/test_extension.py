@@ -13,6 +13,7 @@ from pipelines.contracts.provenance import recording_behind
 from pipelines.contracts.table import Table
 from pipelines.effects.cuff_compliance import CuffCompliance
 from pipelines.effects.encoder_offset import EncoderOffset
+from pipelines.effects.joint_elasticity import JointElasticity
 from pipelines.effects.passive_joint_torque import PassiveJointTorque
 from pipelines.effects.torque_gain import TorqueGain
 from pipelines.errors import InputError
@@ -294,6 +295,13 @@ def test_behind_every_effect_of_known_shape_body_and_amplitudes_are_the_true_one
     body = found.parameters[found.parameters["effect"] == "rigid_body"]
     assert_allclose(body["value"], np.delete(truth, np.s_[4:8]), rtol=SMALL.get(effect.name, 0.015))
     assert np.all(found.validation.pooled.rmse <= without.validation.pooled.rmse + 0.03)
+
+
+@pytest.mark.parametrize(("stiffness", "trusted"), [(150.0, True), (15.0, False)])
+def test_values_behind_a_spring_that_these_runs_do_not_go_with_are_not_to_be_trusted(hidden, stiffness, trusted):
+    held = Term(JointElasticity("knee"), np.array([stiffness]))
+    remarks = identify(hidden, extension=Extension((held,))).remarks
+    assert any("did not come to agree" in remark for remark in remarks) != trusted
 
 
 def test_the_table_tells_the_model_that_was_fitted(tared, tmp_path):
