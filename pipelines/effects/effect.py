@@ -27,9 +27,8 @@ from numpy.typing import NDArray
 from pipelines.effects.kernel import columns_along, columns_along_with_memory, read_along
 from pipelines.mechanics.machine import THE_LEG, Machine
 from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.run import RUNS
 from pipelines.mechanics.units import Scale, unit_at
-
-RUNS = ("exo_alone", "with_human")
 
 DIFFERENCE = 1e-6
 """Relative step of numerical derivatives."""

@@ -10,11 +10,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects import RUNS
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.estimation.regression import block_average, padding, regress
 from pipelines.mechanics.motion import Piece
-from pipelines.mechanics.run import Run
+from pipelines.mechanics.run import Run, kinds_of
 from pipelines.mechanics.slow_motion import below, edge
 from pipelines.model import Model, Term, baseline
 
@@ -31,8 +30,8 @@ IN_WORDS = f"above {CUTOFF_HZ:g} Hz the angles hold accelerations that no torque
 
 def is_loud(runs: Sequence[Run]) -> bool:
     """Tell whether noise of the angles outdoes, at any joint of the runs to train, all else that a fit leaves."""
-    kinds = [kind for kind in RUNS if any(run.run == kind for run in runs)]
-    model = Model(tuple(Term(effect, np.zeros(len(effect.linear))) for effect in baseline(runs[0].machine, kinds)))
+    effects = baseline(runs[0].machine, kinds_of(runs))
+    model = Model(tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects))
     body = [k for k, (effect, _) in enumerate(model.linear_parameters) if isinstance(effect, RigidBody)]
     grams = []
     for piece in (piece for run in runs for piece in _beginning(run)):

@@ -7,10 +7,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects import RUNS, Effect, Parameter
+from pipelines.effects import Effect, Parameter
 from pipelines.estimation.compressed import Compressed, compress, together
 from pipelines.estimation.regression import Regression, regressions
-from pipelines.mechanics.run import Run
+from pipelines.mechanics.run import Run, kinds_of
 from pipelines.mechanics.silence import silent_torque
 from pipelines.model import Model, Term
 
@@ -46,7 +46,7 @@ class Training:
     @property
     def kinds(self) -> tuple[str, ...]:
         """The kinds of run there are, exo_alone first."""
-        return tuple(kind for kind in RUNS if any(run.run == kind for run in self.runs))
+        return kinds_of(self.runs)
 
     @cached_property
     def columns(self) -> list[Column]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pipelines.errors import InputError
 from pipelines.mechanics.one_machine import refuse_several_machines
 from pipelines.mechanics.origin import giving
-from pipelines.mechanics.run import Run
+from pipelines.mechanics.run import Run, kinds_of
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Runs:
     @property
     def kinds(self) -> tuple[str, ...]:
         """The kinds of run there are to fit, exo_alone first."""
-        return tuple(kind for kind in ("exo_alone", "with_human") if self.of("train", kind))
+        return kinds_of(self.of("train"))
 
 
 def checked(motions: Sequence[Run]) -> Runs:

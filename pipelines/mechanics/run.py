@@ -1,6 +1,6 @@
 """A run to fit or to judge: all of it in memory, or read piece by piece from where it is stored."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -15,6 +15,8 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.motion import Motion, Piece, motion_from_table
 from pipelines.mechanics.units import Scale
+
+RUNS = ("exo_alone", "with_human")
 
 WINDOW = 2**16
 """Samples of a piece."""
@@ -133,3 +135,9 @@ class StoredRun:
     def whole(self) -> Motion:
         """Return all of it, every channel, in memory."""
         return self._motion(pa.concat_tables(self.rows.pieces()))
+
+
+def kinds_of(runs: Iterable[Run]) -> tuple[str, ...]:
+    """Return the kinds of run there are among some, exo_alone first."""
+    there = {run.run for run in runs}
+    return tuple(kind for kind in RUNS if kind in there)
