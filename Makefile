@@ -88,9 +88,10 @@ lock: ## pin the newest versions that fit pyproject.toml, in requirements.lock
 	rm -rf build/lock
 	$(PYTHON) -m venv build/lock
 	build/lock/bin/pip install --quiet ".[dev,bench]" hatchling editables
-	build/lock/bin/pip freeze --exclude exoid > requirements.lock
+	build/lock/bin/pip freeze --exclude exoid > build/lock/newest
 	@# Not all that fits this Python fits the oldest one.
-	build/lock/bin/pip install --quiet --dry-run --python-version 3.11.0 --only-binary=:all: --target build/lock/oldest -r requirements.lock
+	build/lock/bin/pip install --quiet --dry-run --python-version 3.11.0 --only-binary=:all: --target build/lock/oldest -r build/lock/newest
+	cp build/lock/newest requirements.lock
 
 install: $(INSTALLED) ## make the environment in .venv
 

@@ -27,8 +27,9 @@ async def refuse_unkept_rate(machine: Machine, cycle_hz: float) -> None:
         Tells how many cycles came late.
     """
     cycles = max(FEWEST, ceil(REHEARSED_S * cycle_hz))
-    late, made = await _late(machine, cycle_hz, cycles)
-    if late <= MOST_LATE * cycles:
+    allowed = MOST_LATE * cycles
+    late, made = await _late(machine, cycle_hz, cycles, allowed)
+    if late <= allowed:
         return
     less_often = ", raise `every` of the sensors" if machine.sensors else ""
     raise DeviceError(
@@ -38,15 +39,15 @@ async def refuse_unkept_rate(machine: Machine, cycle_hz: float) -> None:
     )
 
 
-async def _late(machine: Machine, cycle_hz: float, cycles: int) -> tuple[int, int]:
-    """Make cycles as a run in real time does, until too many were late; return how many let a sample go by, and all.
+async def _late(machine: Machine, cycle_hz: float, cycles: int, allowed: float) -> tuple[int, int]:
+    """Make cycles as a run in real time does, until more than allowed let a sample go by; return those, and all.
 
     Where answers take longer than a cycle, none may come before its time is up: all of them would take minutes.
     """
     pace = PhaseLock(cycle_hz, machine.count, machine.rig.safety.watchdog_s)
     sources = sources_of(machine, cycle_hz)
     late, made, last = 0, 0, await machine.count()
-    while made < cycles and late <= MOST_LATE * cycles:
+    while made < cycles and late <= allowed:
         found = await pace.wait(last)
         late += found > last + 1
         last = found

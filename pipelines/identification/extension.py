@@ -54,10 +54,12 @@ class Extension:
     def with_terms(self, terms: Iterable[Term]) -> "Extension":
         """Return it with more terms; those that it has already are left out, and that is told."""
         have = {(term.effect.label, term.effect.run) for term in self.terms}
-        by_name = {(term.effect.label, term.effect.run): term for term in terms}
-        more = tuple(term for name, term in by_name.items() if name not in have)
-        remarks = [f"{label} is among the causes already, and is fitted as it is there"
-                   for label, run in by_name if (label, run) in have]  # fmt: skip
+        more, remarks = [], list(self.remarks)
+        for term in terms:
+            if (term.effect.label, term.effect.run) in have:
+                remarks.append(f"{term.effect.label} is among the causes already, and is fitted as it is there")
+            else:
+                more.append(term)
         added = sum(len(term.shape) for term in more)
         own = {file: (*own, *more) for file, own in self.own.items()}
         return replace(
@@ -65,7 +67,7 @@ class Extension:
             terms=(*self.terms, *more),
             shape_covariance=np.pad(self.covariance, (0, added)),
             own=own,
-            remarks=(*self.remarks, *remarks),
+            remarks=tuple(remarks),
         )
 
 

@@ -37,8 +37,15 @@ def test_beside_what_is_known_something_else_is_found_all_the_same():
 
 
 @pytest.mark.parametrize(
-    "label", ["rotor_inertia@hip", "rotor_inertia", "backlash@knee", "friction@hip", "torque_offset@hip"]
+    ("label", "goes_on"),
+    [
+        ("rotor_inertia@hip", "; correct it"),
+        ("rotor_inertia", "; correct it"),
+        ("backlash@knee", " or "),
+        ("friction@hip", " or "),
+        ("torque_offset@hip", " or "),
+    ],
 )
-def test_what_no_drawing_shows_or_the_joint_cannot_have_is_refused_with_what_can_be_told(label):
-    with pytest.raises(InputError, match=f"diagnose.known: found {label}, expected rotor_inertia@knee( or |;)"):
+def test_what_no_drawing_shows_or_the_joint_cannot_have_is_refused_with_what_can_be_told(label, goes_on):
+    with pytest.raises(InputError, match=f"diagnose.known: found {label}, expected rotor_inertia@knee{goes_on}"):
         diagnose(session(seconds=10.0), known=[label])
