@@ -1,0 +1,49 @@
+"""Every number that decides, with its meaning. They are learned: `make learn` writes them.
+
+A share is of the joint's rms torque; a log odds is a natural logarithm.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Criteria:
+    """The hyper-parameters of the posterior over sets of causes and laws."""
+
+    drive_weight: float = 0.35
+    """How much of a drive row's likelihood counts: rows are not quite independent."""
+    cuff_weight: float = 0.2
+    """The same of a cuff row."""
+    background_law: float = 0.0005
+    """Share by which each smooth law is off on a good rig."""
+    background_cause: float = 0.003
+    """Share of each cause of the catalogue on a good rig."""
+    background_cuff: float = 0.01
+    """Share by which each smooth law of the cuffs' own is off on a good rig."""
+    background_wander: float = 0.002
+    """Share by which a good rig's torque wanders in each run."""
+    amplitudes: tuple[float, float, float] = (0.03, 0.08, 0.2)
+    """Shares that a cause or a law may have, equally likely: prior standard deviations."""
+    misfits: tuple[float, float, float] = (0.0, 0.03, 0.1)
+    """Shares of a cause's own size by which its true form may differ from ours, equally likely."""
+    shape_sd: float = 0.3
+    """Prior standard deviation of a shape about its best value, in its unit of change."""
+    cause: float = -5.0
+    """Prior log odds of a cause against none."""
+    law: float = -5.0
+    """Prior log odds of an unlisted law against none."""
+    further: float = -1.0
+    """Prior log odds of each element beyond the first."""
+    other_shape: float = -0.5
+    """Log odds of a shape that is not the one which explains most."""
+    each_run: float = -1.0
+    """Log odds of a cause whose value is another in every run."""
+    worn: float = -0.7
+    """Log odds of a mass that the person carries, against the machine."""
+    impacts: float = 0.3
+    """Share of the bursts' log likelihood that counts for backlash."""
+    coherence: float = 0.3
+    """Share of the cuffs' and drive's common scatter that counts for a voluntary torque."""
+
+
+CRITERIA = Criteria()

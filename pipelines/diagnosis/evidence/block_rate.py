@@ -1,0 +1,37 @@
+"""A run at the rate of its blocks: columns of slow effects are then five times cheaper.
+
+What moves below 12 Hz is followed by blocks of 25 ms; the difference to columns at the full rate is
+a small share of the column itself (measured in tests/diagnosis/test_block_rate.py).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipelines.diagnosis.observations import Run
+from pipelines.effects import Effect
+from pipelines.signals.blocks import BlockAverage
+
+
+def at_block_rate(run: Run) -> Run:
+    """Return the run with one sample a block, so that its columns are computed once a block."""
+    motion, (q, dq, ddq) = run.motion, run.state
+    joints = len(motion.joints)
+    rate_hz = motion.sample_rate_hz / run.block.decimation
+    block = BlockAverage(1)
+    slow = replace(
+        motion, time=run.time, q=q, dq=dq, ddq=ddq, torque=run.measured[:, :joints],
+        segment=motion.segment[run.starts], valid=run.valid, sample_rate_hz=rate_hz,
+        load=None if motion.load is None else run.average(motion.load),
+        limb_load=None if motion.limb_load is None else run.average(motion.limb_load),
+        temperature=None if motion.temperature is None else run.average(motion.temperature),
+        forces=None if motion.felt is None else run.average(motion.felt),
+        reference=None, measured_angle=None, sequence=None,
+        metadata={**motion.metadata, "regression_filter": block.as_metadata(rate_hz)},
+    )  # fmt: skip
+    return replace(run, motion=slow, block=block, starts=np.arange(len(run.time)), fast=None)
+
+
+def needs_full_rate(effect: Effect) -> bool:
+    """Tell whether an effect remembers what happens within a block, or swings faster."""
+    return effect.swings or effect.states > 0 or effect.reading_states > 0

@@ -1,0 +1,116 @@
+"""All training runs in the decision band as one weighted regression, the baseline projected out.
+
+Rows are averages over 0.1 s of every output of every run, each divided by the noise that it acts
+with; so the squared length of a residual is a chi-square. What the baseline can imitate is
+projected out of everything, which is the same as a flat prior on its parameters.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.evidence.decision_band import LENGTH_S, DecisionBand
+from pipelines.diagnosis.evidence.noise_model import NoiseModel
+from pipelines.diagnosis.observations import Run
+
+RANK = 1e-9
+"""Relative length below which a baseline column adds nothing to those before it."""
+
+
+@dataclass(frozen=True)
+class DecisionRegression:
+    """N weighted rows: outputs within averages within runs."""
+
+    bands: tuple[DecisionBand, ...]
+    roots: tuple[NDArray, ...]
+    """(M, O) of each run: the root of each row's weight over its noise, 1/(N·m)."""
+    weighty: NDArray
+    """(rows,) whether a row has any weight; N of them do."""
+    output: NDArray
+    """(N,) the output of each row."""
+    torque: NDArray
+    """(O,) N·m rms of each output, with which columns become shares."""
+    basis: NDArray
+    """(N, b) orthonormal basis of the weighted baseline."""
+    measured: NDArray
+    """(N,) the measured torque less its projection on the baseline."""
+
+    @classmethod
+    def of(
+        cls, runs: Sequence[Run], baseline: Sequence[NDArray], noise: NoiseModel, torque: NDArray
+    ) -> "DecisionRegression":
+        """Set the regression up.
+
+        Parameters
+        ----------
+        runs : sequence of Run
+            The training runs.
+        baseline : sequence of (m, O, b) arrays
+            The baseline's columns in each run.
+        noise : NoiseModel
+        torque : (O,) array
+            Rms of each output, N·m.
+        """
+        bands = tuple(DecisionBand.of(run) for run in runs)
+        sigma = noise.sigma(LENGTH_S)
+        precision = np.where(sigma > 0.0, 1.0 / np.where(sigma > 0.0, sigma, 1.0), 0.0)
+        roots = tuple(np.sqrt(band.weight) * precision for band in bands)
+        weighty = np.concatenate([root.ravel() for root in roots]) > 0.0
+        output = np.concatenate([np.tile(np.arange(len(torque)), len(root)) for root in roots])
+        blank = cls(bands, roots, weighty, output[weighty], torque, np.zeros(0), np.zeros(0))
+        basis = _orthonormal(blank.rows(baseline))
+        measured = blank.rows([run.measured[:, :, np.newaxis] for run in runs])[:, 0]
+        return replace(blank, basis=basis, measured=measured - basis @ (basis.T @ measured))
+
+    @property
+    def joints(self) -> int:
+        """Number of drives; the cuffs' outputs come after them."""
+        return len(self.torque) // 2
+
+    @property
+    def of_drives(self) -> NDArray:
+        """Whether a row is of a drive, (N,) bool."""
+        return self.output < self.joints
+
+    def rows(self, parts: Sequence[NDArray]) -> NDArray:
+        """Return weighted rows (N, k) of columns (m, O, k) in each run."""
+        averaged = [
+            (band.average(part) * root[:, :, np.newaxis]).reshape(-1, part.shape[2])
+            for band, root, part in zip(self.bands, self.roots, parts, strict=True)
+        ]
+        return np.concatenate(averaged)[self.weighty]
+
+    def project(self, columns: NDArray) -> NDArray:
+        """Return columns (N, k) less what the baseline imitates."""
+        return columns - self.basis @ (self.basis.T @ columns)
+
+    def series(self, output: int) -> Iterator[tuple[NDArray, NDArray]]:
+        """Yield for each run the times of an output's rows and what the baseline leaves there."""
+        ends = np.cumsum([0, *(root.size for root in self.roots)])
+        values = np.zeros(len(self.weighty))
+        values[self.weighty] = self.measured
+        for band, a, b in zip(self.bands, ends[:-1], ends[1:], strict=True):
+            known = band.weight[:, output] > 0.0
+            yield band.time[known], values[a:b].reshape(band.weight.shape)[known, output]
+
+    def shares(self, columns: NDArray) -> NDArray:
+        """Return rows (R, k) whose squares add up to a column's squared share of the drives' torque.
+
+        The share at a joint is the column's rms over the drive's rms torque.
+        """
+        use = self.of_drives
+        roots = np.concatenate([root.ravel() for root in self.roots])[self.weighty][use]
+        weight = np.concatenate([band.weight.ravel() for band in self.bands])[self.weighty][use]
+        output = self.output[use]
+        total = np.bincount(output, weight, minlength=self.joints)[output]
+        scale = np.sqrt(weight / total) / self.torque[output] / roots
+        return columns[use] * scale[:, np.newaxis]
+
+
+def _orthonormal(columns: NDArray) -> NDArray:
+    """Return an orthonormal basis (N, r) of columns (N, b), leaving out those that add nothing."""
+    size = np.linalg.norm(columns, axis=0)
+    q, r = np.linalg.qr(columns[:, size > 0.0] / size[size > 0.0])
+    return q[:, np.abs(np.diag(r)) > RANK]

@@ -1,0 +1,128 @@
+"""Where the residual goes: its mean square split by what repeats, before any cause is looked for.
+
+The excitation is a designed experiment: phases within periods, periods within runs, runs with and
+without a person. Products of residuals at the same phase of adjacent periods hold what repeats and
+no noise; the noise model tells the noise; what is left moves from period to period. A functional
+analysis of variance (Ramsay and Silverman, 2005, Functional Data Analysis, ch. 13).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.evidence.decision_band import LENGTH_S, DecisionBand
+from pipelines.diagnosis.evidence.noise_model import NoiseModel
+from pipelines.diagnosis.observations import Run
+
+KINDS = ("exo_alone", "with_human")
+
+
+@dataclass(frozen=True)
+class ResidualShares:
+    """Shares of one joint's mean square residual in the decision band; they add up to one."""
+
+    rms: float
+    """N·m in the decision band."""
+    noise: float
+    repeats: float | None
+    """With the motion, in every period alike; None where no period tells."""
+    wanders: float | None
+    """From period to period; None where no period tells."""
+    between_runs: float
+    """Constant within a run, and another in each run."""
+    unsplit: float
+    """More than noise, where no period tells whether it repeats; else zero."""
+    with_person_only: float | None
+    """Part of what repeats that is there with a person only; None with one kind of run."""
+
+    def as_json(self) -> dict[str, float | None]:
+        """Return what ``router`` in the verdict says of a joint."""
+        return {
+            "rms_nm": self.rms, "noise": self.noise, "repeats": self.repeats,
+            "wanders": self.wanders, "between_runs": self.between_runs, "unsplit": self.unsplit,
+            "with_person_only": self.with_person_only,
+        }  # fmt: skip
+
+
+def residual_shares(
+    runs: Sequence[Run], residuals: Sequence[NDArray], noise: NoiseModel
+) -> list[ResidualShares]:
+    """Split the residuals (m, O) of each run, for each joint."""
+    bands = [DecisionBand.of(run) for run in runs]
+    averaged = [band.average(r) for band, r in zip(bands, residuals, strict=True)]
+    joints = len(runs[0].motion.joints)
+    return [_of_joint(j, bands, averaged, noise) for j in range(joints)]
+
+
+def _of_joint(
+    j: int, bands: Sequence[DecisionBand], averaged: Sequence[NDArray], noise: NoiseModel
+) -> ResidualShares:
+    known = [band.weight[:, j] > 0.0 for band in bands]
+    values = [a[k, j] for a, k in zip(averaged, known, strict=True)]
+    everything = np.concatenate(values)
+    total = float(np.mean(everything**2)) if len(everything) else 0.0
+    if not total > 0.0:
+        return ResidualShares(0.0, 1.0, None, None, 0.0, 0.0, None)
+    noisy = min(_averaged_variance(noise.density[j], noise.correlation_s[j]), total)
+    means = np.array([v.mean() if len(v) else 0.0 for v in values])
+    counts = np.array([len(v) for v in values])
+    grand = float(means @ counts) / counts.sum()
+    between = float(counts @ (means - grand) ** 2) / counts.sum()
+    repeated = [_repeating(band, a[:, j], k) for band, a, k in zip(bands, averaged, known, strict=True)]
+    products = np.concatenate(repeated)
+    above = max(total - noisy, 0.0)
+    if not len(products):
+        between = min(between, above)
+        return ResidualShares(
+            np.sqrt(total), noisy / total, None, None, between / total, (above - between) / total,
+            None,
+        )  # fmt: skip
+    repeats = float(np.clip(products.mean(), 0.0, above))
+    between = min(between, repeats)
+    return ResidualShares(
+        np.sqrt(total), noisy / total, (repeats - between) / total, (above - repeats) / total,
+        between / total, 0.0, _with_person_only(bands, repeated, total),
+    )  # fmt: skip
+
+
+def _averaged_variance(density: float, tau: float) -> float:
+    """Return the variance of averages over ``LENGTH_S`` of first-order noise, (N·m)²."""
+    if not np.isfinite(density):
+        return 0.0
+    ratio = tau / LENGTH_S
+    decayed = 1.0 - ratio * (1.0 - np.exp(-1.0 / ratio)) if ratio > 0.0 else 1.0
+    return float(density / LENGTH_S * decayed)
+
+
+def _repeating(band: DecisionBand, values: NDArray, known: NDArray) -> NDArray:
+    """Return products of values (M,) at the same phase of adjacent periods, (k,)."""
+    period = band.run.motion.period_s
+    if not period:
+        return np.zeros(0)
+    time = band.time
+    ahead = np.searchsorted(time, time + period - 0.5 * LENGTH_S)
+    inside = ahead < len(time)
+    now, later = np.flatnonzero(inside), ahead[inside]
+    same = np.abs(time[later] - time[now] - period) <= 0.5 * LENGTH_S
+    use = same & known[now] & known[later]
+    return values[now[use]] * values[later[use]]
+
+
+def _with_person_only(
+    bands: Sequence[DecisionBand], repeated: Sequence[NDArray], total: float
+) -> float | None:
+    """Return how much more repeats with a person than without, as a share of all."""
+    powers = []
+    for kind in KINDS:
+        own = [r for band, r in zip(bands, repeated, strict=True) if band.run.motion.run == kind]
+        products = np.concatenate(own) if own else np.zeros(0)
+        if not len(products):
+            return None
+        powers.append(max(float(products.mean()), 0.0))
+    alone, worn = powers
+    of_all = sum(len(r) for r in repeated)
+    share = sum(len(r) for band, r in zip(bands, repeated, strict=True)
+                if band.run.motion.run == KINDS[1]) / of_all  # fmt: skip
+    return float(np.clip((worn - alone) * share / total, 0.0, 1.0))

@@ -1,0 +1,1 @@
+"""Which causes and unlisted laws explain a session: a posterior over sets of them."""

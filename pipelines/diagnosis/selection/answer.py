@@ -1,0 +1,86 @@
+"""Which causes are named, and what could stand in their place: read off the posterior."""
+
+from dataclasses import dataclass
+
+from pipelines.diagnosis.selection.evidence import Element
+from pipelines.diagnosis.selection.posterior import Posterior, Set
+
+LIKELY = 0.5
+"""Probability of a cause, or of it and its ties together, from which it is named."""
+TIED = 0.1
+"""Odds against the named cause from which another counts as not told apart."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """A named cause."""
+
+    element: Element
+    """At its most probable shape."""
+    probability: float
+    """Of it or of one of its ties."""
+    alone: float
+    """Of it without its ties."""
+    ties: tuple[tuple[str, float], ...]
+    """Labels that cannot be told from it, with their probabilities."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the posterior says."""
+
+    named: tuple[Named, ...]
+    """The most probable first."""
+    nothing: float
+    """Probability that nothing is missing."""
+    unlisted: float
+    """Probability that an unlisted law is missing."""
+
+
+def answer_of(posterior: Posterior) -> Answer:
+    """Name the causes of the most probable set that are likely, each with its ties."""
+    best = _best(posterior)
+    found = [_named(posterior, best, i) for i in best if not posterior.elements[i].is_law]
+    named = [one for one in found if one.probability >= LIKELY]
+    unlisted = sum(
+        float(p)
+        for chosen, p in zip(posterior.sets, posterior.probabilities, strict=True)
+        if any(posterior.elements[i].is_law for i in chosen)
+    )
+    return Answer(
+        tuple(sorted(named, key=lambda one: -one.probability)), posterior.nothing, unlisted
+    )
+
+
+def _best(posterior: Posterior) -> Set:
+    """Return the most probable shapes of the most probable set of labels."""
+    labels = max(posterior.by_labels, key=lambda key: posterior.by_labels[key])
+    return next(
+        chosen
+        for chosen in posterior.sets
+        if frozenset(posterior.elements[i].label for i in chosen) == labels
+    )
+
+
+def _named(posterior: Posterior, best: Set, i: int) -> Named:
+    """Return a cause of the best set with what could stand in its place beside the others."""
+    element = posterior.elements[i]
+    rest = frozenset(posterior.elements[k].label for k in best) - {element.label}
+    listed = {e.label for e in posterior.elements if not e.is_law}
+    in_place: dict[str, float] = {}
+    for labels, p in posterior.by_labels.items():
+        if not rest <= labels:
+            continue
+        # A set that holds the named cause holds nothing in its place.
+        others = labels - rest if element.label not in labels else {element.label}
+        for label in others & listed:
+            in_place[label] = in_place.get(label, 0.0) + p
+    least = TIED * in_place[element.label]
+    ties = sorted(
+        ((label, p) for label, p in in_place.items() if label != element.label and p >= least),
+        key=lambda item: -item[1],
+    )
+    members = {element.label, *(label for label, _ in ties)}
+    together = sum(p for labels, p in posterior.by_labels.items() if labels & members)
+    alone = posterior.marginals[element.label]
+    return Named(element, min(together, 1.0), alone, tuple(ties))

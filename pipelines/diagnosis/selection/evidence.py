@@ -1,0 +1,282 @@
+"""What the decision needs of a session, and nothing else: products of columns, and what they are.
+
+Small enough to be kept for thousands of sessions, from which the criteria are learned.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.library import Cause, Library
+from pipelines.diagnosis.smooth_laws import FAMILIES, LawColumn
+from pipelines.effects import Effect
+
+TIME = "time"
+"""The law whose columns are each run's own curves of time."""
+
+
+@dataclass(frozen=True)
+class Element:
+    """A cause at one shape, or a smooth law: what sets are made of."""
+
+    label: str
+    """``effect@joint``, or ``law:kind@joint``."""
+    name: str
+    """The effect's name, or the law's kind."""
+    joint: str | None
+    family: str
+    is_law: bool
+    columns: list[int]
+    """Places in the Gram matrix."""
+    variance: list[float]
+    """Relative prior variance of each coefficient; they add up to one."""
+    derivative: list[int] = field(default_factory=list)
+    """Places of what its shapes do."""
+    resembles: list[int] = field(default_factory=list)
+    """Places of the laws that its true form may differ by."""
+    resembles_variance: list[float] = field(default_factory=list)
+    amplitudes: list[list[float]] = field(default_factory=list)
+    """Rows: those amplitudes of the effect that are never negative, per coefficient."""
+    repeats: bool = True
+    """Whether it does the same in every period of the motion."""
+    first: bool = True
+    """Whether it is the best shape of its cause."""
+    each_run: bool = False
+    worn: bool = False
+    """Whether the person carries it."""
+    wearer: str = "all"
+    """Of a law: in all runs' drives, or the human's share."""
+    place: int = -1
+    """Of a cause: its number in the library."""
+
+    @property
+    def variant(self) -> str:
+        """The label, and what kind of the cause it is: in every run anew, or the person's."""
+        return self.label + ("/each_run" if self.each_run else "") + ("/worn" if self.worn else "")
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Products over the training runs' rows; n columns."""
+
+    drives: NDArray
+    """(n, n) of the rows of drives."""
+    cuffs: NDArray
+    """(n, n) of the rows of cuffs."""
+    drives_right: NDArray
+    """(n,) with the measured torque."""
+    cuffs_right: NDArray
+    elements: tuple[Element, ...]
+    background: tuple[tuple[str, int, float], ...]
+    """What a good rig has: kind (``law``, ``cuff``, ``wander``, ``cause``), column, variance."""
+    heard: Mapping[str, float]
+    """Log likelihood of causes besides what they do to the mean torque, by label."""
+    about: Mapping[str, Any] = field(default_factory=dict)
+    """Noise, torque, kinds of run: for reports."""
+
+    @classmethod
+    def of(cls, library: Library, heard: Mapping[str, float]) -> "Evidence":
+        """Multiply a library's columns out."""
+        X, at = _stack(library)
+        of_drives = library.regression.of_drives
+        y = library.regression.measured
+        parts = [(X[rows], y[rows]) for rows in (of_drives, ~of_drives)]
+        drives, cuffs = parts
+        return cls(
+            drives[0].T @ drives[0], cuffs[0].T @ cuffs[0],
+            drives[0].T @ drives[1], cuffs[0].T @ cuffs[1],
+            tuple(_elements(library, at)), tuple(_background(library, at)), dict(heard),
+            _about(library),
+        )  # fmt: skip
+
+    def packed(self) -> dict[str, Any]:
+        """Return a row of a table: symmetric matrices as their upper triangles."""
+        upper = np.triu_indices(len(self.drives))
+        return {
+            "drives": self.drives[upper].astype(np.float32).tobytes(),
+            "cuffs": self.cuffs[upper].astype(np.float32).tobytes(),
+            "right": np.concatenate([self.drives_right, self.cuffs_right]).tobytes(),
+            "text": json.dumps(
+                {
+                    "elements": [asdict(element) for element in self.elements],
+                    "background": self.background, "heard": self.heard, "about": self.about,
+                }
+            ),
+        }  # fmt: skip
+
+    @classmethod
+    def unpacked(cls, row: Mapping[str, Any]) -> "Evidence":
+        """Return the evidence of a row that ``packed`` made."""
+        right = np.frombuffer(row["right"])
+        n, text = len(right) // 2, json.loads(row["text"])
+        return cls(
+            _symmetric(row["drives"], n), _symmetric(row["cuffs"], n), right[:n], right[n:],
+            tuple(Element(**one) for one in text["elements"]),
+            tuple((kind, place, v) for kind, place, v in text["background"]),
+            text["heard"], text["about"],
+        )  # fmt: skip
+
+
+def _symmetric(packed: bytes, n: int) -> NDArray:
+    full = np.zeros((n, n))
+    upper = np.triu_indices(n)
+    full[upper] = np.frombuffer(packed, np.float32)
+    return full + np.triu(full, 1).T
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Where in the matrix columns stand: causes, their derivatives, laws, curves of time."""
+
+    causes: list[NDArray]
+    derivatives: list[NDArray]
+    laws: NDArray
+    curves: NDArray
+
+
+def _stack(library: Library) -> tuple[NDArray, _Places]:
+    """Put all columns side by side, (N, n)."""
+    joints = library.regression.joints
+    torque = library.prepared.torque[:joints]
+    del torque
+    columns = [cause.columns for cause in library.causes]
+    derivatives = [cause.derivative for cause in library.causes]
+    parts = [*columns, *derivatives, library.law_columns, library.curve_columns]
+    ends = np.cumsum([0, *(part.shape[1] for part in parts)])
+    places = [np.arange(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    k = len(columns)
+    return np.hstack(parts), _Places(places[:k], places[k : 2 * k], places[-2], places[-1])
+
+
+def _elements(library: Library, at: _Places) -> list[Element]:
+    names = library.prepared.baseline.joints
+    laws = _laws_by_kind(library.laws, at.laws)
+    for j in range(len(names)):
+        own = [
+            (int(p), c[2]) for p, c in zip(at.curves, library.curves, strict=True) if c[0] == j
+        ]
+        laws[TIME, j, "all"] = own
+    two = any(wearer == "human" for _, _, wearer in laws)
+    elements = [
+        _of_cause(number, cause, at, laws, names, two)
+        for number, cause in enumerate(library.causes)
+    ]
+    elements += [
+        Element(
+            f"law:{kind}@{names[j]}", kind, names[j], FAMILIES[kind], True,
+            [int(p) for p, _ in own], _normalised([v for _, v in own]),
+            repeats=FAMILIES[kind] != TIME, wearer=wearer,
+        )
+        for (kind, j, wearer), own in laws.items() if wearer != "cuffs"
+    ]  # fmt: skip
+    return elements
+
+
+Laws = dict[tuple[str, int, str], list[tuple[int, float]]]
+
+
+def _laws_by_kind(laws: Sequence[LawColumn], places: NDArray) -> Laws:
+    found: Laws = {}
+    for law, place in zip(laws, places, strict=True):
+        found.setdefault((law.kind, law.joint, law.wearer), []).append((int(place), law.variance))
+    return found
+
+
+def _normalised(variance: Sequence[float]) -> list[float]:
+    total = sum(variance)
+    return [v / total for v in variance]
+
+
+def _of_cause(
+    number: int, cause: Cause, at: _Places, laws: Laws, names: Sequence[str], two: bool
+) -> Element:
+    effect = cause.candidate.effect
+    places = at.causes[number].tolist()
+    resembles = list(_resembled(effect, laws, names, two))
+    total = sum(v for _, v in resembles)
+    return Element(
+        effect.label, effect.name, effect.joint, family_of(effect), False, places,
+        [1.0 / len(places)] * len(places), at.derivatives[number].tolist(),
+        [p for p, _ in resembles], [v / total for _, v in resembles],
+        cause.amplitudes[_positive(cause)].tolist(),
+        not effect.goes_with_time and family_of(effect) != TIME, cause.first, effect.each_run,
+        effect.run is not None, place=number,
+    )  # fmt: skip
+
+
+def _positive(cause: Cause) -> list[int]:
+    """Return which of the effect's amplitudes are never negative."""
+    effect, bends = cause.candidate.effect, cause.candidate.bends
+    if bends:
+        # A column is the effect at its shape: turned over, it would be a spring that pushes.
+        free = [p for p in effect.shape if p.default is None]
+        return [0] if all(p.typical[0] > 0 and p.unit != "1" for p in free) else []
+    if len(effect.linear) != len(cause.amplitudes):
+        return []  # each run has some amplitude for itself
+    return [i for i, p in enumerate(effect.linear) if p.typical[0] >= 0]
+
+
+RESEMBLES = {
+    "stribeck_friction": ("speed",), "coulomb_asymmetry": ("speed",),
+    "viscous_asymmetry": ("speed",), "quadratic_drag": ("speed",),
+    "load_dependent_friction": ("load", "speed"),
+    "presliding_hysteresis": ("speed", "friction_by_angle"),
+    "friction_warmup": ("friction_over_time", "speed"), "cogging": ("angle",),
+    "parallel_spring": ("angle", "speed"), "passive_joint_torque": ("angle",),
+    "rotor_inertia": ("inertia_by_angle",),
+    "backlash": ("load", "angle", "speed", "inertia_by_angle"),
+    "joint_elasticity": ("load", "angle", "speed", "inertia_by_angle", "other_load"),
+    "time_delay": ("load", "speed", "inertia_by_angle"),
+    "base_tilt": ("angle", "other_angle", "both_angles"),
+    "encoder_offset": ("angle", "other_angle", "both_angles"),
+    "mass_off_axis": ("angle", "both_angles", "inertia_by_angle"),
+    "payload_change": ("angle", "both_angles", "time"),
+    "torque_gain": ("load", "gain_over_time"), "torque_drift": ("time",),
+    "voluntary_torque": ("time",), "spasticity": ("speed",),
+    "cuff_compliance": (
+        "angle", "load", "speed", "inertia_by_angle", "other_load", "both_angles"
+    ),
+    "rotor_coupling": ("inertia_by_angle",),
+}  # fmt: skip
+
+
+def family_of(effect: Effect) -> str:
+    """Return the family that an effect belongs to."""
+    return str(effect.side)
+
+
+def _resembled(effect: Effect, laws: Laws, names: Sequence[str], two: bool):
+    """Yield place and variance of the laws that an effect's true form may differ by."""
+    wearer = "human" if effect.on_limb and two else "all"
+    for kind in RESEMBLES.get(effect.name, ()):
+        for j, name in enumerate(names):
+            if effect.joint in (None, name):
+                yield from laws.get((kind, j, "all" if kind == TIME else wearer), [])
+
+
+def _background(library: Library, at: _Places):
+    """Yield what a good rig has: kind, column and relative variance."""
+    for law, place in zip(library.laws, at.laws, strict=True):
+        yield "cuff" if law.wearer == "cuffs" else "law", int(place), law.variance
+    for (_, _, variance), place in zip(library.curves, at.curves, strict=True):
+        yield "wander", int(place), variance
+    for cause, places in zip(library.causes, at.causes, strict=True):
+        effect = cause.candidate.effect
+        if cause.first and not effect.each_run and effect.run is None:
+            yield from (("cause", int(place), 1.0 / len(places)) for place in places)
+
+
+def _about(library: Library) -> dict[str, Any]:
+    prepared = library.prepared
+    return {
+        "kinds": [run.motion.run for run in prepared.runs],
+        "density": prepared.noise.density.tolist(),
+        "correlation_s": prepared.noise.correlation_s.tolist(),
+        "from_periods": prepared.noise.from_periods,
+        "torque": prepared.torque.tolist(),
+        "shapes": [[list(map(float, s)) for s in c.candidate.shapes] for c in library.causes],
+    }

@@ -1,0 +1,146 @@
+"""The answer at the depth that the data support: what is missing, from its repeating to its cause.
+
+Findings form a tree: whether it repeats with the motion, at which joint, which family of laws it
+belongs to, which cause it is. Each is told at the deepest node whose probability reaches one half.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from pipelines.diagnosis.selection.answer import Answer
+from pipelines.diagnosis.selection.evidence import Element
+from pipelines.diagnosis.selection.posterior import Posterior
+
+LIKELY = 0.5
+"""Probability from which a node is told."""
+CLOSEST = 3
+"""Listed causes that are told where none is named."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is missing."""
+
+    level: str
+    """``repeatability``, ``joint``, ``family`` or ``cause``."""
+    repeats: bool | None
+    joint: str | None
+    family: str | None
+    probability: float
+    causes: tuple[tuple[str, float], ...]
+    """Listed causes that come closest, with their probabilities."""
+    path: tuple[tuple[str, Any, float], ...]
+    """Level, value and probability of each node on the way."""
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what the verdict says of it."""
+        return {
+            "level": self.level, "repeats": self.repeats, "joint": self.joint,
+            "family": self.family, "probability": self.probability,
+            "causes": [_cause(label, p) for label, p in self.causes],
+            "path": [
+                {"level": level, "value": value, "probability": p} for level, value, p in self.path
+            ],
+        }  # fmt: skip
+
+
+def _cause(label: str, probability: float) -> dict[str, Any]:
+    effect, _, joint = label.partition("@")
+    return {"effect": effect, "joint": joint or None, "probability": probability}
+
+
+def findings(posterior: Posterior, answer: Answer) -> list[Finding]:
+    """Return what is missing, the most probable first; empty where nothing is."""
+    missing = 1.0 - posterior.nothing
+    if missing < LIKELY:
+        return []
+    root = ("missing", True, missing)
+    told = [_of_cause(posterior, answer, n, root) for n in range(len(answer.named))]
+    covered = {(finding.joint, finding.family) for finding in told}
+    told += list(_families(posterior, root, covered))
+    if not told:
+        told += list(_joints(posterior, root)) or [_repeatability(posterior, root)]
+    return sorted(told, key=lambda finding: -finding.probability)
+
+
+def _of_cause(
+    posterior: Posterior, answer: Answer, number: int, root: tuple[str, Any, float]
+) -> Finding:
+    named = answer.named[number]
+    element = named.element
+    path = (root, *_path(posterior, element), ("cause", element.label, named.probability))
+    return Finding(
+        "cause", element.repeats, element.joint, element.family, named.probability,
+        ((element.label, named.alone), *named.ties), path,
+    )  # fmt: skip
+
+
+def _path(posterior: Posterior, element: Element) -> Iterator[tuple[str, Any, float]]:
+    """Yield the nodes above an element."""
+    yield "repeats", element.repeats, _chance(posterior, lambda e: e.repeats == element.repeats)
+    yield "joint", element.joint, _chance(posterior, lambda e: e.joint == element.joint)
+    yield "family", element.family, _chance(posterior, _same(element))
+
+
+def _same(element: Element) -> Callable[[Element], bool]:
+    return lambda e: (e.joint, e.family) == (element.joint, element.family)
+
+
+def _families(
+    posterior: Posterior, root: tuple[str, Any, float], covered: set[tuple[str | None, str | None]]
+) -> Iterator[Finding]:
+    """Yield families at joints that are likely and hold no named cause."""
+    for joint, family in dict.fromkeys((e.joint, e.family) for e in posterior.elements):
+        if (joint, family) in covered:
+            continue
+
+        def belongs(e: Element, joint: str | None = joint, family: str = family) -> bool:
+            return (e.joint, e.family) == (joint, family)
+
+        chance = _chance(posterior, belongs)
+        if chance < LIKELY:
+            continue
+        first = max(
+            (e for e in posterior.elements if belongs(e)),
+            key=lambda e: posterior.marginals.get(e.label, 0.0),
+        )
+        path = (root, *_path(posterior, first))
+        yield Finding(
+            "family", first.repeats, joint, family, chance, _closest(posterior, belongs), path
+        )
+
+
+def _closest(
+    posterior: Posterior, belongs: Callable[[Element], bool]
+) -> tuple[tuple[str, float], ...]:
+    """Return the listed causes that come closest, the most probable first."""
+    labels = {e.label for e in posterior.elements if belongs(e) and not e.is_law}
+    ranked = [(label, p) for label, p in posterior.marginals.items() if label in labels]
+    return tuple(ranked[:CLOSEST])
+
+
+def _joints(posterior: Posterior, root: tuple[str, Any, float]) -> Iterator[Finding]:
+    for joint in dict.fromkeys(e.joint for e in posterior.elements):
+        chance = _chance(posterior, lambda e, joint=joint: e.joint == joint)
+        if chance >= LIKELY:
+            path = (root, ("joint", joint, chance))
+            close = _closest(posterior, lambda e, joint=joint: e.joint == joint)
+            yield Finding("joint", None, joint, None, chance, close, path)
+
+
+def _repeatability(posterior: Posterior, root: tuple[str, Any, float]) -> Finding:
+    chances = {r: _chance(posterior, lambda e, r=r: e.repeats == r) for r in (True, False)}
+    repeats = max(chances, key=lambda r: chances[r])
+    chance = chances[repeats]
+    return Finding(
+        "repeatability", repeats, None, None, max(chance, root[2]),
+        _closest(posterior, lambda e: True), (root, ("repeats", repeats, chance)),
+    )  # fmt: skip
+
+
+def _chance(posterior: Posterior, belongs: Callable[[Element], bool]) -> float:
+    """Return the probability that some element of the true set belongs to a node."""
+    inside = {i for i, element in enumerate(posterior.elements) if belongs(element)}
+    pairs = zip(posterior.sets, posterior.probabilities, strict=True)
+    return float(sum(p for chosen, p in pairs if not inside.isdisjoint(chosen)))

@@ -1,0 +1,234 @@
+"""How well a set of causes and laws explains a session, all amplitudes integrated out.
+
+Given shapes everything is linear and Gaussian: y = sum over the set of (A a + D d) + F f + noise,
+with A the element's columns, D what its true form may differ by (a step along its shapes, and the
+smooth laws that it resembles), and F the background of a good rig. So the marginal likelihood is a
+closed form in Gram matrices (Bishop, 2006, Pattern Recognition and Machine Learning, sec. 3.5):
+
+    log p = u' (I + S G S)^-1 u / 2 - log det (I + S G S) / 2,  u = S X'y,  S the prior's sd.
+"""
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular
+from scipy.special import log_ndtr, logsumexp
+
+from pipelines.diagnosis.criteria import Criteria
+from pipelines.diagnosis.selection.evidence import Element, Evidence
+
+ROUGH_SHARE = 0.08
+"""Prior share with which sets are screened before each is weighed in full."""
+WIDEST = 12
+"""Columns of an element that count while screening."""
+WIDTHS = (3, 6, WIDEST)
+"""Widths by which elements are screened together."""
+CHUNK = 4000
+LEAST_SIZE = 1e-4
+"""Share below which an element's size makes no difference to what its form may differ by."""
+
+
+class MarginalLikelihood:
+    """Weighs sets of elements, the background marginalised."""
+
+    def __init__(self, evidence: Evidence, criteria: Criteria) -> None:
+        """Weight rows, and marginalise the background."""
+        self.evidence, self.criteria = evidence, criteria
+        drive, cuff = criteria.drive_weight, criteria.cuff_weight
+        gram = drive * evidence.drives + cuff * evidence.cuffs
+        right = drive * evidence.drives_right + cuff * evidence.cuffs_right
+        self.gram, self.right = _without(gram, right, *self._background())
+        self.parts = [
+            np.array([*e.columns, *e.derivative], dtype=int) for e in evidence.elements
+        ]
+        self.log_prior = np.array([self._log_prior(e) for e in evidence.elements])
+
+    def _background(self) -> tuple[NDArray, NDArray]:
+        c = self.criteria
+        share = {
+            "law": c.background_law, "cuff": c.background_cuff,
+            "wander": c.background_wander, "cause": c.background_cause,
+        }  # fmt: skip
+        told = self.evidence.background
+        sd = [share[kind] * np.sqrt(variance) for kind, _, variance in told]
+        return np.array([place for _, place, _ in told], dtype=int), np.array(sd)
+
+    def _log_prior(self, element: Element) -> float:
+        """Return an element's prior log odds, and what is heard and felt of it."""
+        c = self.criteria
+        if element.is_law:
+            return c.law
+        heard = self.evidence.heard.get(element.label, 0.0)
+        share = c.impacts if element.name == "backlash" else c.coherence
+        return (
+            c.cause + c.other_shape * (not element.first) + c.each_run * element.each_run
+            + c.worn * element.worn + share * heard
+        )  # fmt: skip
+
+    def prior(self, chosen: Sequence[int]) -> float:
+        """Return the prior log odds of a set against the empty one."""
+        return float(self.log_prior[list(chosen)].sum()) + self.criteria.further * (len(chosen) - 1)
+
+    def __call__(self, chosen: Sequence[int]) -> float:
+        """Return the log posterior odds of a set against the empty one."""
+        if not chosen:
+            return 0.0
+        elements = [self.evidence.elements[i] for i in chosen]
+        sizes = self.sizes(chosen)
+        amplitudes = np.array(self.criteria.amplitudes)
+        nearest = [amplitudes[np.argmin(np.abs(np.log(amplitudes / z)))] for z in sizes]
+        columns = np.concatenate([self.parts[i] for i in chosen])
+        variance = np.concatenate(
+            [self._variance(e, sd**2) for e, sd in zip(elements, nearest, strict=True)]
+        )
+        differ, spread = _together(elements, sizes)
+        misfits = self.criteria.misfits if len(differ) else (0.0,)
+        weighed = [
+            self._log_evidence(
+                np.append(columns, differ) if share else columns,
+                np.append(variance, share**2 * spread) if share else variance,
+                elements,
+            )
+            for share in misfits
+        ]
+        mixture = -np.log(len(amplitudes)) * len(chosen) - np.log(len(misfits))
+        return float(logsumexp(weighed)) + mixture + self.prior(chosen)
+
+    def _variance(self, element: Element, amplitude: float) -> NDArray:
+        """Return the prior variances of an element's columns and derivatives."""
+        shapes = np.full(len(element.derivative), self.criteria.shape_sd**2)
+        return np.append(amplitude * np.array(element.variance), shapes)
+
+    def sizes(self, chosen: Sequence[int]) -> NDArray:
+        """Return the share that each element of a set has, (set,)."""
+        elements = [self.evidence.elements[i] for i in chosen]
+        columns = np.concatenate([self.parts[i] for i in chosen])
+        largest = max(self.criteria.amplitudes) ** 2
+        variance = np.concatenate([self._variance(e, largest) for e in elements])
+        system = self.gram[np.ix_(columns, columns)] + np.diag(1.0 / variance)
+        values = np.linalg.solve(system, self.right[columns])
+        ends = np.cumsum([0, *(len(self.parts[i]) for i in chosen)])
+        own = [
+            values[a : a + len(e.columns)] for a, e in zip(ends[:-1], elements, strict=True)
+        ]
+        return np.maximum([_share(e, v) for e, v in zip(elements, own, strict=True)], LEAST_SIZE)
+
+    def _log_evidence(
+        self, columns: NDArray, variance: NDArray, elements: Sequence[Element]
+    ) -> float:
+        """Return the log Bayes factor of columns with prior variances, signs included."""
+        sd = np.sqrt(variance)
+        system = self.gram[np.ix_(columns, columns)] * np.outer(sd, sd)
+        system[np.diag_indices_from(system)] += 1.0
+        lower = cholesky(system, lower=True, check_finite=False, overwrite_a=True)
+        u = solve_triangular(lower, sd * self.right[columns], lower=True, check_finite=False)
+        value = 0.5 * float(u @ u) - float(np.log(np.diag(lower)).sum())
+        at = 0
+        for element in elements:
+            k = len(element.columns)
+            if element.amplitudes:
+                value += _log_sign(np.array(element.amplitudes), lower, u, sd, at)
+            at += k + len(element.derivative)
+        return value
+
+    def pairs(self, chosen: Sequence[int]) -> tuple[NDArray, NDArray]:
+        """Return all pairs of different labels among elements, (p, 2), and rough log odds, (p,)."""
+        chosen = np.asarray(chosen)
+        labels = np.array([self.evidence.elements[i].label for i in chosen])
+        one, other = np.triu_indices(len(chosen), 1)
+        apart = labels[one] != labels[other]
+        one, other = one[apart], other[apart]
+        columns, sd, width = self._padded(chosen)
+        odds = np.empty(len(one))
+        for a in WIDTHS:
+            for b in WIDTHS:
+                rows = np.flatnonzero((width[one] == a) & (width[other] == b))
+                for start in range(0, len(rows), CHUNK):
+                    some = rows[start : start + CHUNK]
+                    c = np.hstack([columns[one[some], :a], columns[other[some], :b]])
+                    s = np.hstack([sd[one[some], :a], sd[other[some], :b]])
+                    odds[some] = self._rough(c, s)
+        odds += self.log_prior[chosen[one]] + self.log_prior[chosen[other]]
+        return np.column_stack([chosen[one], chosen[other]]), odds + self.criteria.further
+
+    def _padded(self, chosen: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+        """Return elements' columns and prior sds padded to one width, and the width that counts."""
+        columns = np.zeros((len(chosen), WIDEST), dtype=int)
+        sd, width = np.zeros((len(chosen), WIDEST)), np.zeros(len(chosen), dtype=int)
+        for n, i in enumerate(chosen):
+            own = self.parts[i][:WIDEST]
+            columns[n, : len(own)] = own
+            variance = self._variance(self.evidence.elements[i], ROUGH_SHARE**2)
+            sd[n, : len(own)] = np.sqrt(variance[:WIDEST])
+            width[n] = next(w for w in WIDTHS if w >= len(own))
+        return columns, sd, width
+
+    def _rough(self, columns: NDArray, sd: NDArray) -> NDArray:
+        """Return log Bayes factors of many sets of columns at once, (sets, c) each."""
+        system = self.gram[columns[:, :, np.newaxis], columns[:, np.newaxis, :]]
+        system *= sd[:, :, np.newaxis] * sd[:, np.newaxis, :]
+        diagonal = np.arange(columns.shape[1])
+        system[:, diagonal, diagonal] += 1.0
+        u = self.right[columns] * sd
+        lower = np.linalg.cholesky(system)
+        solved = np.linalg.solve(system, u[:, :, np.newaxis])[:, :, 0]
+        spread = np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
+        return 0.5 * np.sum(solved * u, axis=1) - spread
+
+    def rough(self, chosen: Sequence[int]) -> float:
+        """Return a set's log odds without what its forms may differ by."""
+        columns = np.concatenate([self.parts[i] for i in chosen])
+        elements = [self.evidence.elements[i] for i in chosen]
+        variance = np.concatenate([self._variance(e, ROUGH_SHARE**2) for e in elements])
+        value = self._rough(columns[np.newaxis], np.sqrt(variance)[np.newaxis])[0]
+        return float(value) + self.prior(chosen)
+
+    @cached_property
+    def alone(self) -> NDArray:
+        """Log odds of each element alone, (elements,)."""
+        return np.array([self((i,)) for i in range(len(self.evidence.elements))])
+
+
+def _without(
+    gram: NDArray, right: NDArray, background: NDArray, sd: NDArray
+) -> tuple[NDArray, NDArray]:
+    """Marginalise background columns with prior sds out of the products."""
+    system = gram[np.ix_(background, background)] * np.outer(sd, sd)
+    system[np.diag_indices_from(system)] += 1.0
+    lower = cholesky(system, lower=True, check_finite=False, overwrite_a=True)
+    X = solve_triangular(lower, gram[background] * sd[:, np.newaxis], lower=True, check_finite=False)
+    u = solve_triangular(lower, right[background] * sd, lower=True, check_finite=False)
+    return gram - X.T @ X, right - X.T @ u
+
+
+def _share(element: Element, values: NDArray) -> float:
+    """Return the share that coefficients make; the columns of a cause are orthonormal."""
+    return float(np.linalg.norm(values))
+
+
+def _together(elements: Sequence[Element], sizes: NDArray) -> tuple[NDArray, NDArray]:
+    """Return the columns by which the forms of a set may differ, and their variances at share 1."""
+    spread: dict[int, float] = {}
+    for element, size in zip(elements, sizes, strict=True):
+        for place, variance in zip(element.resembles, element.resembles_variance, strict=True):
+            spread[place] = spread.get(place, 0.0) + size**2 * variance
+    return np.array(list(spread), dtype=int), np.array(list(spread.values()))
+
+
+def _log_sign(
+    amplitudes: NDArray, lower: NDArray, u: NDArray, sd: NDArray, at: int
+) -> float:
+    """Return what knowing that amplitudes (p, k) are not negative adds to the log evidence.
+
+    The prior is symmetric, so the factor is twice the posterior probability of the sign.
+    """
+    k = amplitudes.shape[1]
+    units = np.zeros((len(u), k))
+    units[np.arange(at, at + k), np.arange(k)] = sd[at : at + k]
+    half = solve_triangular(lower, units, lower=True, check_finite=False)
+    mean, covariance = half.T @ u, half.T @ half
+    centre = amplitudes @ mean
+    spread = np.sqrt(np.einsum("pi,ij,pj->p", amplitudes, covariance, amplitudes))
+    return float(np.sum(log_ndtr(centre / np.maximum(spread, 1e-300)) + np.log(2.0)))

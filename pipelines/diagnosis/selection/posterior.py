@@ -1,0 +1,114 @@
+"""The posterior over sets of causes and laws, and what it says of each.
+
+Every single element and every pair is weighed; triples extend the best pairs. What is reported are
+marginals: of nothing missing, of each cause, of something unlisted, of each family at each joint.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.criteria import CRITERIA, Criteria
+from pipelines.diagnosis.selection.evidence import TIME, Element, Evidence
+from pipelines.diagnosis.selection.marginal_likelihood import MarginalLikelihood
+
+SHAPES = 2
+"""Shapes of each cause that pairs are made of."""
+PAIRS = 150
+"""Pairs that are weighed in full."""
+PARTNERS = 15
+"""Elements with which a torque that wanders is paired."""
+EXTENDED = 6
+"""Pairs that are extended to triples."""
+TRIPLES = 8
+"""Triples of each pair that are weighed in full."""
+
+Set = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Probabilities of sets of elements."""
+
+    elements: tuple[Element, ...]
+    sets: tuple[Set, ...]
+    """By falling probability."""
+    probabilities: NDArray
+    """(sets,); they add up to one."""
+
+    @cached_property
+    def by_labels(self) -> dict[frozenset[str], float]:
+        """Probability of each set of labels, whatever the shapes."""
+        found: dict[frozenset[str], float] = {}
+        for chosen, p in zip(self.sets, self.probabilities, strict=True):
+            labels = frozenset(self.elements[i].label for i in chosen)
+            found[labels] = found.get(labels, 0.0) + float(p)
+        return found
+
+    @property
+    def nothing(self) -> float:
+        """Probability that nothing is missing."""
+        return self.by_labels.get(frozenset(), 0.0)
+
+    @cached_property
+    def marginals(self) -> dict[str, float]:
+        """Probability that each label is in the true set, the most probable first."""
+        found: dict[str, float] = {}
+        for labels, p in self.by_labels.items():
+            for label in labels:
+                found[label] = found.get(label, 0.0) + p
+        return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+
+def posterior(evidence: Evidence, criteria: Criteria = CRITERIA) -> Posterior:
+    """Weigh all sets of up to three elements."""
+    weigh = MarginalLikelihood(evidence, criteria)
+    odds: dict[Set, float] = {(): 0.0}
+    odds |= {(i,): float(value) for i, value in enumerate(weigh.alone)}
+    for chosen in _pairs(weigh):
+        odds[chosen] = weigh(chosen)
+    for chosen in _triples(weigh, odds):
+        odds[chosen] = weigh(chosen)
+    sets = sorted(odds, key=lambda chosen: -odds[chosen])
+    values = np.array([odds[chosen] for chosen in sets])
+    p = np.exp(values - values.max())
+    return Posterior(evidence.elements, tuple(sets), p / p.sum())
+
+
+def _contenders(weigh: MarginalLikelihood) -> tuple[list[int], list[int], list[int]]:
+    """Return the best shapes of each element, its best one, and the laws of wandering torque."""
+    elements = weigh.evidence.elements
+    shapes: dict[str, list[int]] = {}
+    for i in np.argsort(-weigh.alone):
+        element = elements[i]
+        shapes.setdefault(f"{element.variant}/{element.wearer}", []).append(int(i))
+    wide = [i for i, e in enumerate(elements) if e.is_law and e.name == TIME]
+    several = [i for own in shapes.values() for i in own[:SHAPES] if i not in wide]
+    return several, [own[0] for own in shapes.values()], wide
+
+
+def _pairs(weigh: MarginalLikelihood) -> list[Set]:
+    """Return the pairs to weigh in full."""
+    several, best, wide = _contenders(weigh)
+    pairs, odds = weigh.pairs(several)
+    order = np.argsort(-odds)[:PAIRS]
+    found = {tuple(sorted(map(int, pairs[n]))) for n in order}
+    found |= {tuple(sorted((w, i))) for w in wide for i in best[:PARTNERS] if i != w}
+    return sorted(found)
+
+
+def _triples(weigh: MarginalLikelihood, odds: dict[Set, float]) -> list[Set]:
+    """Return the triples to weigh in full: they extend the best pairs."""
+    elements = weigh.evidence.elements
+    _, best, wide = _contenders(weigh)
+    pairs = sorted((s for s in odds if len(s) == 2), key=lambda s: -odds[s])[:EXTENDED]
+    found: set[Set] = set()
+    for pair in pairs:
+        labels = {elements[i].label for i in pair}
+        more = [i for i in {*best, *wide} if elements[i].label not in labels]
+        scored = sorted(more, key=lambda i: -weigh.rough((*pair, i)))
+        found |= {tuple(sorted((*pair, i))) for i in scored[:TRIPLES]}
+    return sorted(found)

@@ -1,0 +1,124 @@
+"""The score that learning raises: the log probability that the posterior gives to the truth.
+
+The sets of a session that matter are found once under reference criteria; under others only these
+are weighed again, so that thousands of sessions can be scored many times.
+"""
+
+import json
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.criteria import Criteria
+from pipelines.diagnosis.selection.evidence import Evidence
+from pipelines.diagnosis.selection.marginal_likelihood import MarginalLikelihood
+from pipelines.diagnosis.selection.posterior import Posterior, Set, posterior
+from tests.learn.truth import Right, right_sets
+
+FLOOR = 1e-4
+"""Probability below which a truth counts the same: one hopeless session must not decide."""
+SETS = 120
+"""Sets of a session that are weighed again."""
+
+
+@dataclass(frozen=True)
+class Session:
+    """One session's evidence, reduced to the sets that matter."""
+
+    name: str
+    world: str
+    truth: dict[str, Any]
+    evidence: Evidence
+    sets: tuple[Set, ...]
+    right: NDArray
+    """(sets,) bool."""
+
+    @property
+    def forms(self) -> tuple[str, ...]:
+        """The forms of what is hidden, ``effect:form``."""
+        return tuple(f"{h['effect']}:{h['form']}" for h in self.truth["hidden"])
+
+
+def rows(root: Path, worlds: Sequence[str] = ()) -> Iterator[dict[str, Any]]:
+    """Yield the stored rows that have evidence."""
+    for file in sorted((root / "evidence").glob("*/*.parquet")):
+        if worlds and file.parent.name not in worlds:
+            continue
+        row = pq.read_table(file).to_pylist()[0]
+        if not row["refused"]:
+            yield row
+
+
+def reduced(row: dict[str, Any], criteria: Criteria) -> Session:
+    """Return a session with the sets that matter under some criteria."""
+    truth, evidence = json.loads(row["truth"]), Evidence.unpacked(row)
+    right = right_sets(truth)
+    kept = _kept(posterior(evidence, criteria), right)
+    return Session(row["name"], row["world"], truth, *_compact(evidence, kept, right))
+
+
+def _kept(found: Posterior, right: Right) -> list[Set]:
+    """Return the most probable sets, and the most probable right ones."""
+    def labels(chosen: Set) -> frozenset[str]:
+        return frozenset(found.elements[i].label for i in chosen)
+
+    true = [chosen for chosen in found.sets if right(labels(chosen))][: SETS // 4]
+    return list(dict.fromkeys((*found.sets[:SETS], *true, ())))
+
+
+def _compact(
+    evidence: Evidence, sets: Sequence[Set], right: Right
+) -> tuple[Evidence, tuple[Set, ...], NDArray]:
+    """Keep the elements and columns that sets need, and the background's."""
+    elements = sorted({i for chosen in sets for i in chosen})
+    columns = {place for _, place, _ in evidence.background}
+    for i in elements:
+        e = evidence.elements[i]
+        columns.update((*e.columns, *e.derivative, *e.resembles))
+    kept = np.array(sorted(columns))
+    new = {int(old): n for n, old in enumerate(kept)}
+
+    def moved(places: Sequence[int]) -> list[int]:
+        return [new[p] for p in places]
+
+    own = tuple(
+        replace(e, columns=moved(e.columns), derivative=moved(e.derivative),
+                resembles=moved(e.resembles))
+        for e in (evidence.elements[i] for i in elements)
+    )  # fmt: skip
+    square = np.ix_(kept, kept)
+    small = replace(
+        evidence, drives=evidence.drives[square].astype(np.float32),
+        cuffs=evidence.cuffs[square].astype(np.float32),
+        drives_right=evidence.drives_right[kept], cuffs_right=evidence.cuffs_right[kept],
+        elements=own, background=tuple((k, new[p], v) for k, p, v in evidence.background),
+    )  # fmt: skip
+    number = {i: n for n, i in enumerate(elements)}
+    chosen = tuple(tuple(number[i] for i in s) for s in sets)
+    true = np.array([right(frozenset(own[i].label for i in s)) for s in chosen])
+    return small, chosen, true
+
+
+def score(session: Session, criteria: Criteria) -> float:
+    """Return the log probability of the truth."""
+    weigh = MarginalLikelihood(session.evidence, criteria)
+    odds = np.array([weigh(chosen) for chosen in session.sets])
+    p = np.exp(odds - odds.max())
+    return float(np.log(max(p[session.right].sum() / p.sum(), FLOOR)))
+
+
+def scores(sessions: Sequence[Session], criteria: Criteria, pool: Executor | None = None) -> NDArray:
+    """Return the score of each session, (n,)."""
+    todo = [(session, criteria) for session in sessions]
+    found = pool.map(_scored, todo, chunksize=8) if pool else map(_scored, todo)
+    return np.array(list(found))
+
+
+def _scored(job: tuple[Session, Criteria]) -> float:
+    return score(*job)
