@@ -83,7 +83,7 @@ def signature(effect: type[Effect]) -> Signature:
     """
     bodies_and_friction = baseline(THE_LEG, RUNS)
     hidden = None if effect in map(type, bodies_and_friction) else _sized(effect)
-    assumed = Model(tuple(Term(e, np.zeros(len(e.linear))) for e in bodies_and_friction if e.name != effect.name))
+    assumed = Model.of(e for e in bodies_and_friction if e.name != effect.name)
     found = [next(regressions(motion, assumed)) for motion in _recorded([hidden] if hidden else [])]
     A, y = (np.concatenate([part[r.usable] for r, part in zip(found, parts, strict=True)])
             for parts in ([r.regressor for r in found], [r.torque for r in found]))  # fmt: skip

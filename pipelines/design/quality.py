@@ -15,7 +15,7 @@ from pipelines.mechanics.machine import THE_LEG
 from pipelines.mechanics.mechanisms.leg import INERTIAL
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.trajectory import Trajectory
-from pipelines.model import Model, Term, baseline
+from pipelines.model import Model, baseline
 from pipelines.settings.design import DesignSettings, NoiseSettings
 
 JOINTS = ("hip", "knee")
@@ -124,7 +124,7 @@ def standard_errors(trajectory: Trajectory, noise: NoiseSettings, geometry: Geom
 def paper_model() -> Model:
     """Return the model an excitation is for: the rigid body, Coulomb and viscous friction of both joints."""
     effects = baseline(THE_LEG, ("exo_alone",))
-    return Model(tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects))
+    return Model.of(effects)
 
 
 def _parameters() -> dict[str, str]:

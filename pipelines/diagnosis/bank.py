@@ -8,11 +8,12 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.candidates import Candidate, expanded, gram_of_runs, proposals, signatures
+from pipelines.diagnosis.candidates import Candidate, columns_under, gram_of_runs, proposals, signatures
 from pipelines.diagnosis.gram import Gram, error, gram_of, solve
 from pipelines.diagnosis.observations import FOLDS, Baseline, Run, with_load
 from pipelines.diagnosis.scan import Scan, worth_a_look
 from pipelines.mechanics.geometry import Geometry
+from pipelines.model import TermColumns
 
 PASSES = 3
 ROWS = 4096
@@ -31,7 +32,7 @@ class Bank:
     runs: tuple[Run, ...]
     baseline: Baseline
     candidates: tuple[Candidate, ...]
-    where: tuple[slice, ...]
+    columns: tuple[TermColumns, ...]
     """Each candidate's columns in ``gram``; the baseline's come first."""
     gram: Gram
     weights: NDArray
@@ -44,9 +45,9 @@ class Bank:
 
     def columns_of(self, chosen: Sequence[int]) -> NDArray:
         """Return the columns of the baseline and some candidates, (c,) places in ``gram``."""
-        parts = [np.arange(self.baseline.size)]
-        parts += [np.arange(self.where[i].start, self.where[i].stop) for i in chosen]
-        return np.concatenate(parts)
+        places = np.arange(len(self.gram.columns[0, 0]))
+        parts = [slice(self.baseline.size), *(self.columns[i].slice for i in chosen)]
+        return np.concatenate([places[part] for part in parts])
 
 
 def weights_under(gram: Gram) -> NDArray:
@@ -63,28 +64,30 @@ def fill(
     runs: Sequence[Run], baseline: Baseline, report: Callable[[float, str], None] = lambda share, what: None
 ) -> Bank:
     """Compute every candidate's columns; ``report`` is told the share done and the effect at hand."""
-    untouched = [run.average(baseline.columns(run.motion, run.motion, run.motion)) for run in runs]
+    untouched = [columns_under((), run, baseline)[0] for run in runs]
     plain = gram_of_runs(runs, untouched)
     weights = weights_under(plain)
     runs = [with_load(run, baseline, solve(plain, weights)) for run in runs]
     scan = Scan.of(runs, untouched, weights)
     candidates: list[Candidate] = []
-    where: list[slice] = []
+    places: list[TermColumns] = []
     columns = [untouched]
     at = baseline.size
-    effects = list(proposals(baseline, [run.motion.run for run in runs]))
+    kinds = [run.motion.run for run in runs]
+    effects = list(proposals(baseline, kinds))
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
         for candidate in worth_a_look(effect, scan):
-            shared = signatures(candidate, runs, baseline, untouched, weights)
-            made = expanded(shared, effect, candidate.signature_apart, runs)
+            own = candidate.columns_in(kinds, start=at)
+            narrow = signatures(candidate, runs, baseline, untouched, weights)
+            made = [own.expand(column, r) for r, column in enumerate(narrow)]
             if not all(np.isfinite(column).all() for column in made):  # a shape that tears the motion apart
                 continue
             candidates.append(candidate)
-            where.append(slice(at, at + made[0].shape[2]))
+            places.append(own)
             columns.append(made)
-            at += made[0].shape[2]
-    return Bank(tuple(runs), baseline, tuple(candidates), tuple(where), _multiplied_out(runs, columns), weights)
+            at += own.width
+    return Bank(tuple(runs), baseline, tuple(candidates), tuple(places), _multiplied_out(runs, columns), weights)
 
 
 def _multiplied_out(runs: Sequence[Run], columns: Sequence[Sequence[NDArray]]) -> Gram:

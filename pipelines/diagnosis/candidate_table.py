@@ -64,18 +64,15 @@ def _evaluated(d: Diagnosis, labels: tuple[str, ...], ranked: Ranked | None) -> 
 
 def _parameters(ranked: Ranked, d: Diagnosis) -> list[dict[str, Any]]:
     """Return what was fitted, as files name it; amplitudes that each run has for itself are left out."""
-    found, at = [], d.baseline.size
-    for cause in ranked.fit.causes:
-        effect = cause.effect
-        apart = cause.apart
-        shared = apart.count(False)
-        if not any(apart):
-            fitted = np.append(ranked.fit.values[at : at + shared], cause.shapes[0])
+    found = []
+    for number, cause in enumerate(ranked.fit.causes):
+        effect, columns = cause.effect, ranked.fit.columns_of(number)
+        if not any(columns.per_run):
+            fitted = np.append(ranked.fit.values[columns.slice], cause.shapes[0])
             found += [
                 {"name": p.name, "value": float(v), "unit": p.unit}
                 for p, v in zip(effect.parameters, effect.physical(fitted), strict=True)
             ]
-        at += shared + apart.count(True) * len(ranked.fit.acting(cause))
     return found
 
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.gram import Gram, gram_of, solve
 from pipelines.diagnosis.observations import FOLDS, Baseline, Run
-from pipelines.effects import EFFECTS, Effect, Parameter, Side
-from pipelines.model import BASELINE, Model, Term
+from pipelines.effects import EFFECTS, Effect, Parameter
+from pipelines.model import BASELINE, Model, Term, TermColumns
 
 WORN = ("mass_off_axis", "payload_change")
 """Effects of the structure that the person may carry instead: then in their runs only, and felt by the cuffs."""
@@ -41,7 +41,7 @@ class Candidate:
 
     def term(self, run: int) -> Term:
         """Return the candidate as a term of a run's model, its amplitudes nought."""
-        return Term(self.effect, np.append(np.zeros(len(self.effect.linear)), self.shapes[run]))
+        return Term.of(self.effect, self.shapes[run])
 
     def moved(self, i: int, step: float, runs: Sequence[int] | None = None) -> "Candidate":
         """Return the candidate with shape parameter ``i`` larger by a step, in some runs or in all."""
@@ -61,15 +61,10 @@ class Candidate:
         """Whether the effect changes kinematics or readings rather than adding torque of its own."""
         return bends_motion(self.effect)
 
-    @property
-    def apart(self) -> list[bool]:
-        """Which linear parameters have a column of their own for each run; none of one that bends."""
-        return [p.per_run and not self.bends for p in self.effect.linear]
-
-    @property
-    def signature_apart(self) -> list[bool]:
-        """The same of the columns of ``signatures``."""
-        return [self.effect.per_run] if self.bends else self.apart
+    def columns_in(self, kinds: Sequence[str], start: int = 0) -> TermColumns:
+        """Return the places of the columns that ``signatures`` gives for runs of some kinds."""
+        per_run = [self.effect.per_run] if self.bends else None
+        return TermColumns.of(self.effect, kinds, per_run, start)
 
     @property
     def own_bend(self) -> int | None:
@@ -129,21 +124,10 @@ def columns_under(terms: Sequence[Term], run: Run, baseline: Baseline) -> tuple[
     -------
     (m, O, size + linear parameters) columns and (m, O) measured torques, N·m.
     """
-    motion = run.motion
-    model = Model(tuple(terms))
-    motor = model.sensed(motion)
-    link = model.behind_motors(motor)
-    limb = model.behind_cuffs(link)
-    joints = len(baseline.joints)
-    parts = [baseline.columns(motor, link, limb)]
-    for term in sorted(terms, key=lambda t: t.effect.side is Side.SENSOR):
-        effect = term.effect
-        for part in parts:
-            part[:, :joints] = effect.observed(part[:, :joints], motion, term.shape)
-        at = limb if effect.on_limb else motor if effect.side is Side.DRIVE else link
-        own = effect.columns(at, term.shape)
-        parts.append(np.concatenate([own, own if effect.on_limb else np.zeros_like(own)], axis=1))
-    return run.average(np.concatenate(parts, axis=2)), run.measured_at(link)
+    model = Model((*baseline.terms, *terms))
+    motions = model.motions(run.motion)
+    columns = model.regressor(run.motion, cuffs=True, motions=motions)
+    return run.average(columns), run.measured_at(motions.link)
 
 
 def gram_of_runs(runs: Sequence[Run], columns: Sequence[NDArray], measured: Sequence[NDArray] | None = None) -> Gram:
@@ -188,32 +172,4 @@ def bent_column(columns: NDArray, measured: NDArray, values: NDArray, untouched:
 
 def torque_columns(candidate: Candidate, number: int, run: Run) -> NDArray:
     """Return a torque effect's columns in one run, (m, O, k): in the drives, and in the cuffs where a person has it."""
-    effect = candidate.effect
-    own = run.average(effect.columns(run.motion, candidate.shapes[number]))
-    return np.concatenate([own, own if effect.on_limb else np.zeros_like(own)], axis=1)
-
-
-def expanded(columns: Sequence[NDArray], effect: Effect, apart: Sequence[bool], runs: Sequence[Run]) -> list[NDArray]:
-    """Give those of an effect's columns that are ``apart`` one for each run the effect acts in, (m, O, k')."""
-    if not any(apart):
-        return list(columns)
-    acting = [r for r, run in enumerate(runs) if effect.explains(run.motion)]
-    wide = iter(expanded_columns([columns[r].reshape(-1, len(apart)) for r in acting], apart))
-    width = apart.count(False) + apart.count(True) * len(acting)
-    shapes = [c.shape[:2] for c in columns]
-    return [
-        next(wide).reshape(*shapes[r], width) if r in acting else np.zeros((*shapes[r], width))
-        for r in range(len(runs))
-    ]
-
-
-def expanded_columns(parts: Sequence[NDArray], apart: Sequence[bool]) -> list[NDArray]:
-    """Give those columns of each part (rows, k) that are ``apart`` a place of their own, nought in all other parts."""
-    if not any(apart):
-        return list(parts)
-    shared, own = [i for i, a in enumerate(apart) if not a], [i for i, a in enumerate(apart) if a]
-    wide = []
-    for number, part in enumerate(parts):
-        blocks = [part[:, own] if k == number else np.zeros((len(part), len(own))) for k in range(len(parts))]
-        wide.append(np.hstack([part[:, shared], *blocks]))
-    return wide
+    return run.average(Model((candidate.term(number),)).regressor(run.motion, cuffs=True))

@@ -244,7 +244,9 @@ def _ranked(scorer: Scorer, causes: Sequence[Candidate], empty: Fit) -> Ranked:
     best = refined(causes, bank.runs, bank.baseline, bank.weights)
     gain = log_likelihood(best.rms, empty.rms, independent, scorer.imperfect)
     # One that bends the motion has no amplitude of its own, but its shape is as free as one.
-    bends = sum(c.bends if c.own_bend is None else len(best.acting(c)) for c in best.causes)
+    bends = sum(
+        c.bends if c.own_bend is None else len(best.columns_of(number).runs) for number, c in enumerate(best.causes)
+    )
     ours = sum(len(c.effect.linear) - c.effect.priced for c in best.causes if isinstance(c.effect, FreerForm))
     columns = len(best.values) - len(empty.values) + bends - ours
     besides = sum(_heard_beside(best, label, scorer) for label in {c.label for c in best.causes})

@@ -25,8 +25,6 @@ from pipelines.diagnosis.candidates import (
     Candidate,
     bent_column,
     columns_under,
-    expanded,
-    expanded_columns,
     gram_of_runs,
     proposals,
     torque_columns,
@@ -46,6 +44,7 @@ from pipelines.diagnosis.thinned import thinned
 from pipelines.effects import Effect, Parameter
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.scale import on_one_scale
+from pipelines.model import TermColumns
 
 POWER = 0.9
 """Chance that an effect of the smallest visible size is found."""
@@ -149,7 +148,7 @@ class Sight:
     @classmethod
     def of(cls, runs: Sequence[Run], baseline: Baseline, floor: Floor) -> "Sight":
         """Fit the baseline and prepare its projection."""
-        untouched = tuple(run.average(baseline.columns(run.motion, run.motion, run.motion)) for run in runs)
+        untouched = tuple(columns_under((), run, baseline)[0] for run in runs)
         plain = gram_of_runs(runs, untouched)
         there = np.isfinite(floor.rms) & (floor.rms > 0)
         noise, imperfect = np.where(there, floor.rms, 1.0), imperfection(runs)
@@ -313,7 +312,8 @@ def _added(candidate: Candidate, sight: Sight, power: float) -> Look:
     effect = candidate.effect
     columns = [torque_columns(candidate, r, run) for r, run in enumerate(sight.runs)]
     direction = _direction(effect, columns, sight)
-    span = sight.left(expanded(columns, effect, candidate.apart, sight.runs))
+    own = candidate.columns_in([run.motion.run for run in sight.runs])
+    span = sight.left([own.expand(column, r) for r, column in enumerate(columns)])
     left = sight.left(direction)[:, 0]
     growth, by = _growth(effect, left, sight.rows(direction)[:, 0], span.shape[1], sight, power)
     size, unit = float(np.sqrt(growth)), sight.rms(effect, direction)
@@ -341,9 +341,9 @@ def _levels(effect: Effect) -> list[int]:
 
 def _wide(effect: Effect, columns: Sequence[NDArray], chosen: list[int], runs: Sequence[Run]) -> list[NDArray]:
     """Return some of an effect's columns, those that each run has for itself in places of their own, (m, O, k)."""
-    apart = [effect.linear[i].per_run for i in chosen]
-    wide = expanded_columns([c[:, :, chosen].reshape(c[:, :, 0].size, len(chosen)) for c in columns], apart)
-    return [w.reshape(*c.shape[:2], w.shape[1]) for w, c in zip(wide, columns, strict=True)]
+    per_run = [effect.linear[i].per_run for i in chosen]
+    own = TermColumns.of(effect, [run.motion.run for run in runs], per_run)
+    return [own.expand(column[:, :, chosen], r) for r, column in enumerate(columns)]
 
 
 def _direction(effect: Effect, columns: Sequence[NDArray], sight: Sight) -> list[NDArray]:

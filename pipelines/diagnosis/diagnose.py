@@ -43,6 +43,7 @@ from pipelines.diagnosis.ties import ALIKE
 from pipelines.diagnosis.uncertainty import Uncertainty, uncertainty
 from pipelines.dynamics.replay import replay
 from pipelines.effects import Effect
+from pipelines.effects.force_sensor_zero import ForceSensorZero
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import ExoidError, InputError
 from pipelines.estimation.angle_noise import CUTOFF_HZ, is_loud
@@ -51,7 +52,7 @@ from pipelines.label import effect_labelled
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.origin import giving
 from pipelines.mechanics.scale import on_one_scale
-from pipelines.model import unrealizable, upside_down
+from pipelines.model import Column, unrealizable, upside_down
 
 SEARCH_SHARE = 0.75
 """Of the progress bar that filling the bank takes."""
@@ -104,10 +105,11 @@ class Diagnosis:
         """Which parameters of the extended model the training runs hardly tell apart, in words."""
         fit = self.choice.named.fit
         shapes = [(fit.causes[number].effect, i) for number, i, _ in self.sure.shapes]
-        own = [*fit.amplitudes(), *((effect, effect.shape[i]) for effect, i in shapes)]
-        names = [*self.baseline.names, *(f"{parameter.name} of {effect.label}" for effect, parameter in own)]
+        columns = [*fit.layout.columns, *(Column(effect, effect.shape[i], None) for effect, i in shapes)]
         # Nobody asks for the zeros of the cuffs.
-        normal = profiled(self.sure.normal, np.arange(len(self.baseline.names), self.baseline.size))
+        zeros = [isinstance(column.effect, ForceSensorZero) for column in columns]
+        names = [column.name for column, zero in zip(columns, zeros, strict=True) if not zero]
+        normal = profiled(self.sure.normal, np.flatnonzero(zeros))
         seen = np.flatnonzero(np.diag(normal) > 0.0)
         return collinearities(normal[np.ix_(seen, seen)], [names[place] for place in seen])
 

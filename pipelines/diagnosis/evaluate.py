@@ -14,7 +14,7 @@ from pipelines.diagnosis.candidates import Candidate, columns_under
 from pipelines.diagnosis.fit import NEWTON_STEPS, Fit, laden, step_of, within_reach
 from pipelines.diagnosis.observations import Baseline, Run
 from pipelines.diagnosis.onset import ALWAYS, NEVER, Onset
-from pipelines.model import Term
+from pipelines.model import Model, Term
 
 STRETCH_S = 1.0
 """Of every second stretch a run's own onsets and phases are learnt, to be scored on the others."""
@@ -31,7 +31,7 @@ def _residual(fit: Fit, run: Run, baseline: Baseline) -> NDArray:
     effects = [cause.effect for cause in fit.causes]
     if not any(effect.per_run and effect.explains(run.motion) for effect in effects):
         columns, measured = columns_under([_shared_term(c) for c in fit.causes], run, baseline)
-        return measured - columns @ _shared_values(fit, baseline)[0]
+        return measured - columns @ fit.layout.select(fit.values, None)
     half = _halves(run)
     left = np.zeros_like(run.measured)
     for side in (0, 1):
@@ -52,30 +52,10 @@ def _shared_term(cause: Candidate) -> Term:
     return cause.term(0)
 
 
-def _shared_values(fit: Fit, baseline: Baseline) -> tuple[NDArray, NDArray]:
-    """Return the values in the order of one run's columns, and which of them a run has for itself."""
-    values, own = list(fit.values[: baseline.size]), [False] * baseline.size
-    at = baseline.size
-    for cause in fit.causes:
-        apart = cause.apart
-        shared = [i for i, a in enumerate(apart) if not a]
-        in_place = dict(zip(shared, fit.values[at : at + len(shared)], strict=True))
-        values += [in_place.get(i, 0.0) for i in range(len(apart))]
-        own += apart
-        at += len(shared) + (len(apart) - len(shared)) * len(fit.acting(cause))
-    return np.array(values), np.array(own, dtype=bool)
-
-
-def settled(fit: Fit, run: Run, baseline: Baseline) -> tuple[list[Term], NDArray]:
-    """Return the causes as terms of a run's model with its own onsets and phases, and the baseline's values (b,)."""
+def settled(fit: Fit, run: Run, baseline: Baseline) -> list[Term]:
+    """Return the causes as terms of a run's model with its own onsets and phases."""
     values, _, terms = _learn(fit, laden([run], fit, baseline)[0], baseline, run.usable)
-    at = baseline.size
-    filled = []
-    for term in terms:
-        width = len(term.effect.linear)
-        filled.append(replace(term, values=np.append(values[at : at + width], term.shape)))
-        at += width
-    return filled, values[: baseline.size]
+    return list(Model(tuple(terms)).with_linear(values[baseline.size :])) if terms else []
 
 
 Learnt = tuple[NDArray, NDArray, list[Term]]
@@ -106,7 +86,7 @@ def _begun(fit: Fit, made: Learnt, place: tuple[int, int], run: Run, baseline: B
 
 def _learn_amplitudes(fit: Fit, terms: list[Term], run: Run, baseline: Baseline, learnt: NDArray) -> Learnt:
     """Fit the run's own amplitudes and bends to samples (m, O)."""
-    shared, own = _shared_values(fit, baseline)
+    shared, own = fit.layout.select(fit.values, None), fit.layout.per_run
     bent, (columns, measured) = _bent(fit, terms, run, baseline, columns_under(terms, run, baseline), learnt)
     values = shared.copy()
     values[own] = _solved(columns[:, :, own], measured - columns @ shared, learnt, fit.weights)
@@ -120,7 +100,7 @@ def _bent(
 
     By Gauss and Newton's steps, as in ``fit.refined``; ``plain`` are the columns and torques under the terms as given.
     """
-    shared, own = _shared_values(fit, baseline)
+    shared, own = fit.layout.select(fit.values, None), fit.layout.per_run
     places = [(number, i) for number, cause in enumerate(fit.causes) if (i := cause.own_bend) is not None]
     for _ in range(NEWTON_STEPS if places else 0):
         columns, measured = plain

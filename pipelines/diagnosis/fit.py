@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from pipelines.diagnosis.candidates import Candidate, columns_under, expanded, gram_of_runs, lowest
+from pipelines.diagnosis.candidates import Candidate, columns_under, gram_of_runs, lowest
 from pipelines.diagnosis.gram import Gram, error, solve
 from pipelines.diagnosis.observations import Baseline, Run, with_load
 from pipelines.diagnosis.onset import ALWAYS, NEVER, Onset
 from pipelines.effects import Effect, Parameter, Side
+from pipelines.effects.friction import Friction
 from pipelines.mechanics.geometry import Geometry
+from pipelines.model import Column, ParameterLayout, TermColumns
 
 SWEEPS = 2
 EVALUATIONS = 14
@@ -56,8 +58,8 @@ class Fit:
     """(O,) N·m on what was fitted."""
     cost: float
     """Sum over outputs of samples times log rms: what refinement lowers."""
-    kinds: tuple[str, ...]
-    """The kind of each run fitted."""
+    layout: ParameterLayout
+    """Of the values: the baseline's terms, then the causes."""
     shares: NDArray
     """(O, size + ...) what each column carries, rms, of all that was measured at an output."""
     normal: NDArray
@@ -74,9 +76,9 @@ class Fit:
         which no mass moves as the rigid body does have taken a part of it for something else.
         """
         most = self.shares.max(axis=0)
-        for column, (effect, parameter) in enumerate(self.amplitudes(), start=baseline.size):
-            amplitude = abs(self.values[column])
-            if amplitude > BEYOND * max(map(abs, parameter.typical)) and most[column] > MOST_OF_ALL:
+        for place, (effect, parameter, _) in self._amplitudes(baseline):
+            amplitude = abs(self.values[place])
+            if amplitude > BEYOND * max(map(abs, parameter.typical)) and most[place] > MOST_OF_ALL:
                 return f"the {parameter.name} of {effect.label} is beyond any, and others take most of it away again"
             if effect.excess_over and self._gives_energy(effect, amplitude, baseline):
                 return f"{effect.label} is an excess over friction that gives energy"
@@ -84,24 +86,25 @@ class Fit:
 
     def _unreal(self, baseline: Baseline, geometry: Geometry) -> bool:
         """Tell whether the machine, or machine and person together, plainly have a least inertia below nought."""
-        inverse, p = np.linalg.pinv(self.normal, hermitian=True), baseline.body
-        for bodies in range(1, len(baseline.bodies) + 1):
-            X = self.values[: bodies * p].reshape(bodies, p).sum(axis=0)
+        inverse = np.linalg.pinv(self.normal, hermitian=True)
+        for number in range(1, len(self.layout.bodies) + 1):
+            bodies = np.array(self.layout.bodies[:number])
+            X = self.values[bodies].sum(axis=0)
             least, largest, slope = baseline.machine.mechanism.least_inertia(X, geometry)
-            along = np.tile(slope, bodies)
-            spread = np.sqrt(ALIKE * along @ inverse[: bodies * p, : bodies * p] @ along)
+            along, own = np.tile(slope, len(bodies)), bodies.ravel()
+            spread = np.sqrt(ALIKE * along @ inverse[np.ix_(own, own)] @ along)
             if -least > max(UNREAL * largest, SURE * spread):
                 return True
         return False
 
     def _gives_energy(self, effect: Effect, amplitude: float, baseline: Baseline) -> bool:
         """Tell whether the level that an effect is an excess over is plainly negative, with what else rubs there."""
-        place = baseline.names.index(f"{effect.joint} {effect.excess_over}")
+        place = self.layout.column_of(Friction.name, effect.joint, effect.excess_over)
         j = baseline.joints.index(str(effect.joint))
         level, carried = self.values[place], self.shares[j, place]
         others = [
             self.shares[j, column]
-            for column, (other, _) in enumerate(self.amplitudes(), start=baseline.size)
+            for column, (other, *_) in self._amplitudes(baseline)
             if other.joint == effect.joint and other.name != effect.name and (other.dissipative or other.holds)
         ]
         if level >= 0.0 or carried <= sum(others):
@@ -110,30 +113,17 @@ class Fit:
         lacking = -level * (1.0 - sum(others) / carried)
         return bool(lacking > max(UNGROUNDED * amplitude, SURE * spread))
 
-    def amplitudes(self) -> Iterator[tuple[Effect, Parameter]]:
-        """Yield effect and parameter that each of the causes' columns is the amplitude of, in their order."""
-        for cause in self.causes:
-            dealt = list(zip(cause.effect.linear, cause.apart, strict=True))
-            yield from ((cause.effect, p) for p, apart in dealt if not apart)
-            yield from [(cause.effect, p) for p, apart in dealt if apart] * len(self.acting(cause))
+    def _amplitudes(self, baseline: Baseline) -> Iterator[tuple[int, Column]]:
+        """Yield place and meaning of each column that is the amplitude of a cause."""
+        yield from itertools.islice(enumerate(self.layout.columns), baseline.size, None)
 
     def instead(self, number: int, cause: Candidate) -> list[Candidate]:
         """Return the causes with another in the place of one."""
         return [cause if k == number else c for k, c in enumerate(self.causes)]
 
-    def acting(self, cause: Candidate) -> list[int]:
-        """Return the runs in which a cause acts."""
-        effect = cause.effect
-        return [r for r, kind in enumerate(self.kinds) if kind in effect.acts_in and effect.run in (None, kind)]
-
-    def places(self, number: int, run: int) -> list[int]:
-        """Return where in ``values`` the linear parameters of a cause stand that hold in a run in which it acts."""
-        widths = [c.apart.count(False) + c.apart.count(True) * len(self.acting(c)) for c in self.causes]
-        cause, at = self.causes[number], len(self.values) - sum(widths[number:])
-        shared = iter(range(at, at + cause.apart.count(False)))
-        before = self.acting(cause).index(run) * cause.apart.count(True)
-        own = itertools.count(at + cause.apart.count(False) + before)
-        return [next(own) if apart else next(shared) for apart in cause.apart]
+    def columns_of(self, number: int) -> TermColumns:
+        """Return the columns of a cause in ``values``, and the runs in which it acts."""
+        return self.layout.terms[len(self.layout.terms) - len(self.causes) + number]
 
 
 def fit(
@@ -142,12 +132,13 @@ def fit(
     """Fit baseline and causes at the shapes they have, to runs with the ``loads`` that ``Fit.loads`` tells of.
 
     ``weights`` (O,) are the outputs' inverse variances."""
+    causes = tuple(sorted(causes, key=_last_sensors))
     gram = gram_of_runs(runs, *zip(*stacked_columns(causes, runs, baseline), strict=True))
     values = solve(gram, weights)
-    ordered, kinds = tuple(sorted(causes, key=_last_sensors)), tuple(run.motion.run for run in runs)
     found, rms, cost = _errors(gram, values)
     normal = np.einsum("o,foij->ij", found, gram.columns)
-    return Fit(ordered, values, found, rms, cost, kinds, _shares(gram, values), normal, loads)
+    layout = _layout(causes, runs, baseline)
+    return Fit(causes, values, found, rms, cost, layout, _shares(gram, values), normal, loads)
 
 
 def _shares(gram: Gram, values: NDArray) -> NDArray:
@@ -170,22 +161,19 @@ def _last_sensors(cause: Candidate) -> bool:
     return cause.effect.side is Side.SENSOR
 
 
+def _layout(causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline) -> ParameterLayout:
+    """Return the layout of the columns of baseline and causes in runs."""
+    effects = (*baseline.effects, *(cause.effect for cause in causes))
+    return ParameterLayout.of(effects, [run.motion.run for run in runs])
+
+
 def stacked_columns(
     causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline
 ) -> list[tuple[NDArray, NDArray]]:
     """Return columns (m, O, c) and measured torque (m, O) of each run, run-wise parameters in places of their own."""
-    made = [columns_under([c.term(r) for c in causes], run, baseline) for r, run in enumerate(runs)]
-    if not any(any(cause.apart) for cause in causes):
-        return made
-    at = baseline.size
-    parts = [[columns[:, :, :at] for columns, _ in made]]
-    # ``columns_under`` puts sensors' columns last.
-    for cause in sorted(causes, key=_last_sensors):
-        width = len(cause.effect.linear)
-        own = [columns[:, :, at : at + width] for columns, _ in made]
-        parts.append(expanded(own, cause.effect, cause.apart, runs))
-        at += width
-    return [(np.concatenate([part[r] for part in parts], axis=2), measured) for r, (_, measured) in enumerate(made)]
+    layout = _layout(causes, runs, baseline)
+    made = (columns_under([c.term(r) for c in causes], run, baseline) for r, run in enumerate(runs))
+    return [(layout.expand(columns, r), measured) for r, (columns, measured) in enumerate(made)]
 
 
 def _errors(gram: Gram, values: NDArray) -> tuple[NDArray, NDArray, float]:
@@ -222,7 +210,7 @@ def refined(causes: Sequence[Candidate], runs: Sequence[Run], baseline: Baseline
 
 def _begun(best: Fit, number: int, i: int, runs: Sequence[Run], baseline: Baseline, weights: NDArray) -> Fit:
     """Move the instant at which a cause begins in each run to where it explains most, all else held."""
-    acting, found = best.acting(best.causes[number]), onsets_of(best, number, i, runs, baseline)
+    acting, found = best.columns_of(number).runs, onsets_of(best, number, i, runs, baseline)
     instants = [found[r].likeliest if r in acting else shape[i] for r, shape in enumerate(best.causes[number].shapes)]
     causes = best.instead(number, best.causes[number].with_own(i, instants))
     return min((best, fit(causes, runs, baseline, weights, best.loads)), key=lambda f: f.cost)
@@ -264,9 +252,9 @@ def _stepped(
     plain = stacked_columns(made.causes, runs, baseline)
     wide = [[columns] for columns, _ in plain]
     for number, i in places:
-        slopes = [s[:, :, np.newaxis] for s in slope(made, (number, i, -1), runs, baseline, plain)]
-        for parts, own in zip(wide, expanded(slopes, made.causes[number].effect, [True], runs), strict=True):
-            parts.append(own)
+        own = TermColumns.of(made.causes[number].effect, made.layout.kinds, [True])
+        for r, slope_in_run in enumerate(slope(made, (number, i, -1), runs, baseline, plain)):
+            wide[r].append(own.expand(slope_in_run[:, :, np.newaxis], r))
     gram = gram_of_runs(runs, [np.concatenate(parts, axis=2) for parts in wide], [y for _, y in plain])
     steps = iter(solve(gram, weights)[len(made.values) :])
     causes = list(made.causes)

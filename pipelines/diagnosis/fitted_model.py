@@ -30,7 +30,7 @@ def model_of_run(made: Fit, baseline: Baseline, run: Run) -> Model:
     model = fitted_model(made, baseline, run.motion.run)
     if not any(cause.effect.per_run for cause in made.causes):
         return model
-    own = {term.effect.label: term.values for term in settled(made, run, baseline)[0]}
+    own = {term.effect.label: term.values for term in settled(made, run, baseline)}
     return Model(tuple(replace(t, values=own.get(t.effect.label, t.values)) for t in model))
 
 
@@ -44,10 +44,10 @@ def values_of_each_run(
     """
     told: dict[str, list[dict[str, Any]]] = {c.label: [] for c in made.causes if c.effect.per_run}
     for number, cause in enumerate(made.causes):
-        for r in made.acting(cause) if cause.label in told else ():
+        for r in made.columns_of(number).runs if cause.label in told else ():
             told[cause.label].append(_told(cause.effect, train[r], *tables.values_in_run(made, sure, number, r)))
     for run in validate if told else ():
-        for term in settled(made, run, baseline)[0]:
+        for term in settled(made, run, baseline):
             if term.effect.label in told and term.effect.explains(run.motion):
                 told[term.effect.label].append(_told(term.effect, run, term.effect.physical(term.values)))
     return told

@@ -3,31 +3,27 @@
 An *output* is one measured torque: each drive's and, where there are cuff forces, the torque about each
 joint that they exert on the person. The second pair is a second measurement of the human's share, and
 what separates causes in the drive or the structure from causes in the person.
-
-Baseline parameters, in the order of the columns: the rigid body (a leg's X1..X4) of the machine, that of the person,
-Coulomb and viscous friction of each joint, what else the machine is known to have, the force sensors' zeros. With one
-kind of run and no cuff forces one rigid body takes the place of the two.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects import Effect, Side
-from pipelines.effects.friction import Friction
+from pipelines.effects import Effect
 from pipelines.estimation.regression import away_from_reversals, away_from_turns, block_average
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.run import kinds_of
 from pipelines.mechanics.slow_motion import filtered, unsure
+from pipelines.model import Model, ParameterLayout, Term, baseline
 from pipelines.signals.blocks import BlockAverage
 
 FOLD_S = 10.0
 """Length of a fold where the excitation does not repeat."""
 FOLDS = 4
-ZEROS = 3
-"""Force zeros that show in the cuffs' torque: shank along, shank across, thigh across."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +131,7 @@ def observe(motion: Motion, cutoff_hz: float | None = None) -> Run:
 
 @dataclass(frozen=True)
 class Baseline:
-    """Names and sizes of the baseline's columns for the kinds of run at hand."""
+    """The model without causes, for the kinds of run at hand."""
 
     kinds: tuple[str, ...]
     machine: Machine
@@ -148,72 +144,30 @@ class Baseline:
         """Names of the machine's joints."""
         return self.machine.names
 
-    @property
-    def body(self) -> int:
-        """Number of a rigid body's parameters."""
-        return len(self.machine.mechanism.parameters)
+    @cached_property
+    def effects(self) -> tuple[Effect, ...]:
+        """Rigid bodies, friction, what the machine is known to have, and the force sensors' zeros."""
+        return baseline(self.machine, self.kinds, self.known, cuffs=self.cuffs)
 
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        """Whose rigid bodies are fitted: the exoskeleton's and the person's, or the one there is."""
-        return ("exo_alone", "human") if len(self.kinds) == 2 or self.cuffs else self.kinds
+    @cached_property
+    def terms(self) -> tuple[Term, ...]:
+        """The effects as terms of a model, their linear parameters zero."""
+        return Model.of(self.effects).terms
+
+    @cached_property
+    def layout(self) -> ParameterLayout:
+        """Its columns, which all runs share: the first of every fit."""
+        return ParameterLayout.of(self.effects)
 
     @property
     def size(self) -> int:
         """Number of columns."""
-        return self.body * len(self.bodies) + sum(len(e.linear) for e in self.beside_bodies) + ZEROS * self.cuffs
-
-    @property
-    def beside_bodies(self) -> tuple[Effect, ...]:
-        """Friction of each joint, and what the machine is known to have; in the order of the columns."""
-        return (*(Friction(joint, on=self.machine) for joint in self.joints), *self.known)
-
-    @property
-    def names(self) -> list[str]:
-        """What messages call the columns, but for the cuffs' zeros, which are the last."""
-        body = [p.name for p in self.machine.mechanism.parameters]
-        person = [f"the person's {name}" for name in body] if len(self.bodies) == 2 else []
-        return body + person + [f"{effect.joint} {p.name}" for effect in self.beside_bodies for p in effect.linear]
-
-    def columns(self, motor: Motion, link: Motion, human: Motion | None = None) -> NDArray:
-        """Baseline columns at full rate, (n, O, size).
-
-        Parameters
-        ----------
-        motor : Motion
-            As the motors move: what friction acts on.
-        link : Motion
-            As the exoskeleton's links move.
-        human : Motion, optional
-            As the person's limbs move, where not with the links.
-        """
-        (n, J), p = motor.q.shape, self.body
-        out = np.zeros((n, 2 * J, self.size))
-        g, mechanism = link.geometry, self.machine.mechanism
-        out[:, :J, :p] = mechanism.regressor(link.q, link.dq, link.ddq, g)
-        if len(self.bodies) == 2 and motor.run == "with_human":
-            limb = human or link
-            person = mechanism.regressor(limb.q, limb.dq, limb.ddq, g)
-            out[:, :J, p : 2 * p] = person
-            out[:, J:, p : 2 * p] = person
-        at = p * len(self.bodies)
-        for effect in self.beside_bodies:
-            own = effect.columns(motor if effect.side is Side.DRIVE else link)
-            out[:, :J, at : at + own.shape[2]] = own
-            at += own.shape[2]
-        if self.cuffs and motor.run == "with_human":
-            L1, cos_knee, sin_knee = g.thigh_length_m, np.cos(link.q[:, 1]), np.sin(link.q[:, 1])
-            d_thigh, d_shank = g.thigh_cuff_distance_m or 0.0, g.shank_cuff_distance_m or 0.0
-            out[:, J, at] = L1 * sin_knee
-            out[:, J, at + 1] = d_shank + L1 * cos_knee
-            out[:, J + 1, at + 1] = d_shank
-            out[:, J, at + 2] = d_thigh
-        return out
+        return self.layout.size
 
 
 def baseline_of(runs: Sequence[Run], known: Sequence[Effect] = ()) -> Baseline:
     """Return the baseline that the kinds of run at hand allow, with what else the machine is ``known`` to have."""
-    kinds = tuple(k for k in ("exo_alone", "with_human") if any(run.motion.run == k for run in runs))
+    kinds = kinds_of(run.motion for run in runs)
     return Baseline(kinds, runs[0].motion.machine, any(run.has_cuffs for run in runs), tuple(known))
 
 
@@ -228,7 +182,6 @@ def like_trained(run: Run, baseline: Baseline) -> Run:
 
 def with_load(run: Run, baseline: Baseline, values: NDArray) -> Run:
     """Return the run with the loads of links and limb estimated from the baseline's rigid bodies in ``values`` (b,)."""
-    bodies = values[: baseline.body * len(baseline.bodies)].reshape(-1, baseline.body)
-    # The first body is the machine's, which alone is there in runs without a wearer.
-    body = bodies.sum(axis=0) if run.motion.run == "with_human" else bodies[0]
-    return replace(run, motion=run.motion.loaded(body, bodies[-1]))
+    layout = baseline.layout
+    body = values[layout.bodies_in(run.motion.run)].sum(axis=0)
+    return replace(run, motion=run.motion.loaded(body, values[layout.bodies[-1]]))

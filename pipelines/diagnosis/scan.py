@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.candidates import TURNS, Candidate, bends_motion, expanded_columns, lowest
+from pipelines.diagnosis.candidates import TURNS, Candidate, bends_motion, lowest
 from pipelines.diagnosis.observations import Run
 from pipelines.diagnosis.onset import NEVER
 from pipelines.effects import Effect, Parameter
 from pipelines.mechanics.motion import Motion
+from pipelines.model import Model, Term, TermColumns
 
 KEPT = 3
 """Shapes of an effect that go on."""
@@ -59,18 +60,16 @@ class Scan:
 
     def columns(self, effect: Effect, shape: Sequence[float], r: int) -> NDArray:
         """Return the weighted columns of a torque effect in one run, (m * O, k)."""
-        own = effect.columns(self.coarse[r], tuple(shape))
+        own = Model((Term.of(effect, shape),)).regressor(self.coarse[r], cuffs=True)
         if not np.isfinite(own).all():  # a memory so fast that block rate cannot follow it promises nothing here
             own = np.zeros_like(own)
-        both = np.concatenate([own, own if effect.on_limb else np.zeros_like(own)], axis=1)
-        return (both * self.roots[r][:, :, np.newaxis]).reshape(-1, own.shape[2])
+        return (own * self.roots[r][:, :, np.newaxis]).reshape(-1, own.shape[2])
 
     def gain(self, effect: Effect, shape: Sequence[float]) -> float:
         """Return how much of the weighted squared residual the effect's columns would take."""
-        apart = [p.per_run for p in effect.linear]
-        parts = [self.columns(effect, shape, r) for r in range(len(self.runs)) if effect.explains(self.coarse[r])]
-        where = [r for r in range(len(self.runs)) if effect.explains(self.coarse[r])]
-        wide = expanded_columns(parts, apart)
+        own = TermColumns.of(effect, [motion.run for motion in self.coarse])
+        where = own.runs
+        wide = [own.expand(self.columns(effect, shape, r), r) for r in where]
         projected = sum(self.basis[r].T @ w for r, w in zip(where, wide, strict=True))
         gram = sum(w.T @ w for w in wide) - projected.T @ projected
         right = sum(w.T @ self.left[r] for r, w in zip(where, wide, strict=True))

@@ -125,7 +125,7 @@ class Scorer:
         return any(part.all() for part in np.split(dropped[self.bank.baseline.size :], ends))
 
     def _width(self, i: int) -> int:
-        return self.bank.where[i].stop - self.bank.where[i].start
+        return self.bank.columns[i].width
 
 
 def one_way(candidate: Candidate, width: int) -> NDArray:

@@ -12,8 +12,10 @@ from pipelines.diagnosis.fit import Fit
 from pipelines.diagnosis.gain import scored
 from pipelines.diagnosis.observations import Baseline, Run
 from pipelines.diagnosis.uncertainty import Uncertainty
+from pipelines.effects import RUNS
+from pipelines.effects.force_sensor_zero import ForceSensorZero
 from pipelines.effects.rigid_body import RigidBody
-from pipelines.estimation.parameter_table import Row, interval, table_of
+from pipelines.estimation.parameter_table import Row, interval, rows_of, table_of
 
 
 def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.DataFrame, NDArray]:
@@ -21,29 +23,23 @@ def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.Data
 
     A rigid body for each kind of run, and the human's.
     """
-    size, machine = len(sure.covariance), baseline.machine
-    units = np.eye(size)
-    values = np.append(fit.values, np.zeros(size - len(fit.values)))
+    units = np.eye(len(sure.covariance))
+    values = np.append(fit.values, np.zeros(len(units) - len(fit.values)))
     rows: list[Row] = []
     for run, bodies in _bodies(baseline).items():
-        for i, p in enumerate(RigidBody(on=machine).linear):
-            slope = units[[b * baseline.body + i for b in bodies]].sum(axis=0)
-            rows.append(Row(RigidBody(run=run, on=machine), p, "inertia", float(slope @ values), slope))
-    at = baseline.body * len(baseline.bodies)
-    for effect in baseline.beside_bodies:
-        places = np.arange(at, at + len(effect.linear))
-        held = effect.completed(values[places])
-        slopes = effect.jacobian(held)[:, : len(places)] @ units[places]
-        step = "extension" if effect in baseline.known else "friction"
-        fitted = zip(effect.parameters, effect.physical(held), slopes, strict=True)
-        rows += [Row(effect, p, step, float(value), slope) for p, value, slope in fitted]
-        at += len(effect.linear)
+        slopes = units[bodies].sum(axis=0)
+        rows += rows_of(RigidBody(run=run, on=baseline.machine), slopes @ values, slopes, "inertia")
+    for term in baseline.layout.terms:
+        if not isinstance(term.effect, (RigidBody, ForceSensorZero)):
+            step = "extension" if term.effect in baseline.known else "friction"
+            rows += rows_of(term.effect, values[term.slice], units[term.slice], step)
     onsets: dict[int, tuple[float, float]] = {}
-    for number, cause in enumerate(fit.causes):
-        first = fit.acting(cause)[0]
+    for number in range(len(fit.causes)):
+        first = fit.columns_of(number).runs[0]
         onsets |= {len(rows) + at: ends for at, ends in _onsets(fit, sure, number, first).items()}
-        of_first = zip(cause.effect.parameters, *_in_run(fit, sure, number, first), strict=True)
-        rows += [Row(cause.effect, p, "extension", value, slope, p.typical[0] >= 0) for p, value, slope in of_first]
+        effect = fit.causes[number].effect
+        fitted, slopes = _in_run(fit, sure, number, first)
+        rows += rows_of(effect, fitted, slopes, "extension", positive=effect.parameters)
     T = np.array([row.slope for row in rows])
     covariance = T @ sure.covariance @ T.T
     frame = table_of(rows, np.sqrt(np.maximum(np.diag(covariance), 0.0)), sure.critical)
@@ -59,33 +55,38 @@ def _onsets(fit: Fit, sure: Uncertainty, number: int, run: int) -> dict[int, tup
     return {linear + i: ends for (which, i, r), ends in sure.onsets.items() if (which, r) == (number, run)}
 
 
-def _bodies(baseline: Baseline) -> dict[str, list[int]]:
-    if len(baseline.bodies) == 1:
-        return {baseline.bodies[0]: [0]}
-    return {"exo_alone": [0], "with_human": [0, 1], "human": [1]}
+def _bodies(baseline: Baseline) -> dict[str, NDArray]:
+    """Return the columns of the rigid bodies, (bodies, parameters), whose sum each row of a body tells of."""
+    layout = baseline.layout
+    if len(layout.bodies) == 1:
+        return {baseline.kinds[0]: layout.bodies_in(baseline.kinds[0])}
+    every = {kind: layout.bodies_in(kind) for kind in RUNS}
+    return {**every, "human": every["with_human"][1:]}
 
 
 def _in_run(fit: Fit, sure: Uncertainty, number: int, run: int) -> tuple[NDArray, NDArray]:
-    """Return a cause's parameters as files name them, (p,), in a run that it was fitted to and acts in.
+    """Return a cause's fitted values in a run that it was fitted to and acts in, (p,), and their slopes.
 
-    With them how each goes with what the covariance is of, (p, size).
+    The slopes, (p, size), are how they change with what the covariance is of.
     """
-    cause = fit.causes[number]
-    effect, places = cause.effect, fit.places(number, run)
-    slopes = np.zeros((len(effect.fitted), len(sure.covariance)))
-    slopes[np.arange(len(places)), places] = 1.0
+    cause, columns = fit.causes[number], fit.columns_of(number)
+    linear = len(cause.effect.linear)
+    slopes = np.zeros((len(cause.effect.fitted), len(sure.covariance)))
+    slopes[np.arange(linear), columns.places(run)] = 1.0
     for order, (which, i, r) in enumerate(sure.shapes):
         if which == number and r in (-1, run):
-            slopes[len(places) + i, len(fit.values) + order] = 1.0
-    fitted = np.append(fit.values[places], cause.shapes[run])
-    return effect.physical(fitted), effect.jacobian(fitted) @ slopes
+            slopes[linear + i, len(fit.values) + order] = 1.0
+    fitted = columns.select(fit.values, run, np.zeros(linear))
+    return np.append(fitted, cause.shapes[run]), slopes
 
 
 def values_in_run(fit: Fit, sure: Uncertainty, number: int, run: int) -> tuple[NDArray, NDArray]:
     """Return a cause's parameters in a run that it was fitted to, (p,), and the ends of their intervals, (p, 2)."""
-    values, slopes = _in_run(fit, sure, number, run)
+    effect = fit.causes[number].effect
+    fitted, fitted_slopes = _in_run(fit, sure, number, run)
+    values, slopes = effect.physical(fitted), effect.jacobian(fitted) @ fitted_slopes
     error = np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", slopes, sure.covariance, slopes), 0.0))
-    one_way = np.array([p.typical[0] >= 0 for p in fit.causes[number].effect.parameters])
+    one_way = np.array([p.typical[0] >= 0 for p in effect.parameters])
     ends = interval(values, sure.critical * error, one_way)
     for at, own in _onsets(fit, sure, number, run).items():
         ends[at] = own

@@ -85,7 +85,7 @@ def _onsets(
     for number, cause in enumerate(fit.causes):
         if (i := cause.onset) is not None:
             onsets = onsets_of(fit, number, i, runs, baseline)
-            ends |= {(number, i, r): onsets[r].interval(runs[r], misfit) for r in fit.acting(cause)}
+            ends |= {(number, i, r): onsets[r].interval(runs[r], misfit) for r in fit.columns_of(number).runs}
     return ends
 
 

@@ -1,8 +1,12 @@
 """The rigid links of the machine, with all that moves along with them."""
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pipelines.effects.effect import Effect, Parameter, Parity, Side
 from pipelines.mechanics.mechanism import Mechanism
 from pipelines.mechanics.mechanisms.leg import LEG
+from pipelines.mechanics.motion import Motion
 
 
 def _parameters(mechanism: Mechanism) -> tuple[Parameter, ...]:
@@ -34,3 +38,9 @@ class RigidBody(Effect):
         super().__post_init__()
         object.__setattr__(self, "linear", _parameters(self.on.mechanism))
         object.__setattr__(self, "equation", _equation(self.on.mechanism))
+
+    def columns(self, motion: Motion, shape: NDArray | tuple[float, ...] = ()) -> NDArray:
+        """Return the mechanism's regressor, (n, J, p): one pass where the kernel takes one a column."""
+        if not self.explains(motion):
+            return np.zeros((*motion.q.shape, len(self.linear)))
+        return self.on.mechanism.regressor(motion.q, motion.dq, motion.ddq, motion.geometry)

@@ -10,12 +10,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.rigid_body import RigidBody
 from pipelines.estimation.regression import block_average, padding, regress
 from pipelines.mechanics.motion import Piece
 from pipelines.mechanics.run import Run, kinds_of
 from pipelines.mechanics.slow_motion import below, edge
-from pipelines.model import Model, Term, baseline
+from pipelines.model import Model, ParameterLayout, baseline
 
 CUTOFF_HZ = 5.0
 LOOKED_S = 600.0
@@ -31,14 +30,14 @@ IN_WORDS = f"above {CUTOFF_HZ:g} Hz the angles hold accelerations that no torque
 def is_loud(runs: Sequence[Run]) -> bool:
     """Tell whether noise of the angles outdoes, at any joint of the runs to train, all else that a fit leaves."""
     effects = baseline(runs[0].machine, kinds_of(runs))
-    model = Model(tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects))
-    body = [k for k, (effect, _) in enumerate(model.linear_parameters) if isinstance(effect, RigidBody)]
+    model, layout = Model.of(effects), ParameterLayout.of(effects)
+    body = np.concatenate(layout.bodies)
     grams = []
     for piece in (piece for run in runs for piece in _beginning(run)):
         if piece.motion.cutoff_hz <= CUTOFF_HZ:
             return False
         grams.append(_gram(piece, model, body))
-    return _outdoes(np.sum(grams, axis=0), len(model.linear_parameters), body)
+    return _outdoes(np.sum(grams, axis=0), layout.size, body)
 
 
 def _beginning(run: Run) -> Iterator[Piece]:
@@ -51,7 +50,7 @@ def _beginning(run: Run) -> Iterator[Piece]:
             return
 
 
-def _gram(piece: Piece, model: Model, body: list[int]) -> NDArray:
+def _gram(piece: Piece, model: Model, body: NDArray) -> NDArray:
     """Return the Gram matrix of each joint, (J, c, c): the slow motion's columns, the bodies' fast part, the torque."""
     fast = regress(piece, model)
     slow = regress(piece._replace(motion=below(piece.motion, CUTOFF_HZ)), model)
@@ -61,7 +60,7 @@ def _gram(piece: Piece, model: Model, body: list[int]) -> NDArray:
     return np.einsum("mji,mjk->jik", rows, rows)
 
 
-def _outdoes(gram: NDArray, p: int, body: list[int]) -> bool:
+def _outdoes(gram: NDArray, p: int, body: NDArray) -> bool:
     """Fit the slow motion, p columns, and hold what it foretells of the fast part against what was measured of it."""
     slow, fast = gram[:, :p, :p], gram[:, p:-1, p:-1]
     torque = gram[:, -1, -1]

@@ -1,6 +1,6 @@
 """``parameters/1``: the rows of a fitted model, and their intervals."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,32 @@ class Row:
     """How it changes with what the covariance is of."""
     one_way: bool = False
     """Whether its interval ends at nought: of a cause that is there, as play or a stiffness."""
+
+
+def rows_of(
+    effect: Effect,
+    values: NDArray,
+    slopes: NDArray,
+    step: str,
+    positive: Collection[Parameter] = (),
+) -> list[Row]:
+    """Return the rows of an effect for its fitted values.
+
+    Parameters
+    ----------
+    effect : Effect
+        What the rows are of.
+    values : (v,) array
+        Of its linear parameters, then of its shape.
+    slopes : (v, s) array
+        How they change with what the covariance is of.
+    step : str
+        In which they were found.
+    positive : collection of Parameter
+        Of those, the interval of one that is never negative, as play or a stiffness, ends at zero.
+    """
+    rows = zip(effect.parameters, effect.physical(values), effect.jacobian(values) @ slopes, strict=True)
+    return [Row(effect, p, step, float(value), slope, p in positive and p.typical[0] >= 0) for p, value, slope in rows]
 
 
 def table_of(rows: Sequence[Row], error: NDArray, critical: NDArray | float) -> pd.DataFrame:

@@ -7,24 +7,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects import Effect, Parameter
 from pipelines.estimation.compressed import Compressed, compress, together
 from pipelines.estimation.regression import Regression, regressions
 from pipelines.mechanics.run import Run, kinds_of
 from pipelines.mechanics.silence import silent_torque
-from pipelines.model import Model, Term
-
-
-@dataclass(frozen=True)
-class Column:
-    """One linear parameter of a model: what all runs share, or what one run has for itself."""
-
-    term: int
-    """Its place in the model."""
-    linear: int
-    """Its place among the term's linear parameters."""
-    file: str | None = None
-    """Of the run that has it for itself."""
+from pipelines.model import Model, ParameterLayout, Term
 
 
 @dataclass(frozen=True)
@@ -49,36 +36,24 @@ class Training:
         return kinds_of(self.runs)
 
     @cached_property
-    def columns(self) -> list[Column]:
+    def layout(self) -> ParameterLayout:
         """The p linear parameters; one that differs from run to run is there for each run that has it."""
-        made = []
-        for i, term in enumerate(self.model):
-            for k, parameter in enumerate(term.effect.linear):
-                of = [run.file for run in self.runs if self.has(run, i)] if parameter.per_run else [None]
-                made += [Column(i, k, file) for file in of]
-        return made
-
-    @property
-    def parameters(self) -> list[tuple[Effect, Parameter]]:
-        """Effect and parameter of each column."""
-        effects = [self.model.terms[column.term].effect for column in self.columns]
-        return [(effect, effect.linear[c.linear]) for effect, c in zip(effects, self.columns, strict=True)]
+        absent = [
+            (term, number)
+            for number, run in enumerate(self.runs)
+            for term, own in enumerate(self.terms_of(run))
+            if own is None
+        ]
+        effects = [term.effect for term in self.model]
+        return ParameterLayout.of(effects, [run.run for run in self.runs], absent)
 
     def terms_of(self, run: Run) -> tuple[Term | None, ...]:
         """Return the model's terms as they are in a run."""
         return self.own.get(run.file, self.model.terms)
 
-    def has(self, run: Run, term: int) -> bool:
-        """Tell whether a term acts in a run, and came there."""
-        return self.terms_of(run)[term] is not None and self.model.terms[term].effect.acts(run.run)
-
-    def place(self, term: int, linear: int, run: Run) -> int | None:
-        """Return the column of a linear parameter in a run, None where no run to train on tells of it."""
-        return self._places.get((term, linear, None), self._places.get((term, linear, run.file)))
-
-    @cached_property
-    def _places(self) -> dict[tuple[int, int, str | None], int]:
-        return {(c.term, c.linear, c.file): place for place, c in enumerate(self.columns)}
+    def number_of(self, run: Run) -> int | None:
+        """Return the number of a run among those to train on, by its file; None where it is none of them."""
+        return next((number for number, other in enumerate(self.runs) if other.file == run.file), None)
 
     def model_of(self, run: Run, values: NDArray) -> Model:
         """Return the model of one run with the columns' values, (p,)."""
@@ -90,16 +65,8 @@ class Training:
         own = self.terms_of(run)[term]
         if own is None:
             return None
-        places = [self.place(term, k, run) for k in range(len(own.linear))]
-        linear = [value if at is None else values[at] for at, value in zip(places, own.linear, strict=True)]
+        linear = self.layout.terms[term].select(values, self.number_of(run), own.linear)
         return Term(own.effect, np.append(linear, own.shape))
-
-    def acts_in(self, place: int, kind: str) -> bool:
-        """Tell whether a column is there in a kind of run."""
-        column = self.columns[place]
-        if column.file:
-            return any(run.file == column.file and run.run == kind for run in self.runs)
-        return self.model.terms[column.term].effect.acts(kind)
 
     def reshaped(self, term: int, shape: int, step: float, files: Sequence[str]) -> "Training":
         """Return the same with one shape of a term larger by a step in some runs."""
@@ -123,20 +90,11 @@ class Training:
 
     def regressions(self, run: Run) -> Iterator[Regression]:
         """Yield a run's regression on the p columns, piece by piece."""
-        p = len(self.columns)
-        here = [
-            self.place(i, k, run)
-            for i, term in enumerate(self.terms_of(run))
-            if term is not None
-            for k in range(len(term.linear))
-        ]
-        # What has no column acts in no run of this kind.
-        kept = {n: at for n, at in enumerate(here) if at is not None}
-        for r in regressions(run, self.model_of(run, np.zeros(p)), self.cutoff_hz):
-            if here != list(range(p)):
-                regressor = np.zeros((*r.torque.shape, p))
-                regressor[:, :, list(kept.values())] = r.regressor[:, :, list(kept)]
-                r = replace(r, regressor=regressor)
+        number, present = self.number_of(run), [term is not None for term in self.terms_of(run)]
+        model = self.model_of(run, np.zeros(self.layout.size))
+        for r in regressions(run, model, self.cutoff_hz):
+            regressor = self.layout.expand(r.regressor, number, np.flatnonzero(present))
+            r = replace(r, regressor=regressor)
             yield replace(r, usable=np.repeat(r.valid[:, np.newaxis], r.torque.shape[1], 1)) if self.reversals else r
 
     @cached_property
@@ -176,9 +134,11 @@ class Problem:
     @property
     def names(self) -> list[str]:
         """What messages call the fitted parameters."""
-        chosen = [(*self.training.parameters[place], self.training.columns[place].file) for place in self.fitted]
-        named = [(f"{effect.joint} {p.name}" if effect.joint else p.name, file) for effect, p, file in chosen]
-        return [f"{name} of {file}" if file else name for name, file in named]
+        runs, columns = self.training.runs, self.training.layout.columns
+        return [
+            column.name if column.run is None else f"{column.name} of {runs[column.run].file}"
+            for column in (columns[place] for place in self.fitted)
+        ]
 
     @property
     def runs(self) -> list[tuple[int, Run]]:

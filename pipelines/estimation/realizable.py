@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 
-from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import NotIdentifiable
 from pipelines.estimation.compressed import residual_rms
 from pipelines.estimation.estimator import Estimator, Fit
@@ -104,22 +103,19 @@ def _constraints(problem: Problem, values: NDArray, size: NDArray) -> Iterator[C
 
 
 def _takes_energy(problem: Problem, column: int) -> bool:
-    effect, _ = problem.training.parameters[column]
-    return effect.dissipative
+    return problem.training.layout.columns[column].effect.dissipative
 
 
 def _inertia_forms(problem: Problem) -> Iterator[NDArray]:
     """Yield for each body that is fitted (p, m, m): of all parameters, what is positive definite of a real one."""
     run = problem.training.runs[0]
     forms = run.machine.mechanism.inertia_forms(run.geometry)
-    effects = [effect for effect, _ in problem.training.parameters]
-    of_kind: dict[str | None, NDArray] = {}
-    for kind in dict.fromkeys(effect.run for effect in effects if isinstance(effect, RigidBody)):
-        form = np.zeros((len(effects), *forms.shape[1:]))
-        form[[isinstance(effect, RigidBody) and effect.run == kind for effect in effects]] = forms
-        of_kind[kind] = form
-    fitted = {effects[column].run for column in problem.fitted if isinstance(effects[column], RigidBody)}
-    yield from (form for kind, form in of_kind.items() if kind in fitted)
+    layout, fitted = problem.training.layout, set(problem.fitted)
+    for places in layout.bodies:
+        if fitted & set(places):
+            form = np.zeros((layout.size, *forms.shape[1:]))
+            form[places] = forms
+            yield form
 
 
 def _triangle(matrix: NDArray) -> Sequence[float]:

@@ -16,8 +16,6 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from pipelines.effects.friction import Friction
-from pipelines.effects.rigid_body import RigidBody
 from pipelines.estimation.angle_noise import CUTOFF_HZ, IN_WORDS, is_loud
 from pipelines.estimation.collinearity import collinearities
 from pipelines.estimation.estimator import Estimate, Estimator, Fit, estimated
@@ -31,7 +29,7 @@ from pipelines.identification.runs import Runs, checked
 from pipelines.identification.validation import Validation, validate
 from pipelines.mechanics.run import Run
 from pipelines.mechanics.scale import on_one_scale
-from pipelines.model import Model, Term, unrealizable, upside_down
+from pipelines.model import Model, baseline, unrealizable, upside_down
 
 BIASED = (
     f"{IN_WORDS}, which lets every fit take the machine for too light; set filter.cutoff_hz = {CUTOFF_HZ:g}, and see "
@@ -177,7 +175,7 @@ def _training(runs: Runs, extension: Extension, reversals: bool, cutoff_hz: floa
     The plain model is fitted piece by piece, whatever is above the cut-off.
     """
     train = tuple(runs.of("train"))
-    plain = _baseline(runs)
+    plain = Model.of(baseline(runs.motions[0].machine, runs.kinds))
     model = Model((*plain, *extension.terms))
     own = {file: (*plain, *terms) for file, terms in extension.own.items()}
     if not extension.terms and not extension.bodies:
@@ -218,19 +216,11 @@ def _under_its_own_loads(training: Training, bodies: Mapping[str, NDArray]) -> t
     return training, False
 
 
-def _baseline(runs: Runs) -> Model:
-    """Return the machine's rigid body, the wearer's where there is one, and friction, without values."""
-    machine = runs.motions[0].machine
-    wearer = [RigidBody(run="with_human", on=machine)] * ("with_human" in runs.kinds)
-    friction = [Friction(joint=joint, on=machine) for joint in machine.names]
-    return Model(tuple(Term(e, np.zeros(len(e.linear))) for e in (RigidBody(on=machine), *wearer, *friction)))
-
-
 def _bodies(training: Training, values: NDArray) -> dict[str, NDArray]:
     """Return the rigid body behind the drive trains in each kind of run, and the wearer's own, (k,) each."""
-    found = [row for row in rows(training, values) if isinstance(row.effect, RigidBody)]
-    kinds = dict.fromkeys(row.effect.run for row in found)
-    return {str(kind): np.array([row.value for row in found if row.effect.run == kind]) for kind in kinds}
+    layout = training.layout
+    found = {kind: values[layout.bodies_in(kind)].sum(axis=0) for kind in training.kinds}
+    return found | ({"human": values[layout.bodies[-1]]} if "human" in _whose(training) else {})
 
 
 def _found(training: Training, values: NDArray, run: Run) -> Model | None:
@@ -249,7 +239,7 @@ class Step(Generic[Found]):
 
 def _in_steps(training: Training, estimator: Estimator) -> dict[str, Step[Fit]]:
     """Fit what is there in the empty exoskeleton, then, that being held, what comes with a human."""
-    empty = np.array([training.acts_in(place, "exo_alone") for place in range(len(training.columns))])
+    empty = training.layout.acting_in("exo_alone")
     values = np.zeros(len(empty))
     steps = {}
     for kind in training.kinds:
@@ -288,19 +278,19 @@ def _answers(training: Training, covariance: NDArray) -> tuple[NDArray, NDArray]
     shapes = [(i, k) for i, term in enumerate(training.model) for k in range(len(term.shape))]
     told, others = [], []
     for (i, k), e in zip(shapes, error, strict=True):
-        having = [run.file for run in training.runs if training.has(run, i)]
+        having = [training.runs[run].file for run in training.layout.terms[i].runs]
         apart = training.model.terms[i].effect.shape[k].per_run
         told.append((i, k, e, having[:1] if apart else having))
         others += [(i, k, e, [file]) for file in having[1:]] if apart else []
     answers = [_answer(training, *moved) for moved in (*told, *others)]
     every = block_diag(covariance, np.diag([e**2 for _, _, e, _ in others]))
-    return np.reshape(answers, (len(answers), len(training.columns))).T, every
+    return np.reshape(answers, (len(answers), training.layout.size)).T, every
 
 
 def _answer(training: Training, term: int, shape: int, error: float, files: Sequence[str]) -> NDArray:
     """Return how least-squares values, (p,), change with a term's shape in some runs."""
     if error == 0.0 or not files:
-        return np.zeros(len(training.columns))
+        return np.zeros(training.layout.size)
     now = abs(training.model.terms[term].shape[shape])
     # A play or a stiffness of which little is known must not fall below nought.
     step = min(STEP * error, 0.5 * now or np.inf)

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.bank import Bank, fill
-from pipelines.diagnosis.candidates import BASELINE, expanded, gram_of_runs, signatures
+from pipelines.diagnosis.candidates import BASELINE, columns_under, gram_of_runs, signatures
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.floor import MOST_INDEPENDENT
 from pipelines.diagnosis.observations import baseline_of, observe
@@ -78,13 +78,11 @@ def search_rows(motions: Sequence[Motion], sample: int) -> Iterator[Row]:
 
 def all_columns(bank: Bank) -> list[NDArray]:
     """Return the columns that were multiplied out, (m, O, c) for each training run."""
-    untouched = [run.average(bank.baseline.columns(run.motion, run.motion, run.motion)) for run in bank.runs]
-    made = [
-        expanded(
-            signatures(c, bank.runs, bank.baseline, untouched, bank.weights), c.effect, c.signature_apart, bank.runs
-        )
-        for c in bank.candidates
-    ]
+    untouched = [columns_under((), run, bank.baseline)[0] for run in bank.runs]
+    made = []
+    for candidate, own in zip(bank.candidates, bank.columns, strict=True):
+        narrow = signatures(candidate, bank.runs, bank.baseline, untouched, bank.weights)
+        made.append([own.expand(column, r) for r, column in enumerate(narrow)])
     return [np.concatenate([untouched[r], *(one[r] for one in made)], axis=2) for r in range(len(bank.runs))]
 
 

@@ -18,6 +18,7 @@ from pipelines.effects import PayloadChange, QuadraticDrag, StribeckFriction
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table
 from pipelines.mechanics.scale import on_one_scale
+from pipelines.model import ParameterLayout
 from pipelines.settings.filter import FilterSettings
 from tests.diagnosis.machines import pendulum
 from tests.diagnosis.sessions import session
@@ -30,7 +31,7 @@ def ranked(effect, score):
         np.ones(2),
         np.ones(2),
         0.0,
-        ("exo_alone",),
+        ParameterLayout.of([effect], ["exo_alone"]),
         np.zeros((2, 1)),
         np.eye(1),
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pipelines.diagnosis.candidates import Candidate, torque_columns
+from pipelines.diagnosis.candidates import Candidate, columns_under, torque_columns
 from pipelines.diagnosis.choice import MATERIAL, NEEDED
 from pipelines.diagnosis.detect import POWER, Look, _alike, detectability, needed_noncentrality
 from pipelines.diagnosis.floor import Floor
@@ -70,7 +70,7 @@ def test_an_effect_of_the_smallest_size_is_found_as_often_as_promised(label):
     assert one.limited_by == "noise"
     candidate = Candidate(one.effect, ((),))
     own = [torque_columns(candidate, r, run)[:, :2] for r, run in enumerate(runs)]
-    plain = [run.average(baseline.columns(run.motion, run.motion))[:, :2] for run in runs]
+    plain = [columns_under((), run, baseline)[0][:, :2] for run in runs]
     root = np.sqrt(share) / rms
     effect = one.smallest * rows_of(own, runs, root)[:, 0]
     basis = np.linalg.qr(rows_of(plain, runs, root))[0]
@@ -101,8 +101,7 @@ def test_what_is_material_takes_its_share_of_a_joints_error_and_of_its_torque():
     one = next(d for d in detectability(runs, baseline_of(runs), floor) if d.effect.label == "torque_drift@knee")
     assert one.limited_by == "materiality"
     baseline = baseline_of(runs)
-    plain = np.concatenate([run.average(baseline.columns(run.motion, run.motion))[:, :2][run.usable[:, :2]]
-                            for run in runs])  # fmt: skip
+    plain = np.concatenate([columns_under((), run, baseline)[0][:, :2][run.usable[:, :2]] for run in runs])
     drift = [one.smallest * (run.time - run.time.mean())[:, np.newaxis] * [0.0, 1.0] for run in runs]
     y = np.concatenate([d[run.usable[:, :2]] for d, run in zip(drift, runs, strict=True)])
     left = y - plain @ np.linalg.lstsq(plain, y, rcond=1e-12)[0]

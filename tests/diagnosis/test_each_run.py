@@ -94,7 +94,7 @@ def test_what_runs_have_of_a_cause_of_some_of_them_is_told_of_those_alone_each_i
     assert [one["file"] for one in told["torque_drift@hip"]] == [f"run_{k}.parquet" for k in (0, 2, 3, 1)]
     # A run alone, all else held, tells the same of itself as the fit of all does.
     for run in train:
-        for term in settled(made, run, baseline)[0]:
+        for term in settled(made, run, baseline):
             names = [p.name for p in term.effect.parameters]
             alone = dict(zip(names, term.effect.physical(term.values), strict=True))
             for one in (one for one in told[term.effect.label] if one["file"] == run.motion.file):

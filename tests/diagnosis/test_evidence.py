@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 from scipy.signal import butter, lfilter
 
 from pipelines.diagnosis import impacts
-from pipelines.diagnosis.candidates import Candidate, lowest
+from pipelines.diagnosis.candidates import Candidate, columns_under, lowest
 from pipelines.diagnosis.examined import Examined, Extended
 from pipelines.diagnosis.fit import _scale, fit, refined
 from pipelines.diagnosis.floor import slow_scatter
@@ -274,7 +274,7 @@ def test_causes_beside_which_the_machine_has_no_mass_are_absurd(run, least, unre
     L1, X1, X3 = run.motion.geometry.thigh_length_m, 3.0, 1.0
     # The X2 with which the matrix [[X1 - X2, L1 X3], [L1 X3, X2]] has this least eigenvalue.
     X2 = brentq(lambda x: np.linalg.eigvalsh([[X1 - x, L1 * X3], [L1 * X3, x]])[0] - least, -1.0, 1.4)
-    measured = run.average(baseline.columns(run.motion, run.motion, run.motion))[..., :4] @ [X1, X2, X3, 4.0]
+    measured = columns_under((), run, baseline)[0][..., :4] @ [X1, X2, X3, 4.0]
     made = replace(run, measured=measured + 0.1 * noise(run))
     found = fit([Candidate(ViscousAsymmetry(joint="hip"), ((),))], [made], baseline, np.ones(4))
     assert bool(found.absurdity(baseline, run.motion.geometry)) == unreal

@@ -86,7 +86,7 @@ def test_a_cause_that_harms_other_runs_is_dropped_and_the_other_stays_named(monk
         choice = choose(*given)
         both = next(r for labels, r in choice.refined[2].items() if asymmetry in labels)
         number = next(i for i, cause in enumerate(both.fit.causes) if cause.label != asymmetry)
-        values, (at, *_) = both.fit.values.copy(), both.fit.places(number, 0)
+        values, (at, *_) = both.fit.values.copy(), both.fit.columns_of(number).places(0)
         values[at] *= 1.0 + 0.002 / both.fit.shares[0, at]
         return replace(choice, named=replace(both, fit=replace(both.fit, values=values)), standby=(), freer=None)
 

@@ -9,6 +9,7 @@ from pipelines.diagnosis.fit import fit, residuals_on
 from pipelines.diagnosis.observations import baseline_of, like_trained, observe
 from pipelines.estimation.regression import TURN_S, away_from_turns
 from pipelines.mechanics.slow_motion import below
+from pipelines.model import Model
 from tests.diagnosis.sessions import session
 
 
@@ -72,11 +73,12 @@ def test_torque_that_obeys_the_model_obeys_it_behind_the_low_pass_and_not_along_
     motion = motions[0]
     baseline = baseline_of([observe(motion)])
     values = np.linspace(1.0, 3.0, baseline.size)
-    torque = (baseline.columns(motion, motion) @ values)[:, : len(motion.joints)]
+    model = Model(baseline.terms)
+    torque = model.regressor(motion) @ values
     left = {}
     for name, moved in (("low-pass", motion), ("motion", below(motion, 5.0))):
         run = observe(replace(motion, torque=torque), cutoff_hz=5.0)
-        predicted = run.average(baseline.columns(moved, moved) @ values)
+        predicted = run.average(model.regressor(moved, cuffs=True) @ values)
         left[name] = (run.measured - predicted)[run.usable[:, 0], 0]
     assert np.abs(left["low-pass"]).max() < 1e-9
     assert np.sqrt(np.mean(left["motion"] ** 2)) > 0.01

@@ -102,7 +102,7 @@ def test_an_instant_is_found_from_wherever_the_search_begins(begun):
     runs = observed(handed("train", 5, 17.3), handed("train", 6, 29.1))
     made, baseline = fitted(runs, (17.3, begun))
     assert [shape[0] for shape in made.causes[0].shapes] == pytest.approx([17.3, 29.1], abs=0.4)
-    (term,), _ = settled(made, runs[1], baseline)
+    (term,) = settled(made, runs[1], baseline)
     assert term.shape[0] == pytest.approx(29.1, abs=0.4)
 
 

@@ -10,6 +10,7 @@ from pipelines.diagnosis.fit import Fit
 from pipelines.diagnosis.observations import observe
 from pipelines.diagnosis.rhythm import shadows_motion
 from pipelines.effects import EncoderOffset, VoluntaryTorque
+from pipelines.model import ParameterLayout
 from tests.diagnosis.sessions import session
 
 OFFSET = EncoderOffset(joint="hip")
@@ -24,8 +25,9 @@ def runs():
 def explained(runs, frequency_hz, *more, left=1.0):
     """A fit of a rhythm and other causes, and what it is held against: an error of three times the floor."""
     made = [Candidate(effect, (shape,) * len(runs)) for effect, shape in ((PUSH, (frequency_hz,)), *more)]
-    rms, kinds = np.array([left, 1.0, 1.0, 1.0]), tuple(run.motion.run for run in runs)
-    fit = Fit(tuple(made), np.zeros(1), np.ones(4), rms, 0.0, kinds, np.zeros((4, 1)), np.eye(1))
+    rms = np.array([left, 1.0, 1.0, 1.0])
+    layout = ParameterLayout.of([cause.effect for cause in made], [run.motion.run for run in runs])
+    fit = Fit(tuple(made), np.zeros(1), np.ones(4), rms, 0.0, layout, np.zeros((4, 1)), np.eye(1))
     return fit, np.array([3.0, 1.0, 1.0, 1.0]), np.ones(4), runs
 
 

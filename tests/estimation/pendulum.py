@@ -14,7 +14,7 @@ from pipelines.contracts.table import Table
 from pipelines.estimation.problem import Problem, Training
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table
-from pipelines.model import Model, Term, baseline
+from pipelines.model import Model, baseline
 from pipelines.settings.filter import FilterSettings
 
 GRAVITY = 9.8
@@ -99,8 +99,6 @@ def motion(disturbed, seed, seconds=20.0, purpose="train"):
 
 def problem(*runs):
     """Return the fit of rigid body and friction to some runs."""
-    model = Model(
-        tuple(Term(effect, np.zeros(len(effect.linear))) for effect in baseline(runs[0].machine, ["exo_alone"]))
-    )
+    model = Model.of(baseline(runs[0].machine, ["exo_alone"]))
     columns = len(model.linear_parameters)
     return Problem(Training(tuple(runs), model), ("exo_alone",), np.arange(columns), np.zeros(columns))

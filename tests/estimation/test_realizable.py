@@ -17,7 +17,7 @@ from pipelines.mechanics.machine import MECHANISMS
 from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.run import Run
-from pipelines.model import Model, Term, baseline
+from pipelines.model import Model, baseline
 
 L1 = Geometry().thigh_length_m
 
@@ -42,7 +42,7 @@ def swing(X, friction=(2.0, 3.0, 2.0, 3.0), kind="exo_alone", purpose="train", s
 
 
 def problem_of(run: Run):
-    model = Model(tuple(Term(effect, np.zeros(len(effect.linear))) for effect in baseline(run.machine, ["exo_alone"])))
+    model = Model.of(baseline(run.machine, ["exo_alone"]))
     return Problem(Training((run,), model), ("exo_alone",), np.arange(8), np.zeros(8))
 
 

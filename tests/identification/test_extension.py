@@ -143,7 +143,7 @@ def shape_and_error(run):
 
     def problem(offset):
         effects = (*baseline(on, ["exo_alone"]), EncoderOffset("joint", on=on))
-        terms = (Term(e, np.append(np.zeros(len(e.linear)), [offset] * len(e.shape))) for e in effects)
+        terms = (Term.of(e, [offset] * len(e.shape)) for e in effects)
         return Problem(Training((run,), Model(tuple(terms))), ("exo_alone",), np.arange(4), np.zeros(4))
 
     def left(offset):
@@ -186,7 +186,7 @@ def test_what_is_not_sure_of_a_held_shape_is_not_sure_of_the_parameters():
 def test_with_reversals_the_fit_is_least_squares_on_every_valid_block(hidden):
     runs = [m for m in hidden if m.run == "exo_alone"]
     found = identify(runs, ESTIMATORS[1](), reversals=True)
-    model = Model(tuple(Term(e, np.zeros(len(e.linear))) for e in baseline(THE_LEG, ["exo_alone"])))
+    model = Model.of(baseline(THE_LEG, ["exo_alone"]))
     A, b = [], []
     for r in regressions(runs[0], model):
         A.append(r.regressor[r.valid].reshape(-1, 8))
@@ -289,7 +289,7 @@ def test_behind_every_effect_of_known_shape_body_and_amplitudes_are_the_true_one
     names = [p.name for p in effect.parameters]
     true = dict(zip(names, map(float, effect.physical(term.values)), strict=True))
     runs = session((PlantEffect(effect=effect.name, joint=effect.joint, values=true),), seconds=20.0)
-    held = Term(effect, np.append(np.zeros(len(effect.linear)), term.shape))
+    held = Term.of(effect, term.shape)
     found, without = identify(runs, extension=Extension((held,))), identify(runs)
     assert sizes(found) == pytest.approx({(effect.name, name): value for name, value in true.items()}, rel=0.02)
     body = found.parameters[found.parameters["effect"] == "rigid_body"]

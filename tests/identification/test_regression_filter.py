@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 from pipelines.estimation.regression import away_from_reversals, block_average
-from pipelines.model import Model, Term, baseline
+from pipelines.model import Model, baseline
 from pipelines.signals.low_pass import low_pass
 
 NOISE = np.array([0.6, 0.4])
@@ -47,7 +47,7 @@ def test_only_one_filter_for_both_sides_away_from_reversals_leaves_the_noise_its
     motion = noiseless_motions[0]
     noise = coloured(len(motion), motion.sample_rate_hz)
     effects = baseline(motion.machine, ("exo_alone",))
-    regressor = Model(tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects)).regressor(motion)
+    regressor = Model.of(effects).regressor(motion)
     smooth, kept, whole = method(motion)
     valid = whole(np.column_stack([motion.valid, motion.valid]))
     moving = valid & whole(away_from_reversals(motion))

@@ -76,10 +76,10 @@ def covers_as_if_independent(motions, truth):
     from pipelines.estimation.least_squares import WeightedLeastSquares
     from pipelines.estimation.problem import Problem, Training
     from pipelines.mechanics.machine import THE_LEG
-    from pipelines.model import Model, Term, baseline
+    from pipelines.model import Model, baseline
 
     effects = baseline(THE_LEG, ("exo_alone",))
-    model = Model(tuple(Term(e, np.zeros(len(e.linear))) for e in effects))
+    model = Model.of(effects)
     problem = Problem(Training((motions[0],), model), ("exo_alone",), np.arange(8), np.zeros(8))
     fit = WeightedLeastSquares().fit(problem)
     return np.abs(fit.values - truth) < 1.96 * np.sqrt(np.diag(fit.sensitivity))

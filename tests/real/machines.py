@@ -187,7 +187,7 @@ def with_rotor(motion: Motion) -> Model:
     """Return the model every lab starts with and the second joint's rotor, without values."""
     machine = motion.machine
     effects = [*baseline(machine, [motion.run]), RotorInertia(machine.names[1], on=machine)]
-    return Model(tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects))
+    return Model.of(effects)
 
 
 def symmetric(d: Diagnosed) -> dict[str, Model]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.contracts.joints import the
+from pipelines.diagnosis.candidates import columns_under
 from pipelines.diagnosis.faults.fault import Fault, column
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, observe
 from pipelines.estimation.long_run import long_run_covariance
@@ -53,10 +54,10 @@ def _inertia_and_loss(run: Run, model: Baseline) -> tuple[NDArray, NDArray]:
     """
     motion, usable = run.motion, run.usable[:, :1]
     beside = np.stack([np.ones_like(motion.q), motion.q], axis=2)
-    columns = run.average(np.concatenate([model.columns(motion, motion)[:, :1], beside], axis=2))[:, 0] * usable
+    columns = np.concatenate([columns_under((), run, model)[0][:, 0], run.average(beside)[:, 0]], axis=1) * usable
     told = np.zeros((2, columns.shape[1]))
     told[0, 0] = 1.0
-    friction = slice(model.body, model.size)
+    friction = model.layout.terms[1].slice
     told[1, friction] = (run.state[1] * columns[:, friction]).sum(axis=0) / usable.sum()
     scale = np.maximum(np.sqrt((columns**2).sum(axis=0)), 1e-12)
     columns, told = columns / scale, told / scale

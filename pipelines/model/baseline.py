@@ -1,0 +1,41 @@
+"""What every lab's model holds: rigid bodies and friction."""
+
+from collections.abc import Collection, Iterable
+
+from pipelines.effects import Effect
+from pipelines.effects.force_sensor_zero import ForceSensorZero
+from pipelines.effects.friction import Friction
+from pipelines.effects.rigid_body import RigidBody
+from pipelines.mechanics.machine import Machine
+
+BASELINE = (RigidBody.name, Friction.name)
+
+
+def baseline(
+    machine: Machine,
+    kinds: Collection[str],
+    known: Iterable[Effect] = (),
+    *,
+    cuffs: bool = False,
+) -> tuple[Effect, ...]:
+    """Return the effects that every model starts with.
+
+    The machine and its wearer have a rigid body each where data tell them apart: by runs with and
+    without the wearer, or by cuff forces. With one kind of run and no cuff forces there is one body
+    for all that moves.
+
+    Parameters
+    ----------
+    machine : Machine
+        The machine that has them.
+    kinds : collection of str
+        Kinds of run to be explained.
+    known : iterable of Effect
+        What else the machine is known to have, without shape parameters to be fitted.
+    cuffs : bool
+        Whether cuff forces are fitted, whose sensors then have zeros.
+    """
+    wearer = [RigidBody(run="with_human", on=machine)] * (len(kinds) == 2 or cuffs)
+    friction = (Friction(joint=joint, on=machine) for joint in machine.names)
+    zeros = [ForceSensorZero(on=machine)] * cuffs
+    return (RigidBody(on=machine), *wearer, *friction, *known, *zeros)

@@ -1,0 +1,105 @@
+"""Models out of ``parameters/1`` tables, and what no real machine could have of them."""
+
+import pandas as pd
+
+from pipelines.effects import RUNS, Effect
+from pipelines.effects.rigid_body import RigidBody
+from pipelines.errors import InputError
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.machine import THE_LEG, Machine
+from pipelines.model.model import Model, Term, effect_named, term_from
+
+
+def model_from_parameters(frame: pd.DataFrame, run: str, machine: Machine = THE_LEG) -> Model:
+    """Rebuild the model of one kind of run of a machine from a ``parameters/1`` table.
+
+    ``run`` is a kind of run, or ``human`` for the wearer's own rigid body.
+
+    Raises
+    ------
+    InputError
+        Where the table has no rigid body for that run.
+    """
+    is_body = frame["effect"] == RigidBody.name
+    if not (is_body & (frame["run"] == run)).any():
+        known = ", ".join(sorted(frame.loc[is_body, "run"].dropna().unique()))
+        raise InputError(f"the parameters hold no rigid body for run {run!r}, only for {known}")
+    terms = [term for term, _ in terms_beside_bodies(frame, machine) if term.effect.run in (None, run)]
+    bodies = {str(kind): rows for kind, rows in frame[is_body].groupby("run")}
+    if any(term.effect.at_cuff for term in terms) and {"exo_alone", "human"} <= set(bodies):
+        # Machine and limb move apart: each needs its own.
+        parts = [
+            (RigidBody(on=machine), bodies["exo_alone"]), (RigidBody(run="with_human", on=machine), bodies["human"]),
+        ]  # fmt: skip
+    else:
+        parts = [(RigidBody(run=run if run in RUNS else None, on=machine), bodies[run])]
+    return Model((*(_term_from_rows(effect, rows) for effect, rows in parts), *terms))
+
+
+def terms_beside_bodies(frame: pd.DataFrame, machine: Machine) -> list[tuple[Term, pd.DataFrame]]:
+    """Return every term that a ``parameters/1`` table of a machine has beside rigid bodies, and the rows that tell it.
+
+    Raises
+    ------
+    InputError
+        Where it tells of effects or joints that there are not, or not of all their values.
+    """
+    beside = frame[frame["effect"] != RigidBody.name]
+    if (twice := beside[["effect", "joint", "run", "name"]].duplicated()).any():
+        row = beside[twice].iloc[0]
+        raise InputError(
+            f"the parameters table: row {row.name} tells {row['name']} of {row['effect']} again, expected every value "
+            "once; delete one of both rows"
+        )
+    others = beside.groupby(["effect", "joint", "run"], sort=False, dropna=False)
+    return [(_term_from_rows(_effect_of_rows(rows, machine), rows), rows) for _, rows in others]
+
+
+def _effect_of_rows(rows: pd.DataFrame, machine: Machine) -> Effect:
+    """Return the effect that a parameters table tells of in some rows, all of one cause."""
+    first = rows.iloc[0]
+    joint, run = (first[key] if isinstance(first[key], str) else None for key in ("joint", "run"))
+    of = effect_named(str(first["effect"]))
+    if joint not in ([None] if of.whole_leg else machine.names):
+        expected = "none: it is the whole machine's" if of.whole_leg else " or ".join(machine.names)
+        raise InputError(
+            f"the parameters table: {of.name} has the joint {joint or 'none'}, expected {expected}; correct its column "
+            "joint, or the joints in its metadata"
+        )
+    each_run = bool(of.may_differ and "each_run" in rows and rows["each_run"].any())
+    return of(joint=joint, run=run, on=machine, each_run=each_run)
+
+
+def _term_from_rows(effect: Effect, rows: pd.DataFrame) -> Term:
+    try:
+        return term_from(effect, dict(zip(rows["name"], rows["value"].astype(float), strict=True)))
+    except InputError as error:
+        raise InputError(f"the parameters table: {error}") from None
+
+
+def unrealizable(parameters: pd.DataFrame, machine: Machine, geometry: Geometry) -> list[str]:
+    """Say why no real machine has the rigid bodies of a ``parameters/1`` table; empty when one may."""
+    bodies = parameters[parameters["effect"] == RigidBody.name]
+    return [
+        f"{run}: {reason}"
+        for run, rows in bodies.groupby("run", sort=False)
+        for reason in machine.mechanism.unrealizable(rows["value"].to_numpy(float), geometry)
+    ]
+
+
+def upside_down(parameters: pd.DataFrame, machine: Machine) -> list[str]:
+    """Say which first moments of mass of a ``parameters/1`` table lie above their axes, a sentence each.
+
+    Empty where gravity does not act: nothing is above then. Angles count from hanging straight down. A link may be
+    overbalanced, or stand; where none is, the zero or a sign is wrong, or what is taken for gravity is a spring.
+    """
+    if not machine.mechanism.has_gravity:
+        return []
+    moments = {parameter.name for parameter in machine.mechanism.parameters if parameter.unit == "kg·m"}
+    of_bodies = parameters[(parameters["effect"] == RigidBody.name) & parameters["name"].isin(moments)]
+    return [
+        f"{row['run']}: {row['name']} = {row['value']:.3g} kg·m ({row['ci95_low']:.3g} to {row['ci95_high']:.3g}) has "
+        "mass above the axis where the angle is zero, which is to be hanging straight down: unless the link is "
+        "overbalanced or stands up, the zero is half a turn off, a sign is wrong, or a spring is taken for gravity"
+        for row in of_bodies[of_bodies["ci95_high"] < 0.0].to_dict("records")
+    ]
