@@ -16,7 +16,6 @@ from pipelines.diagnosis.candidates import (
     Candidate,
     bent_column,
     columns_under,
-    expanded,
     gram_of_runs,
     proposals,
     torque_columns,
@@ -73,9 +72,7 @@ class Prepared:
 
 def prepare(runs: Sequence[Run], baseline: Baseline) -> Prepared:
     """Fit the baseline alone and measure the noise of what it leaves."""
-    columns = tuple(
-        run.average(baseline.columns(run.motion, run.motion, run.motion)) for run in runs
-    )
+    columns = tuple(columns_under((), run, baseline)[0] for run in runs)
     gram = gram_of_runs(runs, columns)
     weights = weights_under(gram)
     values = solve(gram, weights)
@@ -219,7 +216,7 @@ class _Columns:
         self._regression, self._prepared = regression, prepared
         slow = [at_block_rate(run) for run in prepared.runs]
         baseline = prepared.baseline
-        plain = [r.average(baseline.columns(r.motion, r.motion, r.motion)) for r in slow]
+        plain = [columns_under((), run, baseline)[0] for run in slow]
         self._runs = {False: slow, True: list(prepared.runs)}
         self._plain = {False: plain, True: list(prepared.columns)}
 
@@ -236,7 +233,8 @@ class _Columns:
             parts = self._bent(candidate, runs, plain)
         else:
             parts = [torque_columns(candidate, r, run) for r, run in enumerate(runs)]
-        wide = expanded(parts, candidate.effect, candidate.signature_apart, runs)
+        own = candidate.columns_in([run.motion.run for run in runs])
+        wide = [own.expand(part, r) for r, part in enumerate(parts)]
         if not all(np.isfinite(part).all() for part in wide):
             return None
         return self._regression.rows(wide)

@@ -13,7 +13,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.choice import NEEDED
 from pipelines.diagnosis.fit import Fit
 from pipelines.diagnosis.fitted_model import model_of_run
 from pipelines.diagnosis.observations import Baseline, Run
@@ -39,6 +38,8 @@ LATE_S = (0.02, 0.04, 0.06)
 ROUNDING = 1e-9
 TAKEN = 0.2
 """Share of the error's power about reversals that a travel must take beyond what speed or a delay takes."""
+NEEDED = 6.0
+"""Log likelihood that a travel must gain over the best way without one."""
 COUNTS = 2
 """Of the encoder: over a shorter travel friction changes sides between two readings."""
 GIVES = (PreslidingHysteresis, Backlash, JointElasticity)

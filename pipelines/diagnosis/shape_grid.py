@@ -10,7 +10,7 @@ from pipelines.diagnosis.candidates import TURNS, Candidate, bends_motion, lowes
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.observations import Run
 from pipelines.diagnosis.onset import NEVER
-from pipelines.diagnosis.shape_refinement import Fitted
+from pipelines.diagnosis.shape_refinement import TONE_STEP_HZ, Fitted
 from pipelines.effects import Effect, Parameter
 
 VALUES = 8
@@ -21,8 +21,6 @@ HARDENING = ("1/rad²", "1/m²")
 """Units of a form that only bends a spring: left to the refinement."""
 ONSETS = 40
 """Instants tried for what begins at a time of its own in each run."""
-TONE_STEP_HZ = 0.01
-"""Grid of a rhythm's frequency, Hz."""
 OSCILLATING = {"Hz", *TURNS}
 """Units of parameters along which an effect has many maxima."""
 APART = 2

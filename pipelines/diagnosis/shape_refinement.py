@@ -4,7 +4,7 @@ A step solves for the amplitudes and the shape's change together, with the basel
 little without computing any column anew.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,8 +25,10 @@ PRIOR_SD = 0.5
 """Prior standard deviation of a step, in the shape's unit of change."""
 WIDE = 4.0
 """Ratio of the ends of a positive range from which a shape changes by factors."""
-MARGIN = 0.25
-"""Share of its typical range, or factor of e to this power times four, a shape may leave it by."""
+MARGIN, BEYOND = 0.5, 2.0
+"""Share of its typical range, and factor, by which a shape may leave that range."""
+TONE_STEP_HZ = 0.01
+"""Unit of change of a rhythm's frequency: that of a line over 100 s, Hz."""
 
 Columns = Callable[[Candidate], NDArray | None]
 """Compute a candidate's weighted rows, (N, k); None where they are not finite."""
@@ -75,7 +77,7 @@ class Alone:
 
     def refined(self, start: Fitted) -> tuple[Fitted, NDArray]:
         """Return the candidate at its best shape, and its derivative columns there, (N, d)."""
-        best, units = start, _units(start.candidate)
+        best, units = start, free_shapes(start.candidate)
         slopes = self._slopes(best, units)
         for _ in range(STEPS if units else 0):
             ahead = self._step(best, slopes, units)
@@ -91,7 +93,7 @@ class Alone:
         bends = fitted.candidate.bends
         amplitudes = np.ones_like(fitted.amplitudes) if bends else fitted.amplitudes
         for d, (i, unit) in enumerate(units):
-            step = DIFFERENCE * _unit(fitted.candidate, i, unit)
+            step = DIFFERENCE * unit_at(fitted.candidate, i, unit)
             moved = self.columns(fitted.candidate.moved(i, step))
             if moved is not None and moved.shape == fitted.columns.shape:
                 change = (moved - fitted.columns) @ amplitudes
@@ -113,7 +115,7 @@ class Alone:
         solution, _ = self._solve(plain, precision, target)
         candidate = fitted.candidate
         for (i, unit), step in zip(units, solution[free:], strict=True):
-            candidate = _changed(candidate, i, unit, float(np.clip(step, -LARGEST_STEP, LARGEST_STEP)))
+            candidate = changed(candidate, i, unit, step)
         return self.fit(candidate)
 
     def _solve(
@@ -128,36 +130,44 @@ class Alone:
         return solution / size, 0.5 * float(right @ solution)
 
 
-def _units(candidate: Candidate) -> list[tuple[int, float]]:
-    """Return the free shapes and what one unit of change is of each; zero where it is a factor."""
+def free_shapes(candidate: Candidate) -> list[tuple[int, float]]:
+    """Return the shapes that are refined along their slopes, and the unit of change of each.
+
+    The unit is zero where a shape changes by factors. Instants at which something begins are
+    found otherwise.
+    """
     return [
         (i, _unit_of(parameter))
         for i, parameter in enumerate(candidate.effect.shape)
         if parameter.default is None and not parameter.forms and i != candidate.onset
-        and i != candidate.own_bend
-    ]  # fmt: skip
+    ]
 
 
 def _unit_of(parameter: Parameter) -> float:
     """Return a shape's unit of change: its grain, its range, or zero where it changes by factors."""
     low, high = parameter.typical
-    if parameter.unit in TURNS or parameter.unit == "Hz":
-        return parameter.grain if parameter.unit in TURNS else 0.01
+    if parameter.unit in TURNS:
+        return parameter.grain
+    if parameter.unit == "Hz":
+        return TONE_STEP_HZ
     return 0.0 if low > 0.0 and high / low > WIDE else high - low
 
 
-def _unit(candidate: Candidate, i: int, unit: float) -> float:
-    """Return the unit of change as a difference at the candidate's own shape."""
-    return unit if unit else abs(candidate.shapes[0][i])
+def unit_at(candidate: Candidate, i: int, unit: float, run: int = 0) -> float:
+    """Return the unit of change as a difference, at the candidate's own shape in a run."""
+    return unit if unit else abs(candidate.shapes[run][i])
 
 
-def _changed(candidate: Candidate, i: int, unit: float, step: float) -> Candidate:
+def changed(
+    candidate: Candidate, i: int, unit: float, step: float, runs: Sequence[int] | None = None
+) -> Candidate:
     """Return the candidate after a step in units of change, within reach of its typical range."""
-    parameter, now = candidate.effect.shape[i], candidate.shapes[0][i]
+    parameter, now = candidate.effect.shape[i], candidate.shapes[runs[0] if runs else 0][i]
     low, high = parameter.typical
+    step = float(np.clip(step, -LARGEST_STEP, LARGEST_STEP))
     if not unit:
-        value = now * np.exp(step)
-        return candidate.reshaped(i, float(np.clip(value, low / 2.0, high * 2.0)))
-    beyond = MARGIN * (high - low)
-    value = now + step * unit
-    return candidate.reshaped(i, float(np.clip(value, low - beyond, high + beyond)))
+        value = float(np.clip(now * np.exp(step), low / BEYOND, high * BEYOND))
+    else:
+        beyond = MARGIN * (high - low)
+        value = float(np.clip(now + step * unit, low - beyond, high + beyond))
+    return candidate.reshaped(i, value, runs)

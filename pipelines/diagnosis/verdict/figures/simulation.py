@@ -8,10 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipelines.contracts.joints import either
-from pipelines.diagnosis.diagnose import Diagnosis
-from pipelines.diagnosis.examined import Extended
-from pipelines.diagnosis.figures.palette import AFTER, BEFORE, MEASURED
-from pipelines.diagnosis.replayed import Stretch, simulated_error, worst_stretch
+from pipelines.diagnosis.diagnosis import Diagnosis
+from pipelines.diagnosis.validation import Validated
+from pipelines.diagnosis.verdict.figures.palette import AFTER, BEFORE, MEASURED
+from pipelines.diagnosis.verdict.worst_stretch import Stretch, simulated_error, worst_stretch
 from pipelines.label import number
 from pipelines.plots import NOISE
 
@@ -98,7 +98,7 @@ def _measured(angle: Axes, torque: Axes, d: Diagnosis, stretch: Stretch, j: int)
 
 
 def _angles(
-    angles: list[Axes], errors: list[Axes], made: Extended, d: Diagnosis, stretch: Stretch, name: str, colour: str
+    angles: list[Axes], errors: list[Axes], made: Validated, d: Diagnosis, stretch: Stretch, name: str, colour: str
 ) -> None:
     simulated = simulated_error(made, d, stretch)
     motion = d.validate[stretch.run].motion
@@ -113,7 +113,7 @@ def _angles(
 
 
 def _torques(
-    torques: list[Axes], errors: list[Axes], made: Extended, d: Diagnosis, stretch: Stretch, colour: str
+    torques: list[Axes], errors: list[Axes], made: Validated, d: Diagnosis, stretch: Stretch, colour: str
 ) -> None:
     run = d.validate[stretch.run]
     blocks = stretch.within(run.time)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.dependence import VARIABLES, Variable, knows, pooled, tone
-from pipelines.diagnosis.diagnose import Diagnosis
-from pipelines.diagnosis.figures.palette import AFTER, BEFORE
+from pipelines.diagnosis.diagnosis import Diagnosis
+from pipelines.diagnosis.verdict.figures.palette import AFTER, BEFORE
 from pipelines.diagnosis.observations import Run
 from pipelines.mechanics.units import unit_at
 from pipelines.plots import NOISE

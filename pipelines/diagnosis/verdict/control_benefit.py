@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pipelines.contracts.joints import joints_of
-from pipelines.diagnosis.diagnose import Diagnosis
+from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fitted_model import fitted_model
 from pipelines.dynamics.plant import make_plant
 from pipelines.dynamics.tracking import track
@@ -40,7 +40,7 @@ def control(d: Diagnosis) -> dict[str, Any]:
     }
     if not d.baseline.machine.is_exoskeleton:
         return told | {"reason": "the reference case is a leg's gait, with its gains and limits"}
-    if d.spoilt:
+    if d.data.spoilt:
         return told | {"reason": "acquisition is at fault: no model of these recordings can be trusted"}
     fits = {"without": d.before.fit, "with": d.after.fit} if d.causes else {"without": d.before.fit}
     reasons = [] if d.causes else ["no cause is named"]

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from pipelines.diagnosis.diagnose import Diagnosis
-from pipelines.diagnosis.error_budget import FLOOR, LEFT, REPEATS, WANDERS
+from pipelines.diagnosis.diagnosis import Diagnosis
+from pipelines.diagnosis.verdict.error_budget import FLOOR, LEFT, REPEATS, WANDERS
 from pipelines.label import SHARES, in_words
 from pipelines.plots import BLUE, CAUSES, NOISE
 from pipelines.plots import WANDERS as SCATTER

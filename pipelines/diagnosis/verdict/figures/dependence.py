@@ -6,9 +6,9 @@ from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from pipelines.diagnosis.diagnose import Diagnosis
-from pipelines.diagnosis.figures.against import against, draw, reach
-from pipelines.diagnosis.figures.palette import AFTER, BEFORE
+from pipelines.diagnosis.diagnosis import Diagnosis
+from pipelines.diagnosis.verdict.figures.against import against, draw, reach
+from pipelines.diagnosis.verdict.figures.palette import AFTER, BEFORE
 
 SHOWN = ("angle", "speed", "acceleration", "load", "time", "phase", "cuff_force")
 """Always; another variable only where it foretells something."""

@@ -1,4 +1,4 @@
-"""What can be said, and had, where no cause is known: what the residual depends on, and a smooth term for it."""
+"""What the named causes leave: what it depends on, and a smooth term that extends the model by it."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from pipelines.diagnosis.dependence import Dependence, describe, excesses
-from pipelines.diagnosis.diagnose import Diagnosis
+from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fit import residuals_on
 from pipelines.diagnosis.gain import errors_of
 from pipelines.diagnosis.smooth_term import smooth_term
@@ -15,7 +15,7 @@ MENTIONED = 5
 
 
 @dataclass(frozen=True)
-class Unknown:
+class Unexplained:
     """The residual that no named cause explains."""
 
     description: str
@@ -34,7 +34,7 @@ class Unknown:
         }
 
 
-def unknown(d: Diagnosis, found: list[Dependence]) -> Unknown:
+def unexplained(d: Diagnosis, found: list[Dependence]) -> Unexplained:
     """Describe the residual of validation runs and extend the model by a smooth term learnt on train runs.
 
     ``found`` is what the extended model's residual depends on.
@@ -43,7 +43,7 @@ def unknown(d: Diagnosis, found: list[Dependence]) -> Unknown:
     above = excesses(d.validate, list(d.after.residuals), d.floor)
     left = [r - np.nan_to_num(term.torque(run)) for run, r in zip(d.validate, d.after.residuals, strict=True)]
     rms = errors_of(d.validate, left).rms
-    return Unknown(
+    return Unexplained(
         description=describe(d.baseline.machine, found, above, term.together),
         depends_on=found[:MENTIONED],
         smooth=term.describe(),

@@ -10,10 +10,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from pipelines.diagnosis.dependence import VARIABLES, knows, tone, variable_share
-from pipelines.diagnosis.diagnose import Diagnosis
-from pipelines.diagnosis.figures.against import against, draw, reach
-from pipelines.diagnosis.figures.budget import colours_of, highest, lowest, rms, stack, words_of
-from pipelines.diagnosis.figures.palette import AFTER, BEFORE
+from pipelines.diagnosis.diagnosis import Diagnosis
+from pipelines.diagnosis.verdict.figures.against import against, draw, reach
+from pipelines.diagnosis.verdict.figures.budget import colours_of, highest, lowest, rms, stack, words_of
+from pipelines.diagnosis.verdict.figures.palette import AFTER, BEFORE
 from pipelines.effects import RUNS
 from pipelines.label import in_words
 from pipelines.model import effect_named
@@ -71,7 +71,7 @@ def _shape(axis: Axes, d: Diagnosis, said: dict[str, Any]) -> None:
     else:
         joint = max(said["noise_floor_nm"], key=lambda j: said["baseline_rmse_nm"][j] / said["noise_floor_nm"][j])
         # When a fault of acquisition sets in tells more than what it goes with.
-        variable, kinds = "time" if d.spoilt else said["depends_on"][joint][0]["variable"], RUNS
+        variable, kinds = "time" if d.data.spoilt else said["depends_on"][joint][0]["variable"], RUNS
     j = d.baseline.joints.index(joint)
     floor = float(d.floor.rms[j])
     seen = against(variable, d, joint, kinds)

@@ -10,7 +10,7 @@ from math import factorial
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.diagnose import Diagnosis
+from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.evaluate import evaluate
 from pipelines.diagnosis.fit import fit
 from pipelines.diagnosis.gain import errors_of, scored
@@ -26,8 +26,8 @@ def error_budget(d: Diagnosis) -> dict[str, dict[str, float]]:
     A cause's share, by its label, is below zero at a joint whose error it raises.
     """
     left = d.after.errors.rms**2
-    floor = np.minimum(d.standing.floor**2, left)
-    causes = shares_of_causes(tuple(d.likely), lambda labels: _mean_square(d, labels))
+    floor = np.minimum(d.floor_rms**2, left)
+    causes = shares_of_causes(d.causes, lambda labels: _mean_square(d, labels))
     scatter = scatter_between_periods(d.validate, d.after.residuals)
     budget = {}
     for j, joint in enumerate(d.baseline.joints):
@@ -67,14 +67,14 @@ def shares_of_causes(labels: Sequence[str], left_by: Callable[[frozenset[str]], 
 
 
 def _mean_square(d: Diagnosis, labels: frozenset[str]) -> NDArray:
-    named = frozenset(d.likely)
+    named = frozenset(d.causes)
     if labels == named:
         return d.after.errors.rms**2
     if not labels:
         return d.before.errors.rms**2
     if len(labels) == len(named) - 1:
         return d.without[next(iter(named - labels))].errors.rms ** 2
-    made = fit([c for c in d.after.fit.causes if c.label in labels], d.train, d.baseline, d.bank.weights)
+    made = fit([c for c in d.after.fit.causes if c.label in labels], d.train, d.baseline, d.before.fit.weights)
     return errors_of(d.validate, evaluate(made, d.validate, d.baseline)).rms ** 2
 
 

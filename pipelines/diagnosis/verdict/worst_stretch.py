@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.diagnose import Diagnosis
-from pipelines.diagnosis.examined import Extended
+from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fitted_model import model_of_run
 from pipelines.diagnosis.gain import scored
+from pipelines.diagnosis.validation import Validated
 from pipelines.dynamics.replay import WINDOW_S, replay
 from pipelines.errors import ExoidError
 
@@ -39,7 +39,7 @@ def worst_stretch(d: Diagnosis) -> Stretch:
 
 def _stretches(d: Diagnosis) -> Iterator[tuple[float, Stretch]]:
     for number, (run, residual) in enumerate(zip(d.validate, d.before.residuals, strict=True)):
-        square = np.sum((residual[:, : len(d.standing.floor)] / d.standing.floor) ** 2, axis=1) * scored(run)
+        square = np.sum((residual[:, : len(d.floor_rms)] / d.floor_rms) ** 2, axis=1) * scored(run)
         total = np.concatenate([[0.0], np.cumsum(square)])
         last = max(run.time[-1] - STRETCH_S, run.time[0])
         for begin in np.arange(run.time[0], last + STEP_S, STEP_S):
@@ -47,7 +47,7 @@ def _stretches(d: Diagnosis) -> Iterator[tuple[float, Stretch]]:
             yield float(np.diff(total[inside])[0]), Stretch(number, float(begin), float(begin + STRETCH_S))
 
 
-def simulated_error(made: Extended, d: Diagnosis, stretch: Stretch) -> tuple[NDArray, NDArray] | None:
+def simulated_error(made: Validated, d: Diagnosis, stretch: Stretch) -> tuple[NDArray, NDArray] | None:
     """Return times (k,) s and angle errors (k, J) rad of 1 s windows one after the other, NaN between two.
 
     None where the model cannot be simulated: causes that the forward dynamics cannot hold together, or a mass matrix

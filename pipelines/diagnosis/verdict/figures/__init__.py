@@ -5,8 +5,8 @@ from typing import Any
 
 from matplotlib import pyplot as plt
 
-from pipelines.diagnosis.diagnose import Diagnosis
-from pipelines.diagnosis.figures import budget, dependence, simulation, verdict
+from pipelines.diagnosis.diagnosis import Diagnosis
+from pipelines.diagnosis.verdict.figures import budget, dependence, simulation, verdict
 from pipelines.plots import STYLE, save
 
 FIGURES = {

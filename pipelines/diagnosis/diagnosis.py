@@ -1,0 +1,219 @@
+"""The result of a diagnosis: everything that a verdict is written from."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.candidates import Candidate
+from pipelines.diagnosis.evidence.residual_shares import ResidualShares
+from pipelines.diagnosis.faults import Fault
+from pipelines.diagnosis.fitted_model import values_of_each_run
+from pipelines.diagnosis.floor import Floor
+from pipelines.diagnosis.gain import Gain, errors_of
+from pipelines.diagnosis.library import Library
+from pipelines.diagnosis.observations import Baseline, Run
+from pipelines.diagnosis.reversals import BuildUp
+from pipelines.diagnosis.selection.answer import Answer, Named
+from pipelines.diagnosis.selection.evidence import Evidence
+from pipelines.diagnosis.selection.findings import Finding, findings
+from pipelines.diagnosis.selection.posterior import Posterior
+from pipelines.diagnosis.training_data import TrainingData
+from pipelines.diagnosis.uncertainty import Uncertainty
+from pipelines.diagnosis.validation import Validated, gains_of
+from pipelines.effects import Effect
+from pipelines.effects.force_sensor_zero import ForceSensorZero
+from pipelines.effects.rigid_body import RigidBody
+from pipelines.estimation.collinearity import collinearities, profiled
+from pipelines.model import Column, unrealizable, upside_down
+
+AT_FLOOR = 1.03
+"""RMSE over noise floor up to which a joint has no systematic error (docs/contracts.md)."""
+EXPLAINED = 0.2
+"""Share of the systematic power that may be left of an explained joint (docs/contracts.md)."""
+
+
+@dataclass(frozen=True)
+class Selected:
+    """What the evidence says, before anything is fitted."""
+
+    library: Library | None
+    """None where faults of acquisition keep physics from being looked at."""
+    evidence: Evidence | None
+    posterior: Posterior | None
+    answer: Answer
+    findings: tuple[Finding, ...]
+    router: tuple[ResidualShares, ...]
+    """Of each joint: how its residual repeats."""
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """The named causes at their most probable shapes."""
+        if self.library is None:
+            return ()
+        return tuple(
+            self.library.causes[one.element.place].candidate for one in self.answer.named
+        )
+
+    def judged(self, ratios: Mapping[str, float]) -> "Selected":
+        """Return the same after the validation runs, log likelihood ratios of causes by label."""
+        if self.posterior is None or not ratios:
+            return self
+        answer = self.answer.judged(ratios)
+        return replace(self, answer=answer, findings=tuple(findings(self.posterior, answer)))
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """A session, what is named, and the model with it."""
+
+    data: TrainingData
+    selected: Selected
+    before: Validated
+    """The baseline."""
+    after: Validated
+    """The baseline with the named causes."""
+    without: dict[str, Validated]
+    """The named causes less one, by that cause's label."""
+    floor: Floor
+    """Of the validation runs."""
+    uncertainty: Uncertainty
+    parameters: pd.DataFrame
+    covariance: NDArray
+    residuals: pd.DataFrame
+    reversals: tuple[BuildUp, ...]
+    """Joints whose friction builds up over a travel where they reverse, which no fit looks at."""
+    simulation_error: dict[str, NDArray | None]
+    """(J,) rad of 1 s simulations with the baseline and with the extended model."""
+
+    @property
+    def baseline(self) -> Baseline:
+        """The model without causes."""
+        return self.data.baseline
+
+    @property
+    def train(self) -> tuple[Run, ...]:
+        """The training runs, with the loads that the baseline makes."""
+        return self.selected.library.prepared.runs if self.selected.library else self.data.train
+
+    @property
+    def validate(self) -> tuple[Run, ...]:
+        """The validation runs."""
+        return tuple(self.before.runs)
+
+    @property
+    def named(self) -> tuple[Named, ...]:
+        """The named causes, the most probable first."""
+        return self.selected.answer.named
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """Labels of the named causes."""
+        return tuple(one.element.label for one in self.named)
+
+    @property
+    def status(self) -> str:
+        """The verdict's status."""
+        if self.data.spoilt:
+            return "unknown_cause"
+        if not self.named:
+            missing = self.selected.answer.nothing < 0.5
+            return "unknown_cause" if missing else "nothing_missing"
+        left = [share for share in self.unexplained if share is not None]
+        return "explained" if all(s <= EXPLAINED for s in left) else "partly_explained"
+
+    @property
+    def floor_rms(self) -> NDArray:
+        """(J,) N·m noise floor of the drives."""
+        return self.floor.rms[: len(self.baseline.joints)]
+
+    @property
+    def unexplained(self) -> list[float | None]:
+        """Share of each joint's systematic power that is left; None where there was none."""
+        shares: list[float | None] = []
+        errors = self.before.errors.rms, self.after.errors.rms
+        for floor, before, after in zip(self.floor_rms, *errors, strict=True):
+            if not before > AT_FLOOR * floor:
+                shares.append(None)
+            else:
+                shares.append(float(max(after**2 - floor**2, 0.0) / (before**2 - floor**2)))
+        return shares
+
+    @property
+    def leaves_something(self) -> bool:
+        """Whether the extended model leaves more than noise at some joint."""
+        if self.data.spoilt or self.status == "nothing_missing":
+            return False
+        return self.status != "explained" or bool(
+            np.any(self.after.errors.rms > AT_FLOOR * self.floor_rms)
+        )
+
+    @cached_property
+    def effects(self) -> dict[str, Effect]:
+        """The named effects as they were fitted, by label."""
+        return {cause.label: cause.effect for cause in self.after.fit.causes}
+
+    def effect_of(self, label: str) -> Effect:
+        """Return the effect of a label that the library has, at its most probable shape."""
+        assert self.selected.library is not None and self.selected.posterior is not None
+        sets = (i for chosen in self.selected.posterior.sets for i in chosen)
+        elements = self.selected.posterior.elements
+        place = next(elements[i].place for i in sets if elements[i].label == label)
+        return self.selected.library.causes[place].candidate.effect
+
+    @cached_property
+    def each_run(self) -> dict[str, list[dict[str, Any]]]:
+        """What each run has for itself of the named causes, by label."""
+        return values_of_each_run(
+            self.after.fit, self.baseline, self.uncertainty, self.train, self.validate
+        )
+
+    @cached_property
+    def gains(self) -> dict[str, Gain]:
+        """What each named cause gains on the validation runs beside the others, by label."""
+        return gains_of(self.without, self.after)
+
+    @cached_property
+    def torque_rms(self) -> NDArray:
+        """(J,) N·m that was measured, on the samples that the errors are of."""
+        return errors_of(self.validate, [run.measured for run in self.validate]).rms
+
+    @property
+    def collinear(self) -> list[str]:
+        """Which parameters of the extended model the training runs hardly tell apart, in words."""
+        made = self.after.fit
+        shapes = [(made.causes[k].effect, i) for k, i, _ in self.uncertainty.shapes]
+        own = (Column(effect, effect.shape[i], None) for effect, i in shapes)
+        columns = [*made.layout.columns, *own]
+        # Nobody asks for the zeros of the cuffs.
+        zeros = [isinstance(column.effect, ForceSensorZero) for column in columns]
+        names = [c.name for c, zero in zip(columns, zeros, strict=True) if not zero]
+        normal = profiled(self.uncertainty.normal, np.flatnonzero(zeros))
+        seen = np.flatnonzero(np.diag(normal) > 0.0)
+        return collinearities(normal[np.ix_(seen, seen)], [names[place] for place in seen])
+
+    @property
+    def unrealizable(self) -> list[str]:
+        """Why no real machine has the extended model's rigid bodies; empty when one may."""
+        geometry = self.train[0].motion.geometry
+        return unrealizable(self.parameters, self.baseline.machine, geometry)
+
+    @cached_property
+    def lacks_mass(self) -> bool:
+        """Whether a rigid body's least inertia is negative by more than its standard error."""
+        table, geometry = self.parameters.reset_index(drop=True), self.train[0].motion.geometry
+        for _, rows in table[table["effect"] == RigidBody.name].groupby("run"):
+            own = rows.index.to_numpy()
+            least, _, slope = self.baseline.machine.mechanism.least_inertia(rows["value"], geometry)
+            if least < -np.sqrt(slope @ self.covariance[np.ix_(own, own)] @ slope):
+                return True
+        return False
+
+    @property
+    def upside_down(self) -> list[str]:
+        """Which links the extended model has upside down; empty when none."""
+        return upside_down(self.parameters, self.baseline.machine)

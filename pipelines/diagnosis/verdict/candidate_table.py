@@ -1,0 +1,123 @@
+"""``candidates/1``: every set of causes and laws that was weighed in full, and what became of it."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from pipelines.diagnosis.diagnosis import Diagnosis
+from pipelines.diagnosis.gain import gain
+from pipelines.diagnosis.validation import Validated
+from pipelines.effects import EFFECTS, Effect
+from pipelines.mechanics.machine import Machine
+
+ORDER = {"named": 0, "indistinguishable": 1, "rejected": 2, "absorbed": 3}
+
+
+def candidates(d: Diagnosis) -> pd.DataFrame:
+    """Return every set that was weighed, the named one first, then by probability."""
+    rows = [_row(d, labels, p) for labels, p in _weighed(d).items() if labels]
+    rows += [
+        _absorbed(d, effect.name, joint, into)
+        for effect in EFFECTS
+        for joint, into in _taken_up(effect, d.baseline.machine).items()
+    ]
+    rows.sort(key=lambda r: (ORDER[r["verdict"]], -(r["probability"] or 0.0)))
+    frame = pd.DataFrame(rows)
+    frame.insert(0, "rank", range(1, len(frame) + 1))
+    return frame
+
+
+def _weighed(d: Diagnosis) -> dict[frozenset[str], float]:
+    """Return the probability of each set of labels."""
+    return {} if d.selected.posterior is None else d.selected.posterior.by_labels
+
+
+def _row(d: Diagnosis, labels: frozenset[str], probability: float) -> dict[str, Any]:
+    fitted = _fitted(d, labels)
+    row: dict[str, Any] = {
+        "causes": sorted(labels),
+        "parameters": _parameters(fitted, d) if fitted else [],
+        "train_score": _log_odds(d, probability),
+        "gain_nm": None,
+        "gain_low_nm": None,
+        "gain_high_nm": None,
+        "probability": probability,
+    }
+    for j, joint in enumerate(d.baseline.machine.joints):
+        row[joint.column("rmse_before")] = float(d.before.errors.rms[j])
+        row[joint.column("rmse_after")] = float(fitted.errors.rms[j]) if fitted else None
+    if fitted:
+        own = gain(d.before.errors, fitted.errors)
+        row |= {"gain_nm": own.value, "gain_low_nm": own.low, "gain_high_nm": own.high}
+    row["verdict"], row["reason"] = _judged(d, labels, probability)
+    return row
+
+
+def _log_odds(d: Diagnosis, probability: float) -> float | None:
+    """Return the log posterior odds of a set against the empty one."""
+    nothing = d.selected.answer.nothing
+    if not probability > 0.0 or not nothing > 0.0:
+        return None
+    return float(np.log(probability) - np.log(nothing))
+
+
+def _fitted(d: Diagnosis, labels: frozenset[str]) -> Validated | None:
+    """Return the set as it was fitted to the runs: the named one, or it less one cause."""
+    named = frozenset(d.causes)
+    if labels == named:
+        return d.after
+    missing = named - labels
+    return d.without[next(iter(missing))] if len(missing) == 1 and labels < named else None
+
+
+def _parameters(fitted: Validated, d: Diagnosis) -> list[dict[str, Any]]:
+    """Return what was fitted, as files name it; what each run has for itself is left out."""
+    found: list[dict[str, Any]] = []
+    for number, cause in enumerate(fitted.fit.causes):
+        columns = fitted.fit.columns_of(number)
+        if any(columns.per_run):
+            continue
+        amplitudes = columns.select(fitted.fit.values, None, np.zeros(len(columns.per_run)))
+        values = cause.effect.physical(np.append(amplitudes, cause.shapes[0]))
+        found += [
+            {"name": p.name, "value": float(v), "unit": p.unit}
+            for p, v in zip(cause.effect.parameters, values, strict=True)
+        ]
+    return found
+
+
+def _judged(d: Diagnosis, labels: frozenset[str], probability: float) -> tuple[str, str]:
+    named = frozenset(d.causes)
+    if named and labels == named:
+        return "named", "selected: its causes are the most probable"
+    for one in d.named:
+        rest = named - {one.element.label}
+        rivals = labels - rest
+        if rest <= labels and len(rivals) == 1 and next(iter(rivals)) in dict(one.ties):
+            return "indistinguishable", f"it explains these data as well as {one.element.label}"
+    laws = sorted(label for label in labels if label.startswith("law:"))
+    unlisted = f"; {' and '.join(laws)} is no listed cause" if laws else ""
+    return "rejected", f"its probability is {probability:.2g}{unlisted}"
+
+
+def _taken_up(effect: type[Effect], machine: Machine) -> dict[str, str]:
+    """Return the joints at which other parameters take an effect up whole, and which."""
+    everywhere = machine.mechanism.absorbs.get(effect.name)
+    by_joint = {
+        joint: everywhere or effect.absorbed.get(machine.place(joint)) for joint in machine.names
+    }
+    return {joint: into for joint, into in by_joint.items() if into}
+
+
+def _absorbed(d: Diagnosis, name: str, joint: str, into: str) -> dict[str, Any]:
+    blank = {
+        j.column(f"rmse_{when}"): None
+        for j in d.baseline.machine.joints
+        for when in ("before", "after")
+    }
+    return {
+        "causes": [f"{name}@{joint}"], "parameters": [], "train_score": None, "gain_nm": None,
+        "gain_low_nm": None, "gain_high_nm": None, "probability": None, **blank,
+        "verdict": "absorbed", "reason": f"it is part of {into} and cannot be seen apart from it",
+    }  # fmt: skip

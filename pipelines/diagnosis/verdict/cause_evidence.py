@@ -1,0 +1,78 @@
+"""What speaks for a named cause: one sentence each."""
+
+from pipelines.contracts.joints import the
+from pipelines.diagnosis.diagnosis import Diagnosis
+from pipelines.diagnosis.perceived import PERCEIVED
+from pipelines.diagnosis.selection.answer import Named
+from pipelines.effects import Effect
+from pipelines.label import amount, effect_labelled, in_words, number
+
+CERTAIN = 1000.0
+"""Odds from which more is not told: no calibration could vouch for a figure."""
+HEARD = 3.0
+"""Log likelihood from which auxiliary evidence is mentioned: odds of 20."""
+
+
+def cause_evidence(d: Diagnosis, named: Named) -> list[str]:
+    """Return the sentences for a named cause."""
+    label = named.element.label
+    effect, gained = d.effects[label], d.gains[label]
+    machine, joint = d.baseline.machine, d.baseline.joints[gained.joint]
+    before = d.without[label].errors.rms[gained.joint]
+    others = " that the other causes leave" if len(d.named) > 1 else ""
+    taken = number(machine, gained.value) if gained.value > 0.0 else "nothing"
+    sentences = [
+        f"it removes {taken} of {amount(machine, joint, before)} of {machine.joint(joint).effort} "
+        f"error at {the(joint)}{others} on the validation runs"
+    ]
+    if doubt := doubt_of_gain(d, label):
+        sentences.append(doubt[1])
+    if effect.each_run:
+        sentences.append(_differs(d, label, effect))
+    assert d.selected.evidence is not None
+    if d.selected.evidence.heard.get(label, 0.0) > HEARD:
+        sentences.append(PERCEIVED[effect.name])
+    if rival := _next(d, named):
+        sentences.append(rival)
+    return [*sentences, f"it looks like {effect.looks_like}", f"to make sure: {effect.confirm}"]
+
+
+def _differs(d: Diagnosis, label: str, effect: Effect) -> str:
+    """List the values that runs have of a cause which differs from run to run."""
+    (parameter,) = (p for p in effect.parameters if p.per_run)
+    values = [f"{r['values'][parameter.name]:+.3g} in {r['file']}" for r in d.each_run[label]]
+    return (
+        f"each run has its own {parameter.name}, as of {effect.may_differ}: {', '.join(values)} "
+        f"({parameter.unit})"
+    )
+
+
+def doubt_of_gain(d: Diagnosis, label: str) -> tuple[str, str] | None:
+    """Say that a cause gains no more than chance may, in the summary and alone; or None."""
+    gained = d.gains.get(label)
+    if gained is None or gained.low > 0.0:
+        return None
+    if gained.high < 0.0:
+        return (
+            "which raises the error on the validation runs",
+            "that is no gain: its 95 % interval lies below zero",
+        )
+    return "whose gain may be chance", "that gain may be chance: its 95 % interval includes zero"
+
+
+def _next(d: Diagnosis, named: Named) -> str | None:
+    """Say how much less likely the next listed cause is that is not tied with a named one."""
+    assert d.selected.posterior is not None
+    named_or_tied = {label for one in d.named for label in (one.element.label, *dict(one.ties))}
+    listed = {e.label for e in d.selected.posterior.elements if not e.is_law}
+    others = [
+        (label, p)
+        for label, p in d.selected.posterior.marginals.items()
+        if label in listed - named_or_tied and p > 0.0
+    ]
+    if not others:
+        return None
+    rival, p = others[0]
+    odds = named.probability / p
+    times = f"{odds:.3g} times" if odds < CERTAIN else f"over {CERTAIN:g} times"
+    return f"the next listed cause, {in_words(effect_labelled(rival))}, is {times} less likely"

@@ -1,0 +1,121 @@
+"""What the recordings at hand could not show, whatever is missing."""
+
+from pipelines.contracts.joints import the
+from pipelines.diagnosis.diagnosis import Diagnosis
+from pipelines.diagnosis.reversals import NEAR_S, BuildUp
+from pipelines.effects import PreslidingHysteresis
+from pipelines.estimation.angle_noise import CUTOFF_HZ, IN_WORDS
+from pipelines.label import amount
+from pipelines.mechanics.geometry import Geometry
+
+HIDING = 0.2
+"""Share of a joint's torque from which an estimated noise floor is doubted: no sensor is as noisy,
+and friction is seldom more."""
+
+
+def caveats(d: Diagnosis) -> list[str]:
+    """Return what must be known beside the verdict, a sentence or two each."""
+    noisy = (
+        f"{IN_WORDS}. Fits would underestimate inertia, so only what is below {CUTOFF_HZ:g} Hz is "
+        f"used: set filter.cutoff_hz = {CUTOFF_HZ:g} for the other stages, and check encoder "
+        "counts and time stamps"
+    )
+    known = [
+        f"{effect.label} is assumed present (`known`). Its size is fitted; its presence was not "
+        "tested"
+        for effect in d.baseline.known
+    ]
+    doubtful = [] if d.data.spoilt else [*_high_floor(d), *d.upside_down]
+    return [
+        *known, *_default_length(d), *[noisy] * d.data.noisy_angles, *_unrealizable(d), *doubtful,
+        *(_reversal(d, one) for one in d.reversals), *_one_run(d), *_one_kind(d),
+    ]  # fmt: skip
+
+
+def floor_that_hides(d: Diagnosis) -> dict[str, float]:
+    """Return joints whose noise floor is estimated without periods and high, with its share."""
+    if d.floor.from_periods:
+        return {}
+    shares = zip(d.baseline.joints, (d.floor_rms / d.torque_rms).tolist(), strict=True)
+    return {joint: share for joint, share in shares if share > HIDING}
+
+
+def _high_floor(d: Diagnosis) -> list[str]:
+    machine = d.baseline.machine
+    return [
+        f"the noise floor of {the(joint)} is estimated as {share:.0%} of its "
+        f"{machine.joint(joint).effort}, more than any sensor's noise: much of it may be what the "
+        "model lacks. Repeat one motion and record its period, and check unit, sign and time "
+        "stamps of that channel"
+        for joint, share in floor_that_hides(d).items()
+    ]
+
+
+def _unrealizable(d: Diagnosis) -> list[str]:
+    if not d.causes or not d.lacks_mass:
+        return []
+    return [
+        "the extended model's inertia is not physically realizable; treat the named causes with "
+        f"caution: {reason}"
+        for reason in d.unrealizable
+    ]
+
+
+def _default_length(d: Diagnosis) -> list[str]:
+    """Say that the distance between two axes is an exoskeleton's default on another machine."""
+    machine, length = d.baseline.machine, d.train[0].motion.geometry.thigh_length_m
+    default = length == Geometry().thigh_length_m
+    if machine.is_exoskeleton or not machine.mechanism.has_length or not default:
+        return []
+    return [
+        f"the distance between the axes of {machine.names[0]} and {machine.names[1]} is not given. "
+        f"{length:g} m is assumed, an exoskeleton's: set geometry.thigh_length_m in the map, and "
+        "import again"
+    ]
+
+
+def _reversal(d: Diagnosis, one: BuildUp) -> str:
+    """Say what the samples about a joint's reversals show, which no fit uses."""
+    machine = d.baseline.machine
+    joint = machine.joint(one.joint)
+    at_once, otherwise, over = (
+        amount(machine, one.joint, value)
+        for value in (one.at_once, one.otherwise, one.over_travel)
+    )
+    return (
+        f"within {NEAR_S:g} s of its reversals {the(one.joint)}'s friction changes sign over about "
+        f"{1e3 * one.travel:.1g} m{joint.unit('angle')} of travel. {PreslidingHysteresis.name} "
+        "could cause it, or play or give between encoder and friction. The model ignores it: there "
+        f"the {joint.effort} error is {at_once}, at best {otherwise} without a travel and {over} "
+        f"with it (validation runs, below {CUTOFF_HZ:g} Hz)"
+    )
+
+
+def _one_run(d: Diagnosis) -> list[str]:
+    """Say what one training run cannot show, where nothing is named that it could be."""
+    if d.status != "unknown_cause" or d.data.spoilt or len(d.train) > 1:
+        return []
+    return [
+        "there is one training run only: a zero that is set at each start looks like one for all "
+        "runs. Record another training run after a new start"
+    ]
+
+
+def _one_kind(d: Diagnosis) -> list[str]:
+    """Say what runs of one kind cannot show."""
+    kinds = {run.motion.run for run in d.train}
+    if not d.baseline.machine.is_exoskeleton and kinds == {"exo_alone"}:
+        return []  # nobody is meant to be in any other machine
+    if kinds == {"exo_alone"}:
+        return [
+            "every run is without a person: what a person adds cannot be seen, and a shifted zero "
+            "cannot be told from a mass beside the axis. Record with_human runs as well"
+        ]
+    if kinds == {"with_human"}:
+        felt = any(run.motion.forces is not None for run in d.train)
+        told = "by the cuff forces alone" if felt else "not at all"
+        return [
+            "every run is with a person: causes in the machine and in the person are separated "
+            f"{told}, and the machine's friction alone is unknown. Record exo_alone runs as well"
+        ]
+    return []

@@ -1,0 +1,175 @@
+"""The verdict in one or two sentences: what a person reads first."""
+
+from typing import Any
+
+from pipelines.contracts.joints import the
+from pipelines.diagnosis.diagnosis import AT_FLOOR, EXPLAINED, Diagnosis
+from pipelines.diagnosis.faults import Fault
+from pipelines.diagnosis.selection.findings import Finding
+from pipelines.diagnosis.verdict.caveats import floor_that_hides
+from pipelines.diagnosis.verdict.cause_evidence import doubt_of_gain
+from pipelines.diagnosis.verdict.unexplained import Unexplained
+from pipelines.label import amount, cause_label, effect_labelled, effect_told, in_words
+
+MENTIONED = 3
+"""Tied causes in the summary; ``indistinguishable_from`` has all."""
+CLOSEST = 0.05
+"""Probability from which a listed cause is said to come closest."""
+FAMILY = {
+    "angle": "a law of {joint}'s angle",
+    "speed": "a law of {joint}'s speed",
+    "reversal": "friction of {joint} that remembers its reversals",
+    "load": "a law of {joint}'s load",
+    "time": "a torque at {joint} that changes with time",
+    "transmission": "something in {joint}'s transmission",
+    "sensor": "something in {joint}'s sensors",
+    "person": "something of the person at {joint}",
+}
+"""What an unlisted law is called by its family."""
+
+
+def summary(d: Diagnosis, causes: list[dict[str, Any]], left: Unexplained | None) -> str:
+    """Return the verdict's first sentences."""
+    if d.data.spoilt:
+        return f"Acquisition, not physics: {_in_short(d.data.spoilt[0], d)}."
+    said = finding_in_words(d, causes, left)
+    if not d.floor.from_periods:
+        told = any(run.motion.period_s for run in (*d.train, *d.validate))
+        why = "No run holds two periods" if told else "No recording names a period"
+        said += f" {why}, so the noise floor is estimated from {floor_from(d)}."
+    if d.data.faults:
+        said += f" Faults of acquisition were found as well: {_in_short(d.data.faults[0], d)}."
+    return said
+
+
+def floor_from(d: Diagnosis) -> str:
+    """Say what the noise floor was estimated from."""
+    if d.floor.from_periods:
+        return "periods"
+    if d.data.noisy_angles:
+        return "what the model leaves of the motion's own band"
+    return "the band above the motion"
+
+
+def _in_short(fault: Fault, d: Diagnosis) -> str:
+    others = len(d.data.faults) - 1
+    plural = "s" * (others > 1)
+    more = f" (and {others} more fault{plural}, in data_faults of verdict.json)" if others else ""
+    return f"{fault.file}, {fault.channel}: {fault.what}{more}"
+
+
+def finding_in_words(
+    d: Diagnosis, causes: list[dict[str, Any]], left: Unexplained | None
+) -> str:
+    """Return what was found, without remarks on floor and faults."""
+    described = f" {left.description}" if left and left.description else ""
+    if d.status == "nothing_missing":
+        return _nothing(d)
+    if d.status == "unknown_cause":
+        return f"{_unlisted(d)} {_worst(d)}{described}"
+    return f"{_named(d, causes)}{described}"
+
+
+def _worst_joint(d: Diagnosis) -> int:
+    return int((d.before.errors.rms / d.floor_rms).argmax())
+
+
+def _size(d: Diagnosis) -> str:
+    """Return the largest error under the baseline, and how many noise floors that is."""
+    worst = _worst_joint(d)
+    joint, error = d.baseline.joints[worst], d.before.errors.rms[worst]
+    ratio = error / d.floor_rms[worst]
+    return f"{amount(d.baseline.machine, joint, error)}, {ratio:.2f} times the noise floor"
+
+
+def _worst(d: Diagnosis) -> str:
+    joint = d.baseline.joints[_worst_joint(d)]
+    effort = d.baseline.machine.joint(joint).effort
+    return f"{the(joint).capitalize()}'s {effort} error is {_size(d)}."
+
+
+def _nothing(d: Diagnosis) -> str:
+    joint = d.baseline.joints[_worst_joint(d)]
+    effort = d.baseline.machine.joint(joint).effort
+    said = (
+        "Nothing is missing that these data could show "
+        f"(probability {d.selected.answer.nothing:.2f}). The largest {effort} error, at "
+        f"{the(joint)}, is {_size(d)}"
+    )
+    if hiding := floor_that_hides(d).get(joint):
+        return f"{said}, but the floor itself is {hiding:.0%} of the {effort}: little could show."
+    return f"{said}."
+
+
+def _unlisted(d: Diagnosis) -> str:
+    """Say at which depth something is known that no listed cause explains."""
+    found = d.selected.findings
+    if not found:
+        return "Something is missing, and no listed cause is likely."
+    first, *more = found
+    also = "".join(f"; and {_thing(one)} ({one.probability:.2f})" for one in more)
+    said = (
+        f"Something is missing that no listed cause explains: {_thing(first)} "
+        f"(probability {first.probability:.2f}){also}."
+    )
+    close = [(label, p) for label, p in first.causes if p >= CLOSEST]
+    if not close:
+        return said
+    label, p = close[0]
+    return f"{said} Of the listed causes {in_words(effect_labelled(label))} ({p:.2f}) comes closest."
+
+
+def _thing(finding: Finding) -> str:
+    """Return what is missing, as deep as it is known."""
+    joint = the(finding.joint) if finding.joint else "the machine"
+    if finding.level == "family":
+        return FAMILY[str(finding.family)].format(joint=joint)
+    if finding.level == "joint":
+        return f"something at {joint}"
+    return "something that " + ("repeats" if finding.repeats else "does not repeat")
+
+
+def _named(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
+    """Name the causes, and say what naming them gains."""
+    doubts = [doubt_of_gain(d, cause_label(cause)) for cause in causes]
+    named = "; and ".join(
+        _in_words(cause) + (f", {doubt[0]}" if doubt else "")
+        for cause, doubt in zip(causes, doubts, strict=True)
+    )
+    before, after = d.before.errors.rms, d.after.errors.rms
+    most = int(((before**2 - after**2) / d.floor_rms**2).argmax())
+    joint, machine = d.baseline.joints[most], d.baseline.machine
+    gain = (
+        f"With {'it' if len(causes) == 1 else 'them'} {the(joint)}'s {machine.joint(joint).effort} "
+        f"error falls from {amount(machine, joint, before[most])}, "
+        f"{before[most] / d.floor_rms[most]:.2f} times the noise floor, to "
+        f"{amount(machine, joint, after[most])}, {_remains(d, most)}."
+    )
+    rest = [one for one in d.selected.findings if one.level != "cause"]
+    also = "".join(f" Also missing: {_thing(one)} ({one.probability:.2f})." for one in rest)
+    return f"Missing from the simulation: {named}. {gain}{also}"
+
+
+def _remains(d: Diagnosis, most: int) -> str:
+    """Say how far the joint is from its floor, and where else something stays unexplained."""
+    ratio = d.after.errors.rms / d.floor_rms
+    left = [share is not None and share > EXPLAINED for share in d.unexplained]
+    here = f"{'still ' if left[most] else ''}{ratio[most]:.2f} times the floor"
+    others = [
+        f"; {the(joint)}'s is then {amount(d.baseline.machine, joint, d.after.errors.rms[j])}, "
+        f"{ratio[j]:.2f} times its floor"
+        for j, joint in enumerate(d.baseline.joints)
+        if left[j] and j != most
+    ]
+    return (here if ratio[most] > AT_FLOOR else "which is noise") + "".join(others)
+
+
+def _in_words(cause: dict[str, Any]) -> str:
+    """Return a cause, those tied with it, and how probable they are together."""
+    alike = [in_words(effect_told(one)) for one in (cause, *cause["indistinguishable_from"])]
+    likely = f"{cause['probability']:.2f}"
+    if len(alike) == 1:
+        return f"{alike[0]} (probability {likely})"
+    more = [f"{len(alike) - MENTIONED} more"] if len(alike) > MENTIONED else []
+    *most, last = [*alike[:MENTIONED], *more]
+    return f"{', '.join(most)} or {last}, which these data cannot tell apart (together {likely})"

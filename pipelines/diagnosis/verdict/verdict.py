@@ -1,0 +1,195 @@
+"""``verdict.json``: the diagnosis in the words of its contract."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import pandas as pd
+
+from pipelines.diagnosis.dependence import Dependence, dependences
+from pipelines.diagnosis.diagnosis import Diagnosis
+from pipelines.diagnosis.reversals import BuildUp
+from pipelines.diagnosis.selection.answer import Named
+from pipelines.diagnosis.verdict.caveats import caveats
+from pipelines.diagnosis.verdict.cause_evidence import cause_evidence
+from pipelines.diagnosis.verdict.control_benefit import control
+from pipelines.diagnosis.verdict.error_budget import error_budget
+from pipelines.diagnosis.verdict.summary import finding_in_words, floor_from, summary
+from pipelines.diagnosis.verdict.ties import tie_between
+from pipelines.diagnosis.verdict.unexplained import unexplained
+from pipelines.effects import Effect
+from pipelines.estimation.angle_noise import CUTOFF_HZ
+from pipelines.estimation.regression import mask_in_words
+
+
+def verdict(d: Diagnosis) -> dict[str, Any]:
+    """Return the verdict as JSON objects, keys as in docs/contracts.md."""
+    first, joints = d.validate[0], d.baseline.machine.joints
+    causes = [_cause(d, named) for named in d.named]
+    before = dependences(d.validate, d.before.residuals)
+    after = dependences(d.validate, d.after.residuals) if d.causes else before
+    left = unexplained(d, after) if d.leaves_something else None
+    low_pass = f"; torque and model behind a low-pass of {CUTOFF_HZ:g} Hz"
+    return {
+        "contract": "verdict/1",
+        "status": d.status,
+        "summary": summary(d, causes, left),
+        "finding": None if d.data.spoilt else finding_in_words(d, causes, left),
+        "findings": [one.as_json() for one in d.selected.findings],
+        "router": {
+            joint.name: shares.as_json()
+            for joint, shares in zip(joints, d.selected.router, strict=True)
+        },
+        "posterior": _posterior(d),
+        "acquisition_at_fault": bool(d.data.spoilt),
+        "caveats": caveats(d),
+        "scoring": {
+            "bandwidth_hz": first.bandwidth_hz,
+            "mask": mask_in_words(d.baseline.machine) + low_pass * d.data.noisy_angles,
+            "samples": int(d.after.errors.counts.sum()),
+        },
+        **_numbers(d),
+        "control": control(d),
+        "error_budget": error_budget(d),
+        "depends_on": _depends_on(before, after),
+        "reversals": [_reversal(d, one) for one in d.reversals],
+        "units": {j.name: {"torque": j.unit("torque"), "angle": j.unit("angle")} for j in joints},
+        "known": [_known(d, effect) for effect in d.baseline.known],
+        "causes": causes,
+        "data_faults": [
+            {"file": f.file, "channel": f.channel, "what": f.what} for f in d.data.faults
+        ],
+        "residual": left.as_json() if left else None,
+        "runs": sorted({run.motion.run for run in d.validate}),
+        "noise_floor_from": floor_from(d),
+    }
+
+
+def _numbers(d: Diagnosis) -> dict[str, Any]:
+    """Return the verdict's numbers by joint."""
+    joints = d.baseline.joints
+
+    def by_joint(values: Any) -> dict[str, float | None]:
+        if values is None:
+            return dict.fromkeys(joints)
+        pairs = zip(joints, values, strict=True)
+        return {joint: None if v is None else float(v) for joint, v in pairs}
+
+    before, after = d.before.errors, d.after.errors
+    return {
+        "torque_rms_nm": by_joint(d.torque_rms),
+        "noise_floor_nm": by_joint(d.floor_rms),
+        "baseline_rmse_nm": by_joint(before.rms),
+        "extended_rmse_nm": by_joint(after.rms),
+        "baseline_rmse_unmasked_nm": by_joint(before.unmasked),
+        "extended_rmse_unmasked_nm": by_joint(after.unmasked),
+        "baseline_simulation_rmse_rad": by_joint(d.simulation_error["baseline"]),
+        "extended_simulation_rmse_rad": by_joint(d.simulation_error["extended"]),
+        "unexplained": by_joint(d.unexplained),
+    }
+
+
+def _posterior(d: Diagnosis) -> dict[str, Any] | None:
+    """Return the probabilities of nothing missing, of something unlisted, and of each cause."""
+    weighed = d.selected.posterior
+    if weighed is None:
+        return None
+    listed = {e.label for e in weighed.elements if not e.is_law}
+    return {
+        "nothing_missing": d.selected.answer.nothing,
+        "unlisted": d.selected.answer.unlisted,
+        "causes": {label: p for label, p in weighed.marginals.items() if label in listed},
+        "laws": {label: p for label, p in weighed.marginals.items() if label not in listed},
+    }
+
+
+def _known(d: Diagnosis, effect: Effect) -> dict[str, Any]:
+    rows = _rows(d.parameters, effect)
+    return {"effect": effect.name, "joint": effect.joint, "parameters": _values(rows)}
+
+
+def _values(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": r["name"], "value": r["value"], "unit": r["unit"],
+            "ci95": [r["ci95_low"], r["ci95_high"]],
+        }
+        for r in rows
+    ]  # fmt: skip
+
+
+def _depends_on(
+    before: Sequence[Dependence], after: Sequence[Dependence]
+) -> dict[str, list[dict[str, Any]]]:
+    """Return what each joint's residual depends on, under the baseline and the extended model."""
+    left = {(one.joint, one.variable): one.share for one in after}
+    return {
+        joint: [
+            {
+                "variable": one.variable, "share_before": one.share,
+                "share_after": left[joint, one.variable],
+            }
+            for one in before if one.joint == joint
+        ]
+        for joint in dict.fromkeys(one.joint for one in before)
+    }  # fmt: skip
+
+
+def _cause(d: Diagnosis, named: Named) -> dict[str, Any]:
+    label = named.element.label
+    effect, gained = d.effects[label], d.gains[label]
+    floor, without = d.floor_rms[gained.joint], d.without[label].errors.rms[gained.joint]
+    power = without**2 - floor**2
+    removed = without**2 - d.after.errors.rms[gained.joint] ** 2
+    return {
+        "effect": effect.name,
+        "joint": effect.joint,
+        "side": str(effect.side),
+        "probability": named.probability,
+        "parameters": _values(_rows(d.parameters, effect)),
+        "gain": {
+            "rmse_reduction_nm": gained.value,
+            "ci95": [gained.low, gained.high],
+            "systematic_error_removed": _clipped(removed / power) if power > 0 else None,
+            "joint": d.baseline.joints[gained.joint],
+        },
+        "indistinguishable_from": [_tie(effect, d.effect_of(tie), p) for tie, p in named.ties],
+        "evidence": cause_evidence(d, named),
+        "fitted_on_validate": [p.name for p in effect.parameters if p.per_run],
+        "each_run": d.each_run.get(label, []),
+    }
+
+
+def _clipped(share: float) -> float:
+    return float(min(max(share, 0.0), 1.0))
+
+
+def _rows(frame: pd.DataFrame, effect: Effect) -> list[dict[str, Any]]:
+    here = frame["joint"].isna() if effect.joint is None else frame["joint"] == effect.joint
+    numbers = ("value", "ci95_low", "ci95_high")
+    return [
+        {str(k): float(v) if k in numbers else v for k, v in row.items()}
+        for row in frame[(frame["effect"] == effect.name) & here].to_dict("records")
+    ]
+
+
+def _tie(effect: Effect, rival: Effect, probability: float) -> dict[str, Any]:
+    tie = tie_between(effect.name, rival.name, effect.confirm, rival.confirm)
+    return {
+        "effect": rival.name,
+        "joint": rival.joint,
+        "why": tie.why,
+        "how_to_separate": tie.how_to_separate,
+        "probability": probability,
+        "per_run": rival.each_run,
+    }
+
+
+def _reversal(d: Diagnosis, one: BuildUp) -> dict[str, Any]:
+    return {
+        "joint": one.joint,
+        "travel": one.travel,
+        "unit": d.baseline.machine.joint(one.joint).unit("angle"),
+        "at_once_rmse_nm": one.at_once,
+        "otherwise_rmse_nm": one.otherwise,
+        "over_travel_rmse_nm": one.over_travel,
+    }
