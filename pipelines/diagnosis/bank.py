@@ -72,7 +72,8 @@ def fill(
     where: list[slice] = []
     columns = [untouched]
     at = baseline.size
-    effects = list(proposals(baseline, [run.motion.run for run in runs]))
+    motions = [run.motion for run in runs]
+    effects = [e for e in proposals(baseline, [m.run for m in motions]) if e.shows_in(motions)]
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
         for candidate in worth_a_look(effect, scan):

@@ -33,6 +33,8 @@ class Candidate:
     effect: Effect
     shapes: tuple[tuple[float, ...], ...]
     """One for each run; they differ in parameters that each run has for itself."""
+    directions: tuple[tuple[float, ...], ...] = ()
+    """Shapes that have a column each, where the effect is in proportion to them; empty where it has one shape."""
 
     @property
     def label(self) -> str:
@@ -69,7 +71,7 @@ class Candidate:
     @property
     def signature_apart(self) -> list[bool]:
         """The same of the columns of ``signatures``."""
-        return [self.effect.per_run] if self.bends else self.apart
+        return [self.effect.per_run] * max(1, len(self.directions)) if self.bends else self.apart
 
     @property
     def own_bend(self) -> int | None:
@@ -168,6 +170,12 @@ def signatures(
     """
     if not candidate.bends:
         return [torque_columns(candidate, r, run) for r, run in enumerate(runs)]
+    if candidate.directions:
+        parts = [
+            signatures(Candidate(candidate.effect, (shape,) * len(runs)), runs, baseline, untouched, weights)
+            for shape in candidate.directions
+        ]
+        return [np.concatenate(columns, axis=2) for columns in zip(*parts, strict=True)]
     under = [
         columns_under([candidate.term(r)], run, baseline) if candidate.effect.explains(run.motion)
         else (untouched[r], run.measured)

@@ -16,7 +16,7 @@ the compiled hooks. ``columns`` and ``observed`` evaluate the same kernels, so t
 """
 
 from abc import ABC
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum, StrEnum
 from typing import Any, ClassVar
@@ -41,6 +41,58 @@ class Side(StrEnum):
     STRUCTURE = "structure"
     SENSOR = "sensor"
     HUMAN = "human"
+
+
+class Family(StrEnum):
+    """The kind of law that an effect follows, as a reader who does not know the catalogue names it."""
+
+    ANGLE = "angle"
+    SPEED = "speed"
+    REVERSAL = "reversal"
+    LOAD = "load"
+    TIME = "time"
+    TRANSMISSION = "transmission"
+    SENSOR = "sensor"
+    PERSON = "person"
+
+
+LAWS = (
+    "angle", "other_angle", "both_angles", "speed", "other_speed", "load", "other_load", "friction_by_angle",
+    "friction_by_other_angle", "inertia_by_angle", "gain_over_time", "friction_over_time", "time", "hum",
+)  # fmt: skip
+"""Names of the smooth laws that ``Effect.resembles`` may list.
+
+======================= ==========================================================================
+angle, other_angle      a torque that depends on the joint's own angle, or on the other joint's
+both_angles             a torque that depends on the sum of both angles, as gravity does
+speed, other_speed      a torque that depends on the joint's own speed, or on the other joint's
+load, other_load        a torque or a friction that depends on the transmitted torque
+friction_by_angle       friction whose size depends on the joint's own angle
+friction_by_other_angle friction whose size depends on the other joint's angle
+inertia_by_angle        an inertia that depends on the joint's own angle
+gain_over_time          a share of the whole torque that changes slowly with time
+friction_over_time      friction that changes slowly with time
+time                    a torque that wanders with time, in each run in its own way
+hum                     a line at a fixed frequency
+======================= ==========================================================================
+"""
+
+FAMILY_OF_SIDE = {
+    Side.DRIVE: Family.SPEED, Side.STRUCTURE: Family.ANGLE, Side.SENSOR: Family.SENSOR, Side.HUMAN: Family.PERSON,
+}  # fmt: skip
+"""The family of an effect that states none."""
+
+LAWS_OF_FAMILY: Mapping[Family, tuple[str, ...]] = {
+    Family.ANGLE: ("angle", "both_angles"),
+    Family.SPEED: ("speed",),
+    Family.REVERSAL: ("speed", "friction_by_angle"),
+    Family.LOAD: ("load", "speed"),
+    Family.TIME: ("time", "friction_over_time"),
+    Family.TRANSMISSION: ("angle", "speed", "load", "inertia_by_angle"),
+    Family.SENSOR: ("angle", "load"),
+    Family.PERSON: ("angle", "both_angles", "speed"),
+}
+"""What an effect that states none ``resembles``."""
 
 
 class Parity(IntEnum):
@@ -68,6 +120,8 @@ class Parameter:
     """Values that stand for the known members of a family of shapes; empty where the range is all there is."""
     grain: float = 1.0
     """Step of a search along what an effect oscillates with."""
+    swept: bool = False
+    """True where it is a place on the joint's way: a search spans what the motion sweeps, not ``typical``."""
     of_joint: bool = True
     """False where its unit is not the joint's: the phase of a rhythm is an angle at a prismatic joint too."""
 
@@ -110,6 +164,13 @@ class Effect(ABC):
     """What it leaves in a plot of the residual."""
     confirm: ClassVar[str]
     """How to make sure of it on the rig."""
+    family: ClassVar[Family]
+    """The kind of law it follows; one that states none has the family of its side (``FAMILY_OF_SIDE``)."""
+    resembles: ClassVar[tuple[str, ...]]
+    """Smooth laws of its joint (``LAWS``) that contain it approximately: what the real effect does beyond our equation
+    looks like one of them. One that states none has those of its family (``LAWS_OF_FAMILY``)."""
+    forms_differ: ClassVar[str] = ""
+    """How the real effect may differ from the equation, a sentence without its full stop; empty where nobody said."""
     joints: ClassVar[tuple[str, ...] | None] = None
     """The only joints that can have it, by their place in the mechanism; None for any."""
     absorbed: ClassVar[Mapping[str, str]] = {}
@@ -155,6 +216,17 @@ class Effect(ABC):
     spring: ClassVar[Callable[..., Any] | None] = None
     reading: ClassVar[Callable[..., Any] | None] = None
     torque_reading: ClassVar[Callable[..., Any] | None] = None
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Complete what the class leaves unsaid of its family."""
+        super().__init_subclass__(**options)
+        side = getattr(cls, "side", None)
+        if side is None:
+            return
+        if not hasattr(cls, "family"):
+            cls.family = FAMILY_OF_SIDE[side]
+        if not hasattr(cls, "resembles"):
+            cls.resembles = LAWS_OF_FAMILY[cls.family]
 
     def __post_init__(self) -> None:
         """Say in the machine's own units and equations what the class says of a leg, and what each run has."""
@@ -233,6 +305,18 @@ class Effect(ABC):
     def explains(self, motion: Motion) -> bool:
         """Tell whether the effect is there in this run."""
         return self.acts(motion.run)
+
+    def shows_in(self, motions: Sequence[Motion]) -> bool:
+        """Tell whether runs hold what the effect depends on, so that it can be asked for in them."""
+        return any(self.explains(motion) for motion in motions)
+
+    def directions(self, motions: Sequence[Motion]) -> tuple[tuple[tuple[float, ...], ...], ...]:
+        """Return shapes in proportion to which the effect transforms the measurement; empty where it is not linear.
+
+        Each set of shapes (s,) is a candidate that has one column for each of them: the effect of any combination is
+        that combination of the columns, so that no grid of shapes needs to be searched.
+        """
+        return ()
 
     def acts(self, kind: str) -> bool:
         """Tell whether the effect is there in a kind of run."""
