@@ -92,6 +92,7 @@ def _coarse(run: Run) -> Motion:
         m, time=run.time, q=q, dq=dq, ddq=ddq, torque=run.measured[:, :J], segment=m.segment[run.starts],
         valid=run.valid, load=None if m.load is None else run.average(m.load),
         limb_load=None if m.limb_load is None else run.average(m.limb_load), forces=None,
+        temperature=None if m.temperature is None else run.block.mean(m.motor_temperature, run.starts),
         sample_rate_hz=m.sample_rate_hz / run.block.decimation,
     )  # fmt: skip
 

@@ -9,7 +9,9 @@ from pipelines.effects.effect import LAWS, RUNS, Effect, Family, Parameter, Pari
 from pipelines.effects.encoder_offset import EncoderOffset
 from pipelines.effects.end_stop import EndStop
 from pipelines.effects.friction import Friction
+from pipelines.effects.friction_temperature import FrictionTemperature
 from pipelines.effects.friction_warmup import FrictionWarmup
+from pipelines.effects.gain_drift import GainDrift
 from pipelines.effects.joint_elasticity import JointElasticity
 from pipelines.effects.load_dependent_friction import LoadDependentFriction
 from pipelines.effects.mass_off_axis import MassOffAxis
@@ -44,6 +46,7 @@ EFFECTS: tuple[type[Effect], ...] = (
     PositionDependentFriction,
     PreslidingHysteresis,
     FrictionWarmup,
+    FrictionTemperature,
     Cogging,
     RotorInertia,
     RotorCoupling,
@@ -57,6 +60,7 @@ EFFECTS: tuple[type[Effect], ...] = (
     TorqueGain,
     TorqueOffset,
     TorqueDrift,
+    GainDrift,
     TorqueCrossTalk,
     EncoderOffset,
     TimeDelay,

@@ -34,6 +34,10 @@ DIFFERENCE = 1e-6
 """Relative step of numerical derivatives."""
 
 
+LEAST_WARMING_C = 1.0
+"""Change of a motor's temperature without which nothing that depends on it can be seen."""
+
+
 class Side(StrEnum):
     """Where an effect acts."""
 
@@ -175,6 +179,8 @@ class Effect(ABC):
     """The only joints that can have it, by their place in the mechanism; None for any."""
     absorbed: ClassVar[Mapping[str, str]] = {}
     """Places of joints at which another parameter takes it up whole, and which."""
+    needs_temperature: ClassVar[bool] = False
+    """True where it is known only in runs in which its motor's temperature was read."""
     by_angle: ClassVar[bool] = False
     """True where it shows only in a torque that depends on where its joint stands, as gravity's does; at the whole
     machine, on where the first one does."""
@@ -303,12 +309,21 @@ class Effect(ABC):
         return self.side is Side.HUMAN or self.run == "with_human"
 
     def explains(self, motion: Motion) -> bool:
-        """Tell whether the effect is there in this run."""
-        return self.acts(motion.run)
+        """Tell whether the effect is there in this run, and what it depends on was read."""
+        known = not self.needs_temperature or bool(np.isfinite(motion.motor_temperature[:, self.column(motion)]).all())
+        return known and self.acts(motion.run)
 
     def shows_in(self, motions: Sequence[Motion]) -> bool:
         """Tell whether runs hold what the effect depends on, so that it can be asked for in them."""
+        if self.needs_temperature and not self.temperature_varies([m for m in motions if self.acts(m.run)]):
+            return False
         return any(self.explains(motion) for motion in motions)
+
+    def temperature_varies(self, motions: Sequence[Motion]) -> bool:
+        """Tell whether every run has its motor's temperature, and not the same one throughout all of them."""
+        read = [motion.motor_temperature[:, self.column(motion)] for motion in motions]
+        ends = np.array([(np.min(t), np.max(t)) for t in read if len(t)])
+        return len(ends) > 0 and bool(np.ptp(ends) >= LEAST_WARMING_C)  # NaN is not
 
     def directions(self, motions: Sequence[Motion]) -> tuple[tuple[tuple[float, ...], ...], ...]:
         """Return shapes in proportion to which the effect transforms the measurement; empty where it is not linear.
@@ -366,7 +381,9 @@ class Effect(ABC):
         return columns
 
     def _react(self, motion: Motion, values: NDArray, out: NDArray) -> None:
-        of_motion = (motion.time, motion.q, motion.dq, motion.ddq, motion.transmitted[0])
+        of_motion = (
+            motion.time, motion.q, motion.dq, motion.ddq, motion.transmitted[0], motion.motor_temperature,
+        )  # fmt: skip
         arrays = [np.ascontiguousarray(array) for array in of_motion]
         joint, geometry, joints = self.column(motion), motion.geometry.array(), len(motion.joints)
         if self.derivative is None:
@@ -395,9 +412,10 @@ class Effect(ABC):
     def _read(self, torque: NDArray, motion: Motion, values: NDArray) -> NDArray:
         out = np.empty_like(torque)
         joint = self.column(motion)
+        time, temperature = (np.ascontiguousarray(x) for x in (motion.time, motion.motor_temperature))
         for stretch in motion.segments():
             read_along(
-                self.torque_reading, values, joint, np.ascontiguousarray(motion.time[stretch]), torque[stretch],
+                self.torque_reading, values, joint, time[stretch], temperature[stretch], torque[stretch],
                 np.zeros(len(motion.joints)), np.zeros(self.reading_states), out[stretch],
             )  # fmt: skip
         return out

@@ -25,7 +25,7 @@ class TimeDelay(Effect):
     reading_states = 1 + 2 * SLOTS
 
     @torque_reading
-    def torque_reading(t, torque, values, joint, state):
+    def torque_reading(t, torque, values, joint, state, temperature):
         """Return the torque of then, in a straight line between samples; the first one's until there is one."""
         newest = int(state[0])
         state[0] += 1.0

@@ -37,7 +37,7 @@ class TorqueCrossTalk(Effect):
         return (((0.05,),),)
 
     @torque_reading
-    def torque_reading(t, torque, values, joint, state):
+    def torque_reading(t, torque, values, joint, state, temperature):
         """Add a share of the other joint's torque."""
         torque[joint] += values[0] * torque[1 - joint]
 

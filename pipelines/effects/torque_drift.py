@@ -33,6 +33,6 @@ class TorqueDrift(Effect):
             object.__setattr__(self, "shape", (replace(level, per_run=False, forms=(0.0,)),))
 
     @torque_reading
-    def torque_reading(t, torque, values, joint, state):
+    def torque_reading(t, torque, values, joint, state, temperature):
         """Shift the torque by what has gathered."""
         torque[joint] += values[0] * t + values[1]

@@ -20,7 +20,7 @@ class TorqueGain(Effect):
     shape = (Parameter("gain", "1", "measured per true torque", "g", (0.7, 1.4)),)
 
     @torque_reading
-    def torque_reading(t, torque, values, joint, state):
+    def torque_reading(t, torque, values, joint, state, temperature):
         """Multiply the torque."""
         torque[joint] *= values[0]
 

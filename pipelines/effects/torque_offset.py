@@ -22,6 +22,6 @@ class TorqueOffset(Effect):
     parity = Parity.EVEN
 
     @torque_reading
-    def torque_reading(t, torque, values, joint, state):
+    def torque_reading(t, torque, values, joint, state, temperature):
         """Shift the torque."""
         torque[joint] += values[0]

@@ -21,6 +21,8 @@ class Unit(NamedTuple):
 
 UNITS = {
     "N·m": Unit("N", 1, 0, 0),
+    "N·m/°C": Unit("N/°C", 1, 0, 0),
+    "N·m·s/(rad·°C)": Unit("N·s/(m·°C)", 1, 0, -1),
     "N·m/s": Unit("N/s", 1, 0, 0),
     "N·m·s/rad": Unit("N·s/m", 1, 0, -1),
     "N·m·s²/rad²": Unit("N·s²/m²", 1, 0, -2),
