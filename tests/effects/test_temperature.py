@@ -13,6 +13,8 @@ from pipelines.effects.friction import Friction
 from pipelines.effects.friction_temperature import FrictionTemperature
 from pipelines.effects.gain_drift import GainDrift
 from pipelines.effects.rigid_body import RigidBody
+from pipelines.errors import InputError
+from pipelines.identification import Extension, identify
 from pipelines.model import Model, Term
 from tests.diagnosis.sessions import session
 
@@ -122,3 +124,15 @@ def test_a_gain_that_follows_the_temperature_is_recovered_across_runs(warm_and_c
     )
     chosen = library.gram.select(library.columns_of([number]))
     assert_allclose(0.002 * solve(chosen, library.weights)[-1], 0.004, atol=0.001)
+
+
+def test_an_identification_with_temperature_refuses_runs_without(warm_and_cold):
+    known = Extension((Term(FrictionTemperature("knee"), np.zeros(2)),))
+    identify(warm_and_cold, extension=known)
+    unread = [replace(m, temperature=None) for m in warm_and_cold]
+    with pytest.raises(InputError) as caught:
+        identify(unread, extension=known)
+    assert str(caught.value) == (
+        "run_0.parquet: holds no knee_temperature_c, on which friction_temperature@knee depends; "
+        "record the temperature, or leave the effect out"
+    )
