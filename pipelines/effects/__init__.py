@@ -6,6 +6,7 @@ from pipelines.effects.cogging import Cogging
 from pipelines.effects.coulomb_asymmetry import CoulombAsymmetry
 from pipelines.effects.cuff_compliance import CuffCompliance
 from pipelines.effects.effect import LAWS, RUNS, Effect, Family, Parameter, Parity, Side
+from pipelines.effects.encoder_eccentricity import EncoderEccentricity
 from pipelines.effects.encoder_offset import EncoderOffset
 from pipelines.effects.end_stop import EndStop
 from pipelines.effects.friction import Friction
@@ -63,6 +64,7 @@ EFFECTS: tuple[type[Effect], ...] = (
     GainDrift,
     TorqueCrossTalk,
     EncoderOffset,
+    EncoderEccentricity,
     TimeDelay,
     PassiveJointTorque,
     VoluntaryTorque,

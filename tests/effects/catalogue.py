@@ -33,6 +33,7 @@ SIZES = {
     "gain_drift": (0.01, 0.0, 0.0),
     "torque_cross_talk": (0.1,),
     "encoder_offset": (0.06,),
+    "encoder_eccentricity": (0.04, 0.6, 0.01, -1.2),
     "time_delay": (0.0175,),
     "passive_joint_torque": (15.0, -0.9, -0.25),
     "voluntary_torque": (3.0, 0.73, 0.4, 0.8),
