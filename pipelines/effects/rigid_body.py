@@ -1,6 +1,6 @@
 """The rigid links of the machine, with all that moves along with them."""
 
-from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.mechanics.mechanism import Mechanism
 from pipelines.mechanics.mechanisms.leg import LEG
 
@@ -19,6 +19,9 @@ class RigidBody(Effect):
     name = "rigid_body"
     title = "Rigid body"
     side = Side.STRUCTURE
+    family = Family.ANGLE
+    resembles = ("inertia_by_angle", "angle", "other_angle", "both_angles")
+    forms_differ = "real links bend a little, and cables and hoses pull at them"
     equation = _equation(LEG)
     source = "Lagrange's equations of a planar double pendulum, docs/errata.md"
     looks_like = "what every fit starts with: torque in step with acceleration and with gravity"
