@@ -57,7 +57,14 @@ def _page(effect: type) -> None:
     console.say("")
     headings = ("parameter", "symbol", "unit", "meaning", "on exoskeletons")
     console.table(headings, [(p.name, p.symbol, p.unit, p.meaning, typical_range(p)) for p in effect().parameters])
-    for title, key in (("Runs", "runs"), ("Looks like", "looks_like"), ("To confirm", "confirm"), ("Source", "source")):
+    parts = (
+        ("Runs", "runs"),
+        ("Looks like", "looks_like"),
+        ("How the real one may differ", "forms_differ"),
+        ("To confirm", "confirm"),
+        ("Source", "source"),
+    )
+    for title, key in ((title, key) for title, key in parts if told[key]):
         text = told[key] if isinstance(told[key], str) else ", ".join(told[key])
         console.say(f"\n{title}")
         console.note(text)

@@ -73,8 +73,9 @@ def fill(
     places: list[TermColumns] = []
     columns = [untouched]
     at = baseline.size
-    kinds = [run.motion.run for run in runs]
-    effects = list(proposals(baseline, kinds))
+    motions = [run.motion for run in runs]
+    kinds = [motion.run for motion in motions]
+    effects = [e for e in proposals(baseline, kinds) if e.shows_in(motions)]
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
         for candidate in worth_a_look(effect, scan):

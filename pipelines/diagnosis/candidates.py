@@ -33,6 +33,8 @@ class Candidate:
     effect: Effect
     shapes: tuple[tuple[float, ...], ...]
     """One for each run; they differ in parameters that each run has for itself."""
+    directions: tuple[tuple[float, ...], ...] = ()
+    """Shapes that have a column each, where the effect is in proportion to them; empty where it has one shape."""
 
     @property
     def label(self) -> str:
@@ -63,8 +65,15 @@ class Candidate:
 
     def columns_in(self, kinds: Sequence[str], start: int = 0) -> TermColumns:
         """Return the places of the columns that ``signatures`` gives for runs of some kinds."""
-        per_run = [self.effect.per_run] if self.bends else None
+        width = max(1, len(self.directions))
+        per_run = [self.effect.per_run] * width if self.bends else None
         return TermColumns.of(self.effect, kinds, per_run, start)
+
+    def is_free(self, i: int) -> bool:
+        """Tell whether shape parameter ``i`` is fitted, and not held at its usual value or at one of its forms."""
+        parameter = self.effect.shape[i]
+        spanned = any(shape[i] != 0.0 for shape in self.directions)
+        return not parameter.forms and (parameter.default is None or spanned)
 
     @property
     def own_bend(self) -> int | None:
@@ -152,6 +161,12 @@ def signatures(
     """
     if not candidate.bends:
         return [torque_columns(candidate, r, run) for r, run in enumerate(runs)]
+    if candidate.directions:
+        parts = [
+            signatures(Candidate(candidate.effect, (shape,) * len(runs)), runs, baseline, untouched, weights)
+            for shape in candidate.directions
+        ]
+        return [np.concatenate(columns, axis=2) for columns in zip(*parts, strict=True)]
     under = [
         columns_under([candidate.term(r)], run, baseline) if candidate.effect.explains(run.motion)
         else (untouched[r], run.measured)

@@ -37,7 +37,7 @@ from pipelines.diagnosis.gram import solve
 from pipelines.diagnosis.imperfection import imperfection
 from pipelines.diagnosis.known import known_effects
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, observe, with_load
-from pipelines.diagnosis.scan import BENDING, values_of
+from pipelines.diagnosis.scan import BENDING, values_in, values_of
 from pipelines.diagnosis.search import SHAPE_COST
 from pipelines.diagnosis.session import refuse_unfit
 from pipelines.diagnosis.thinned import thinned
@@ -228,7 +228,10 @@ def detectability(
     """
     sight = Sight.of(runs, baseline, floor)
     # What the wearer may carry instead of the machine goes by the same name; the machine's is reported.
-    effects = [e for e in proposals(baseline, baseline.kinds) if e.run is None and not e.each_run]
+    motions = [run.motion for run in runs]
+    effects = [
+        e for e in proposals(baseline, baseline.kinds) if e.run is None and not e.each_run and e.shows_in(motions)
+    ]
     looks: dict[Effect, list[Look]] = {}
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
@@ -289,11 +292,14 @@ def _looks(effect: Effect, sight: Sight, power: float) -> Iterator[Look]:
 def _shapes(effect: Effect, runs: Sequence[Run]) -> Iterator[Candidate]:
     """Yield the effect with shapes that span its family."""
     probe = Candidate(effect, ())
+    if chosen := effect.directions([run.motion for run in runs]):
+        yield from (Candidate(effect, (shape,) * len(runs)) for shape in chosen[0])
+        return
     if probe.bends:
         weak = values_of(effect.shape[0], BENDING)[-1]
         yield Candidate(effect, ((float(weak),),) * len(runs))
         return
-    grids = [ONSETS if p.per_run else _spread(values_of(p, SHAPES)) for p in effect.shape]
+    grids = [ONSETS if p.per_run else _spread(values_in(effect, p, SHAPES, runs)) for p in effect.shape]
     for shape in itertools.product(*grids):
         yield Candidate(effect, tuple(_in_run(effect, shape, run) for run in runs))
 
@@ -365,18 +371,18 @@ def _direction(effect: Effect, columns: Sequence[NDArray], sight: Sight) -> list
 
 def _bent(candidate: Candidate, sight: Sight, power: float) -> Look:
     """Size an effect that bends the motion or a reading: step until it is just seen."""
-    effect, parameter = candidate.effect, candidate.effect.shape[0]
-    start = candidate.shapes[0][0]
-    zero = parameter.neutral
+    effect, start = candidate.effect, np.array(candidate.shapes[0])
+    zero = np.array([v if p.forms else p.neutral for v, p in zip(start, effect.shape, strict=False)])
+    reach = float(np.linalg.norm(start - zero))
 
     def at(x: float) -> tuple[float, str, NDArray, list[NDArray], float]:
-        value = zero + np.sign(start - zero) * np.exp(x)
-        column = _bend(replace(candidate, shapes=((value,),) * len(sight.runs)), sight)
+        shape = zero + (start - zero) / reach * np.exp(x)
+        column = _bend(replace(candidate, shapes=(tuple(shape),) * len(sight.runs)), sight)
         left = sight.left(column)[:, 0]
         growth, by = _growth(effect, left, sight.rows(column)[:, 0], 1, sight, power)
-        return growth, by, left, column, float(value)
+        return growth, by, left, column, float(effect.physical(effect.completed(shape))[0])
 
-    x0 = float(np.log(abs(start - zero)))
+    x0 = float(np.log(reach))
     x1 = x0 - np.log(1.5)
     before, now = at(x0), at(x1)
     for _ in range(STEPS):

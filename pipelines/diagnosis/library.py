@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.bank import weights_under
 from pipelines.diagnosis.candidates import (
     Candidate,
-    bent_column,
     columns_under,
     gram_of_runs,
     proposals,
-    torque_columns,
+    signatures,
 )
 from pipelines.diagnosis.evidence.block_rate import at_block_rate, needs_full_rate
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
@@ -123,7 +122,9 @@ def build_library(prepared: Prepared, report: Report = silent) -> Library:
     columns = _Columns(prepared, regression)
     fast = Alone(columns.at_block_rate, regression.project, regression.measured)
     exact = Alone(columns, regression.project, regression.measured)
-    effects = list(proposals(prepared.baseline, [run.motion.run for run in prepared.runs]))
+    motions = [run.motion for run in prepared.runs]
+    listed = proposals(prepared.baseline, [motion.run for motion in motions])
+    effects = [effect for effect in listed if effect.shows_in(motions)]
     causes: list[Cause] = []
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
@@ -229,29 +230,10 @@ class _Columns:
 
     def _rows(self, candidate: Candidate, full: bool) -> NDArray | None:
         runs, plain = self._runs[full], self._plain[full]
-        if candidate.bends:
-            parts = self._bent(candidate, runs, plain)
-        else:
-            parts = [torque_columns(candidate, r, run) for r, run in enumerate(runs)]
+        prepared = self._prepared
+        parts = signatures(candidate, runs, prepared.baseline, plain, prepared.weights)
         own = candidate.columns_in([run.motion.run for run in runs])
         wide = [own.expand(part, r) for r, part in enumerate(parts)]
         if not all(np.isfinite(part).all() for part in wide):
             return None
         return self._regression.rows(wide)
-
-    def _bent(
-        self, candidate: Candidate, runs: Sequence[Run], plain: Sequence[NDArray]
-    ) -> list[NDArray]:
-        """Return what bending the baseline adds to it under the values that it then has."""
-        baseline, weights = self._prepared.baseline, self._prepared.weights
-        under = [
-            columns_under([candidate.term(r)], run, baseline)
-            if candidate.effect.explains(run.motion)
-            else (plain[r], run.measured)
-            for r, run in enumerate(runs)
-        ]
-        values = solve(gram_of_runs(runs, *zip(*under, strict=True)), weights)
-        return [
-            bent_column(columns, measured, values, own, run)
-            for (columns, measured), own, run in zip(under, plain, runs, strict=True)
-        ]

@@ -91,6 +91,7 @@ def _coarse(run: Run) -> Motion:
         m, time=run.time, q=q, dq=dq, ddq=ddq, torque=run.measured[:, :J], segment=m.segment[run.starts],
         valid=run.valid, load=None if m.load is None else run.average(m.load),
         limb_load=None if m.limb_load is None else run.average(m.limb_load), forces=None,
+        temperature=None if m.temperature is None else run.block.mean(m.motor_temperature, run.starts),
         sample_rate_hz=m.sample_rate_hz / run.block.decimation,
     )  # fmt: skip
 
@@ -98,6 +99,8 @@ def _coarse(run: Run) -> Motion:
 def worth_a_look(effect: Effect, scan: Scan) -> list[Candidate]:
     """Return the few shapes of an effect that promise most."""
     bends = bends_motion(effect)
+    if chosen := effect.directions([run.motion for run in scan.runs]):
+        return [_along(effect, directions, len(scan.runs)) for directions in chosen]
     shapes = list(_grid(effect, bends, scan.runs))
     runs = len(scan.runs)
     if bends or len(shapes) == 1:
@@ -110,13 +113,27 @@ def worth_a_look(effect: Effect, scan: Scan) -> list[Candidate]:
     return made
 
 
+def _along(effect: Effect, directions: Sequence[tuple[float, ...]], runs: int) -> Candidate:
+    """Return a candidate with a column for each direction; a refinement starts from all of them together."""
+    start = np.where([bool(p.forms) for p in effect.shape], directions[0], np.sum(directions, axis=0))
+    return Candidate(effect, (tuple(start.tolist()),) * runs, tuple(directions))
+
+
 def _grid(effect: Effect, bends: bool, runs: Sequence[Run]) -> Iterator[tuple[float, ...]]:
     """Yield the shapes to try; where each is dear, forms that only bend a spring are left to the refinement."""
     few = FEW if not bends else SPRINGS if effect.swings else BENDING
     yield from itertools.product(*(
-        (tried := values_of(p, few))[tried >= lowest(effect, p, runs)]
+        (tried := values_in(effect, p, few, runs))[tried >= lowest(effect, p, runs)]
         if not (effect.swings and p.unit in HARDENING) else (p.default,) for p in effect.shape
     ))  # fmt: skip
+
+
+def values_in(effect: Effect, parameter: Parameter, count: int, runs: Sequence[Run]) -> NDArray:
+    """Return the values of a shape parameter of an effect that are tried on some runs, (count,) or fewer."""
+    if not parameter.swept or effect.joint is None:
+        return values_of(parameter, count)
+    angles = np.concatenate([run.state[0][:, run.motion.joint_index(effect.joint)] for run in runs])
+    return np.linspace(np.min(angles), np.max(angles), count + 2)[1:-1]
 
 
 def values_of(parameter: Parameter, count: int) -> NDArray:

@@ -35,7 +35,9 @@ def screened(
     effect: Effect, fit: Fit, runs: Sequence[Run], regression: DecisionRegression
 ) -> list[Fitted]:
     """Return the fits of an effect's grid, those that explain most first."""
-    if any(p.per_run for p in effect.shape) and not bends_motion(effect):
+    if chosen := effect.directions([run.motion for run in runs]):
+        starts = [_along(effect, directions, len(runs)) for directions in chosen]
+    elif any(p.per_run for p in effect.shape) and not bends_motion(effect):
         starts = [_with_onsets(effect, fit, runs)]
     else:
         starts = [
@@ -43,6 +45,11 @@ def screened(
         ]
     fits = [fitted for start in starts if (fitted := fit(start)) is not None]
     return sorted(fits, key=lambda fitted: -fitted.gain)
+
+
+def _along(effect: Effect, directions: Sequence[tuple[float, ...]], runs: int) -> Candidate:
+    """Return a candidate with a column for each direction that its effect is in proportion to."""
+    return Candidate(effect, (directions[0],) * runs, tuple(directions))
 
 
 def others_of(fits: Sequence[Fitted], best: Fitted, most: int) -> list[Fitted]:

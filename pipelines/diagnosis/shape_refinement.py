@@ -5,7 +5,7 @@ little without computing any column anew.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,6 +77,9 @@ class Alone:
 
     def refined(self, start: Fitted) -> tuple[Fitted, NDArray]:
         """Return the candidate at its best shape, and its derivative columns there, (N, d)."""
+        if start.candidate.directions:
+            # Linear in its shapes: the amplitudes are the shape.
+            return _shaped(start), np.zeros((len(self._measured), 0))
         best, units = start, free_shapes(start.candidate)
         slopes = self._slopes(best, units)
         for _ in range(STEPS if units else 0):
@@ -130,6 +133,16 @@ class Alone:
         return solution / size, 0.5 * float(right @ solution)
 
 
+def _shaped(fitted: Fitted) -> Fitted:
+    """Return a candidate that is linear in its shapes at the shape which its amplitudes make."""
+    candidate = fitted.candidate
+    directions = np.array(candidate.directions)
+    held = np.array([bool(parameter.forms) for parameter in candidate.effect.shape])
+    shape = np.where(held, directions[0], fitted.amplitudes[: len(directions)] @ directions)
+    shapes = (tuple(shape.tolist()),) * len(candidate.shapes)
+    return replace(fitted, candidate=replace(candidate, shapes=shapes))
+
+
 def free_shapes(candidate: Candidate) -> list[tuple[int, float]]:
     """Return the shapes that are refined along their slopes, and the unit of change of each.
 
@@ -139,7 +152,7 @@ def free_shapes(candidate: Candidate) -> list[tuple[int, float]]:
     return [
         (i, _unit_of(parameter))
         for i, parameter in enumerate(candidate.effect.shape)
-        if parameter.default is None and not parameter.forms and i != candidate.onset
+        if candidate.is_free(i) and i != candidate.onset
     ]
 
 

@@ -16,8 +16,8 @@ from pipelines.diagnosis.observations import Run
 
 FAMILIES = {
     "angle": "angle", "other_angle": "angle", "both_angles": "angle",
+    "friction_by_angle": "angle", "friction_by_other_angle": "angle",
     "speed": "speed", "other_speed": "speed",
-    "friction_by_angle": "speed", "friction_by_other_angle": "speed",
     "load": "load", "other_load": "load",
     "inertia_by_angle": "transmission",
     "gain_over_time": "time", "friction_over_time": "time", "time": "time", "hum": "time",

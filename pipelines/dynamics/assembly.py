@@ -12,6 +12,7 @@ from pipelines.effects.kernel import address, derivative, reaction, reading, spr
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.instant import REFERENCE_C
 from pipelines.model import Model, Term
 
 MOTOR_SHARE = 0.04
@@ -39,7 +40,7 @@ def _no_reading(angle, values, joint):
 
 
 @torque_reading
-def _no_torque_reading(t, torque, values, joint, state):
+def _no_torque_reading(t, torque, values, joint, state, temperature):
     pass
 
 
@@ -72,6 +73,8 @@ class Assembly(NamedTuple):
     """True where the springs are cuffs: links are then the limb's, and the machine's own bodies are on the
     motors' side."""
     geometry: np.ndarray
+    temperature: np.ndarray
+    """(J,) °C of the motors; who simulates a machine that warms sets it before each sample."""
 
 
 def _addresses(kernels: Sequence, blank) -> NDArray:
@@ -121,6 +124,7 @@ def assemble(model: Model, geometry: Geometry, joints: Sequence[str] = ("hip", "
         motor_inertia=inertias,
         cuffed=cuffed(effects),
         geometry=geometry.array(),
+        temperature=np.full(len(joints), REFERENCE_C),
     )
 
 

@@ -15,6 +15,7 @@ from pipelines.dynamics.assembly import Assembly, assemble
 from pipelines.dynamics.forward import DQ, DTHETA
 from pipelines.dynamics.mobility import masses
 from pipelines.dynamics.pd_loop import Drives, follow, loop_at_rest, make_drives
+from pipelines.dynamics.replay import known_temperature
 from pipelines.errors import InputError
 from pipelines.mechanics.motion import Motion
 from pipelines.model import Model
@@ -38,13 +39,14 @@ def closed_loop(model: Model, motion: Motion) -> Motion:
     """
     reference = _set_points(motion)
     a = assemble(model.for_run(motion.run), motion.geometry, motion.joints)
-    drives = _drives(motion, a)
+    drives, temperature = _drives(motion, a), known_temperature(motion)
     q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
     for stretch in motion.segments():
         loop = loop_at_rest(a, motion.q[stretch.start])
         loop.state[[DQ, DTHETA]] = loop.speed[:] = motion.dq[stretch.start]
         loop.reference[:] = reference[stretch.start]
-        truth = follow(a, drives, loop, reference[stretch], motion.time[stretch.start])[3]
+        start, warmth = motion.time[stretch.start], temperature[stretch]
+        truth = follow(a, drives, loop, reference[stretch], start, warmth)[3]
         q[stretch], dq[stretch], ddq[stretch] = truth[:, 0], truth[:, 1], truth[:, 2]
     if not np.isfinite(ddq).all():
         raise InputError(

@@ -85,12 +85,12 @@ def _mass_and_rest(a, w, first, last, t, angle, speed, direction, load, memory, 
     The mass matrix is the torque at unit acceleration less that at none (Walker and Orin, 1982).
     """
     rest[:] = 0.0
-    _react(a, first, last, Instant(t, angle, speed, w.zero, direction, load), memory, rest)
+    _react(a, first, last, Instant(t, angle, speed, w.zero, direction, load, a.temperature), memory, rest)
     w.ddq[:] = 0.0
     for k in range(a.joints):
         w.ddq[k] = 1.0
         w.column[:] = 0.0
-        _react(a, first, last, Instant(t, angle, speed, w.ddq, direction, load), memory, w.column)
+        _react(a, first, last, Instant(t, angle, speed, w.ddq, direction, load, a.temperature), memory, w.column)
         w.ddq[k] = 0.0
         for row in range(a.joints):
             M[row, k] = w.column[row] - rest[row]
@@ -121,7 +121,7 @@ def _prepare(a, w, t, state, memory, load):
         w.link_direction[j] = np.sign(state[DQ, j])
     _mass_and_rest(a, w, link, after_inertial, t, state[Q], state[DQ], w.link_direction, load, memory, w.mass, w.rest)
     if drive > after_inertial:
-        at = Instant(t, state[Q], state[DQ], w.zero, w.link_direction, load)
+        at = Instant(t, state[Q], state[DQ], w.zero, w.link_direction, load, a.temperature)
         _react(a, after_inertial, drive, at, memory, w.rest)
     if a.bounds[3] > drive:
         _mass_and_rest(
@@ -196,7 +196,7 @@ def _eliminate(A, b):
 def _finish(a, w, t, state, memory, direction, load, drive, rates):
     """Write d(state)/dt for a direction of dry friction, after ``_prepare``."""
     w.friction[:] = 0.0
-    at = Instant(t, state[THETA], state[DTHETA], w.zero, direction, load)
+    at = Instant(t, state[THETA], state[DTHETA], w.zero, direction, load, a.temperature)
     _react(a, a.bounds[2], a.bounds[4], at, memory, w.friction)
     if a.cuffed:
         _accelerate_both(a, w, state, drive, rates)
@@ -245,8 +245,8 @@ def accelerations(a, w, t, state, memory, direction, load, drive, rates):
 def memory_rates(a, w, t, state, memory, direction, load, rates):
     """Write the rates of all memories into ``rates`` (m,)."""
     if rates.shape[0] > 0:
-        motor = Instant(t, state[THETA], state[DTHETA], w.zero, direction, load)
-        link = Instant(t, state[Q], state[DQ], w.zero, direction, load)
+        motor = Instant(t, state[THETA], state[DTHETA], w.zero, direction, load, a.temperature)
+        link = Instant(t, state[Q], state[DQ], w.zero, direction, load, a.temperature)
         for i in range(a.bounds[4]):
             first, last = a.state_at[i], a.state_at[i + 1]
             if last > first:
@@ -324,7 +324,7 @@ def begin_stages(a, w, s, t, state, memory, load):
     """Finish the first stage, whose ``s.rates[0]`` is known: rates of the memories, and ``load`` (J,) passed on."""
     memory_rates(a, w, t, state, memory, w.direction, load, s.memory_rates[0])
     load[:] = 0.0
-    at = Instant(t, state[Q], state[DQ], s.rates[0, DQ], w.direction, w.zero)
+    at = Instant(t, state[Q], state[DQ], s.rates[0, DQ], w.direction, w.zero, a.temperature)
     _react(a, a.bounds[0], a.bounds[2], at, memory, load)
 
 

@@ -111,7 +111,7 @@ def read_torque(a, t, torque, sensed):
     for i in range(a.bounds[4]):
         values = a.values[a.value_at[i] : a.value_at[i + 1]]
         state = sensed[a.sensed_at[i] : a.sensed_at[i + 1]]
-        torque_reading_at(a.torque_readings[i])(t, torque, values, a.joint[i], state)
+        torque_reading_at(a.torque_readings[i])(t, torque, values, a.joint[i], state, a.temperature)
 
 
 @njit(cache=True)
@@ -172,8 +172,11 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
 
 
 @njit(cache=True)
-def follow(a, d, loop, reference, start_s):
-    """Run the loop along set-points (n, J): measured angle, speed, torque (n, J) and truth (n, 4, J) of each sample."""
+def follow(a, d, loop, reference, start_s, temperature=None):
+    """Run the loop along set-points (n, J): measured angle, speed, torque (n, J) and truth (n, 4, J) of each sample.
+
+    ``temperature`` (n, J) is the motors', °C, where they warm.
+    """
     n, joints = reference.shape
     w, s = workspace(joints), stages(joints, loop.memory.shape[0])
     angle, speed, torque = np.empty((n, joints)), np.empty((n, joints)), np.empty((n, joints))
@@ -181,6 +184,8 @@ def follow(a, d, loop, reference, start_s):
     enabled = np.ones(joints, dtype=np.bool_)
     period = d.step_s * SUBSTEPS * d.periods
     for k in range(n):
+        if temperature is not None:
+            a.temperature[:] = temperature[k]
         t = start_s + k * period
         advance(a, d, w, s, loop, t, reference[k], enabled, angle[k], speed[k], torque[k], truth[k])
     return angle, speed, torque, truth

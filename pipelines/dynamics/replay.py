@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pipelines.dynamics.assembly import assemble
 from pipelines.dynamics.forward import DTHETA, HOT, THETA, memory_rates, memory_size, stages, step, workspace
 from pipelines.errors import InputError
+from pipelines.mechanics.instant import REFERENCE_C
 from pipelines.mechanics.motion import Motion
 from pipelines.model import Model
 
@@ -77,14 +78,22 @@ def replay(model: Model, motion: Motion, window_s: float = WINDOW_S, every_s: fl
     link = model.behind_motors(motor)
     states = np.ascontiguousarray(np.stack([link.q, link.dq, motor.q, motor.dq], axis=1))
     load = np.ascontiguousarray(motor.transmitted[0])
+    temperature = known_temperature(motion)
     memory = np.zeros((len(motion), memory_size(a)))
     for stretch in motion.segments():
-        _remember(a, motion.time[stretch], states[stretch], load[stretch], memory[stretch])
+        _remember(
+            a, motion.time[stretch], states[stretch], load[stretch], temperature[stretch], memory[stretch]
+        )  # fmt: skip
     torque = np.ascontiguousarray(model.delivered(motor))
     parts = int(np.ceil(0.5 / (motion.sample_rate_hz * LONGEST_STEP_S)))
-    out = _windows(a, motion.time, states, load, memory, torque, first, length, parts)
+    out = _windows(a, motion.time, states, load, temperature, memory, torque, first, length, parts)
     samples = first[:, np.newaxis] + np.arange(length + 1)
     return ReplayResult(first, out[:, :, 0], out[:, :, 1], motor.q[samples] - out[:, :, 0])
+
+
+def known_temperature(motion: Motion) -> NDArray:
+    """Return the motors' temperature along a motion, (n, J) °C: the reference where it was not read."""
+    return np.nan_to_num(motion.motor_temperature, nan=REFERENCE_C)
 
 
 def _stretches(motion: Motion) -> Iterator[slice]:
@@ -97,13 +106,14 @@ def _stretches(motion: Motion) -> Iterator[slice]:
 
 
 @njit(cache=True)
-def _remember(a, time, states, load, memory):
+def _remember(a, time, states, load, temperature, memory):
     """Write the memories along a recorded stretch (n, 4, J), from rest at its first sample, into ``memory`` (n, m)."""
     w = workspace(a.joints)
     rate, middle = np.zeros(memory.shape[1]), np.zeros(memory.shape[1])
     state, passed = states[0].copy(), load[0].copy()
     for k in range(len(time) - 1 if memory.shape[1] > 0 else 0):
         memory[k + 1] = memory[k]
+        a.temperature[:] = temperature[k]
         h = (time[k + 1] - time[k]) / MEMORY_SUBSTEPS
         for i in range(2 * MEMORY_SUBSTEPS):
             share = 0.5 * i / MEMORY_SUBSTEPS
@@ -121,7 +131,7 @@ def _remember(a, time, states, load, memory):
 
 
 @njit(cache=True)
-def _windows(a, time, states, load, memory, torque, first, length, parts):
+def _windows(a, time, states, load, temperature, memory, torque, first, length, parts):
     """Simulate every window: motor angle and speed, (windows, length + 1, 2, J)."""
     out = np.empty((len(first), length + 1, 2, a.joints))
     w, s = workspace(a.joints), stages(a.joints, memory.shape[1])
@@ -129,6 +139,7 @@ def _windows(a, time, states, load, memory, torque, first, length, parts):
     for window in range(len(first)):
         k = first[window]
         state[:], remembered[:], passed[:] = states[k], memory[k], load[k]
+        a.temperature[:] = temperature[k]
         _window(a, w, s, time[k:], torque[k:], parts, state, remembered, passed, out[window])
     return out
 

@@ -5,7 +5,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.effect import Effect, Parameter, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Side
 from pipelines.effects.joint_elasticity import MOTOR_INERTIA
 from pipelines.effects.kernel import spring
 from pipelines.mechanics.motion import Motion
@@ -26,6 +26,9 @@ class Backlash(Effect):
     name = "backlash"
     title = "Backlash"
     side = Side.DRIVE
+    family = Family.TRANSMISSION
+    resembles = ("load", "angle", "speed", "inertia_by_angle")
+    forms_differ = "real play differs from tooth to tooth, and the link bounces in it"
     equation = "load angle = motor angle - play / 2 * sgn(transmitted torque)"
     source = "Nordin, Gutman (2002), Automatica 38(10): controlling mechanical systems with backlash, sec. 2"
     looks_like = "bursts of torque at 4 to 25 Hz wherever the load changes sign, and gravity that jumps there"

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.effect import Effect, Parameter, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Side
 from pipelines.effects.kernel import reading
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.motion import Motion
@@ -18,6 +18,9 @@ class BaseTilt(Effect):
     name = "base_tilt"
     title = "Base tilt"
     side = Side.STRUCTURE
+    family = Family.ANGLE
+    resembles = ("angle", "other_angle", "both_angles")
+    forms_differ = "a real base gives way under load, so its tilt changes with the motion"
     equation = "hip angle from the vertical = hip angle from the base + tilt"
     source = "Hollerbach, Khalil, Gautier (2016), Springer Handbook of Robotics, ch. 6 (gravity in the base's frame)"
     looks_like = "gravity torque that leads or lags the first joint's angle in every run alike"

@@ -5,7 +5,7 @@ from math import cos, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
 
@@ -15,6 +15,9 @@ class Cogging(Effect):
     name = "cogging"
     title = "Cogging"
     side = Side.DRIVE
+    family = Family.ANGLE
+    resembles = ("angle",)
+    forms_differ = "a real ripple may differ forward and back, and grow with the load"
     equation = "tau = A sin(n q) + B cos(n q)"
     source = "Holtz, Springob (1996), IEEE Trans. Industrial Electronics 43(2); Tuttle, Seering (1996), T-RA 12(3)"
     looks_like = "residual against angle: a wave that is the same forward and backward"

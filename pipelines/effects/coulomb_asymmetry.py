@@ -1,6 +1,6 @@
 """Dry friction that differs with direction."""
 
-from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
 
@@ -10,6 +10,9 @@ class CoulombAsymmetry(Effect):
     name = "coulomb_asymmetry"
     title = "Coulomb asymmetry"
     side = Side.DRIVE
+    family = Family.SPEED
+    resembles = ("speed",)
+    forms_differ = "a real level may also change with load or with the angle"
     holds = True
     equation = "tau = a abs(sgn v): Ks + a forward, Ks - a backward"
     source = "Janot, Vandanjon, Gautier (2014), IEEE Trans. Control Systems Technology 22(1): the drive chain's offset"

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.effect import Effect, Parameter, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Side
 from pipelines.effects.kernel import spring
 from pipelines.effects.swing import behind_spring
 from pipelines.mechanics.motion import Motion
@@ -29,6 +29,9 @@ class CuffCompliance(Effect):
     name = "cuff_compliance"
     title = "Cuff compliance"
     side = Side.HUMAN
+    family = Family.PERSON
+    resembles = ("angle", "load", "speed", "inertia_by_angle", "other_load", "both_angles")
+    forms_differ = "real tissue hardens, creeps, and slides in its cuff"
     equation = "torque on the limb = k twist (1 + h twist²); limb angle = exoskeleton angle - twist"
     source = "Yandell, Quinlivan, Popov, Walsh, Zelik (2017), J. NeuroEngineering and Rehabilitation 14:40"
     looks_like = "with the human only, gravity and inertia torques off in step with the cuff forces"

@@ -16,7 +16,7 @@ the compiled hooks. ``columns`` and ``observed`` evaluate the same kernels, so t
 """
 
 from abc import ABC
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum, StrEnum
 from typing import Any, ClassVar
@@ -34,6 +34,10 @@ DIFFERENCE = 1e-6
 """Relative step of numerical derivatives."""
 
 
+LEAST_WARMING_C = 1.0
+"""Change of a motor's temperature without which nothing that depends on it can be seen."""
+
+
 class Side(StrEnum):
     """Where an effect acts."""
 
@@ -41,6 +45,58 @@ class Side(StrEnum):
     STRUCTURE = "structure"
     SENSOR = "sensor"
     HUMAN = "human"
+
+
+class Family(StrEnum):
+    """The kind of law that an effect follows, as a reader who does not know the catalogue names it."""
+
+    ANGLE = "angle"
+    SPEED = "speed"
+    REVERSAL = "reversal"
+    LOAD = "load"
+    TIME = "time"
+    TRANSMISSION = "transmission"
+    SENSOR = "sensor"
+    PERSON = "person"
+
+
+LAWS = (
+    "angle", "other_angle", "both_angles", "speed", "other_speed", "load", "other_load", "friction_by_angle",
+    "friction_by_other_angle", "inertia_by_angle", "gain_over_time", "friction_over_time", "time", "hum",
+)  # fmt: skip
+"""Names of the smooth laws that ``Effect.resembles`` may list.
+
+======================= ==========================================================================
+angle, other_angle      a torque that depends on the joint's own angle, or on the other joint's
+both_angles             a torque that depends on the sum of both angles, as gravity does
+speed, other_speed      a torque that depends on the joint's own speed, or on the other joint's
+load, other_load        a torque or a friction that depends on the transmitted torque
+friction_by_angle       friction whose size depends on the joint's own angle
+friction_by_other_angle friction whose size depends on the other joint's angle
+inertia_by_angle        an inertia that depends on the joint's own angle
+gain_over_time          a share of the whole torque that changes slowly with time
+friction_over_time      friction that changes slowly with time
+time                    a torque that wanders with time, in each run in its own way
+hum                     a line at a fixed frequency
+======================= ==========================================================================
+"""
+
+FAMILY_OF_SIDE = {
+    Side.DRIVE: Family.SPEED, Side.STRUCTURE: Family.ANGLE, Side.SENSOR: Family.SENSOR, Side.HUMAN: Family.PERSON,
+}  # fmt: skip
+"""The family of an effect that states none."""
+
+LAWS_OF_FAMILY: Mapping[Family, tuple[str, ...]] = {
+    Family.ANGLE: ("angle", "both_angles"),
+    Family.SPEED: ("speed",),
+    Family.REVERSAL: ("speed", "friction_by_angle"),
+    Family.LOAD: ("load", "speed"),
+    Family.TIME: ("time", "friction_over_time"),
+    Family.TRANSMISSION: ("angle", "speed", "load", "inertia_by_angle"),
+    Family.SENSOR: ("angle", "load"),
+    Family.PERSON: ("angle", "both_angles", "speed"),
+}
+"""What an effect that states none ``resembles``."""
 
 
 class Parity(IntEnum):
@@ -68,6 +124,8 @@ class Parameter:
     """Values that stand for the known members of a family of shapes; empty where the range is all there is."""
     grain: float = 1.0
     """Step of a search along what an effect oscillates with."""
+    swept: bool = False
+    """True where it is a place on the joint's way: a search spans what the motion sweeps, not ``typical``."""
     of_joint: bool = True
     """False where its unit is not the joint's: the phase of a rhythm is an angle at a prismatic joint too."""
 
@@ -110,10 +168,19 @@ class Effect(ABC):
     """What it leaves in a plot of the residual."""
     confirm: ClassVar[str]
     """How to make sure of it on the rig."""
+    family: ClassVar[Family]
+    """The kind of law it follows; one that states none has the family of its side (``FAMILY_OF_SIDE``)."""
+    resembles: ClassVar[tuple[str, ...]]
+    """Smooth laws of its joint (``LAWS``) that contain it approximately: what the real effect does beyond our equation
+    looks like one of them. One that states none has those of its family (``LAWS_OF_FAMILY``)."""
+    forms_differ: ClassVar[str] = ""
+    """How the real effect may differ from the equation, a sentence without its full stop; empty where nobody said."""
     joints: ClassVar[tuple[str, ...] | None] = None
     """The only joints that can have it, by their place in the mechanism; None for any."""
     absorbed: ClassVar[Mapping[str, str]] = {}
     """Places of joints at which another parameter takes it up whole, and which."""
+    needs_temperature: ClassVar[bool] = False
+    """True where it is known only in runs in which its motor's temperature was read."""
     by_angle: ClassVar[bool] = False
     """True where it shows only in a torque that depends on where its joint stands, as gravity's does; at the whole
     machine, on where the first one does."""
@@ -155,6 +222,17 @@ class Effect(ABC):
     spring: ClassVar[Callable[..., Any] | None] = None
     reading: ClassVar[Callable[..., Any] | None] = None
     torque_reading: ClassVar[Callable[..., Any] | None] = None
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Complete what the class leaves unsaid of its family."""
+        super().__init_subclass__(**options)
+        side = getattr(cls, "side", None)
+        if side is None:
+            return
+        if not hasattr(cls, "family"):
+            cls.family = FAMILY_OF_SIDE[side]
+        if not hasattr(cls, "resembles"):
+            cls.resembles = LAWS_OF_FAMILY[cls.family]
 
     def __post_init__(self) -> None:
         """Say in the machine's own units and equations what the class says of a leg, and what each run has."""
@@ -231,8 +309,29 @@ class Effect(ABC):
         return self.side is Side.HUMAN or self.run == "with_human"
 
     def explains(self, motion: Motion) -> bool:
-        """Tell whether the effect is there in this run."""
-        return self.acts(motion.run)
+        """Tell whether the effect is there in this run, and what it depends on was read."""
+        known = not self.needs_temperature or bool(np.isfinite(motion.motor_temperature[:, self.column(motion)]).all())
+        return known and self.acts(motion.run)
+
+    def shows_in(self, motions: Sequence[Motion]) -> bool:
+        """Tell whether runs hold what the effect depends on, so that it can be asked for in them."""
+        if self.needs_temperature and not self.temperature_varies([m for m in motions if self.acts(m.run)]):
+            return False
+        return any(self.explains(motion) for motion in motions)
+
+    def temperature_varies(self, motions: Sequence[Motion]) -> bool:
+        """Tell whether every run has its motor's temperature, and not the same one throughout all of them."""
+        read = [motion.motor_temperature[:, self.column(motion)] for motion in motions]
+        ends = np.array([(np.min(t), np.max(t)) for t in read if len(t)])
+        return len(ends) > 0 and bool(np.ptp(ends) >= LEAST_WARMING_C)  # NaN is not
+
+    def directions(self, motions: Sequence[Motion]) -> tuple[tuple[tuple[float, ...], ...], ...]:
+        """Return shapes in proportion to which the effect transforms the measurement; empty where it is not linear.
+
+        Each set of shapes (s,) is a candidate that has one column for each of them: the effect of any combination is
+        that combination of the columns, so that no grid of shapes needs to be searched.
+        """
+        return ()
 
     def acts(self, kind: str) -> bool:
         """Tell whether the effect is there in a kind of run."""
@@ -282,7 +381,9 @@ class Effect(ABC):
         return columns
 
     def _react(self, motion: Motion, values: NDArray, out: NDArray) -> None:
-        of_motion = (motion.time, motion.q, motion.dq, motion.ddq, motion.transmitted[0])
+        of_motion = (
+            motion.time, motion.q, motion.dq, motion.ddq, motion.transmitted[0], motion.motor_temperature,
+        )  # fmt: skip
         arrays = [np.ascontiguousarray(array) for array in of_motion]
         joint, geometry, joints = self.column(motion), motion.geometry.array(), len(motion.joints)
         if self.derivative is None:
@@ -319,9 +420,10 @@ class Effect(ABC):
     def _read(self, torque: NDArray, motion: Motion, values: NDArray) -> NDArray:
         out = np.empty_like(torque)
         joint = self.column(motion)
+        time, temperature = (np.ascontiguousarray(x) for x in (motion.time, motion.motor_temperature))
         for stretch in motion.segments():
             read_along(
-                self.torque_reading, values, joint, np.ascontiguousarray(motion.time[stretch]), torque[stretch],
+                self.torque_reading, values, joint, time[stretch], temperature[stretch], torque[stretch],
                 np.zeros(len(motion.joints)), np.zeros(self.reading_states), out[stretch],
             )  # fmt: skip
         return out

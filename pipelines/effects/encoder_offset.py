@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.effect import Effect, Parameter, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Side
 from pipelines.effects.kernel import reading
 from pipelines.mechanics.motion import Motion
 
@@ -14,6 +14,9 @@ class EncoderOffset(Effect):
     name = "encoder_offset"
     title = "Encoder offset"
     side = Side.SENSOR
+    family = Family.SENSOR
+    resembles = ("angle", "other_angle", "both_angles")
+    forms_differ = "a real zero may slip during a run"
     equation = "measured angle = true angle + offset"
     source = "Hollerbach, Khalil, Gautier (2016), Springer Handbook of Robotics, ch. 6 (joint offset calibration)"
     looks_like = "gravity torque that leads or lags the angle: a residual like the cosine of the link's angle"

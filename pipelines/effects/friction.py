@@ -1,6 +1,6 @@
 """Coulomb and viscous friction of a drive: the baseline every other drive effect is judged against."""
 
-from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
 
@@ -10,6 +10,9 @@ class Friction(Effect):
     name = "friction"
     title = "Coulomb and viscous friction"
     side = Side.DRIVE
+    family = Family.SPEED
+    resembles = ("speed",)
+    forms_differ = "real friction has no sharp corner at standstill and no straight line above it"
     equation = "tau = Ks sgn(v) + Km v"
     source = "paper, appendix A (tau_fic); Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30(7)"
     looks_like = "a square wave that flips with the direction of motion, on a ramp in proportion to speed"

@@ -2,7 +2,7 @@
 
 from math import exp
 
-from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
 
@@ -12,6 +12,9 @@ class FrictionWarmup(Effect):
     name = "friction_warmup"
     title = "Friction warm-up"
     side = Side.DRIVE
+    family = Family.TIME
+    resembles = ("friction_over_time", "speed")
+    forms_differ = "a real gear warms with its losses, and in more than one time constant"
     equation = "tau = (dv v + ds sgn(v)) exp(-t / T)"
     source = "Simoni, Beschi, Legnani, Visioli (2015), IROS: friction with temperature effects in industrial robots"
     looks_like = "residual in step with speed that shrinks from period to period"

@@ -5,7 +5,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.effect import Effect, Parameter, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Side
 from pipelines.effects.kernel import spring
 from pipelines.effects.swing import behind_spring
 from pipelines.mechanics.motion import Motion
@@ -26,6 +26,9 @@ class JointElasticity(Effect):
     name = "joint_elasticity"
     title = "Joint elasticity"
     side = Side.DRIVE
+    family = Family.TRANSMISSION
+    resembles = ("load", "angle", "speed", "inertia_by_angle", "other_load")
+    forms_differ = "a real gear hardens with its twist, and loses energy in a loop"
     equation = "torque = k twist (1 + h twist²); load angle = motor angle - twist"
     source = "Spong (1987), ASME J. Dyn. Sys. Meas. Control 109(4), eq. 8; Tuttle, Seering (1996), IEEE T-RA 12(3)"
     looks_like = "gravity and inertia torques too small or too large in step with the load itself"

@@ -33,10 +33,12 @@ SPRING = float64(float64, float64, vector)
 READING = void(vector, vector, int64)
 """reading(angle, values, joint): turn true angles into what the encoders say, in place."""
 
-TORQUE_READING = void(float64, vector, vector, int64, vector)
-"""torque_reading(t, torque, values, joint, state): turn what the drives deliver into what their sensors say, in place.
+TORQUE_READING = void(float64, vector, vector, int64, vector, vector)
+"""torque_reading(t, torque, values, joint, state, temperature): turn what the drives deliver into what their sensors
+say, in place.
 
-Called once a sample, in order; ``state`` is the sensor's memory, all zero before the first."""
+Called once a sample, in order; ``state`` is the sensor's memory, all zero before the first; ``temperature`` is the
+motors', °C, NaN where it was not read."""
 
 
 def derivative(function):
@@ -55,8 +57,17 @@ def reading(function):
 
 
 def torque_reading(function):
-    """Compile what a torque sensor makes of the torque."""
+    """Compile what a torque sensor makes of the torque; one that needs no temperature may leave out that argument."""
+    if function.__code__.co_argcount == len(TORQUE_READING.args) - 1:
+        return staticmethod(njit(TORQUE_READING)(_at_any_temperature(njit(function))))
     return staticmethod(njit(TORQUE_READING, cache=True)(function))
+
+
+def _at_any_temperature(kernel):
+    def torque_reading(t, torque, values, joint, state, temperature):
+        kernel(t, torque, values, joint, state)
+
+    return torque_reading
 
 
 def address(kernel) -> int:
@@ -93,14 +104,14 @@ torque_reading_at = _kernel_at(TORQUE_READING)
 
 _table = float64[:, ::1]
 _columns = float64[:, :, ::1]
-_MOTION = (vector, _table, _table, _table, _table, vector)  # time, q, dq, ddq, load, geometry
+_MOTION = (vector, *(_table,) * 5, vector)  # time, q, dq, ddq, load, temperature, geometry
 # Signatures are spelt out so that one compilation serves every effect: the kernel is an argument.
 _ALONG = void(types.FunctionType(REACTION), vector, int64, *_MOTION, vector, _columns)
 _ALONG_WITH_MEMORY = void(
     types.FunctionType(REACTION), types.FunctionType(DERIVATIVE), vector, int64, *_MOTION, _table, _table, _columns
 )
 _READ_ALONG = void(
-    types.FunctionType(TORQUE_READING), vector, int64, vector, types.Array(float64, 3, "A"), vector, vector,
+    types.FunctionType(TORQUE_READING), vector, int64, vector, _table, types.Array(float64, 3, "A"), vector, vector,
     types.Array(float64, 3, "A"),
 )  # fmt: skip
 
@@ -144,7 +155,7 @@ def _unit_columns(kernel, at, state, values, geometry, joint, torque, out):
 
 
 @njit(_ALONG, **ALLOCATING_NOTHING)
-def columns_along(kernel, values, joint, time, q, dq, ddq, load, geometry, scratch, out):
+def columns_along(kernel, values, joint, time, q, dq, ddq, load, temperature, geometry, scratch, out):
     """Evaluate a reaction kernel without memory along a motion, into ``out`` (n, J, p) N·m per unit.
 
     ``values`` are zero but for the shape; ``scratch`` has room for 2 J.
@@ -154,7 +165,7 @@ def columns_along(kernel, values, joint, time, q, dq, ddq, load, geometry, scrat
     for k in range(q.shape[0]):
         for j in range(joints):
             direction[j] = np.sign(dq[k, j])
-        at = Instant(time[k], q[k], dq[k], ddq[k], direction, load[k])
+        at = Instant(time[k], q[k], dq[k], ddq[k], direction, load[k], temperature[k])
         _unit_columns(kernel, at, scratch[:0], values, geometry, joint, torque, out[k])
 
 
@@ -182,7 +193,9 @@ def _advance(rate, at, ahead, h, state, middle, slope, values, geometry, joint):
 
 
 @njit(_ALONG_WITH_MEMORY, **ALLOCATING_NOTHING)
-def columns_along_with_memory(kernel, rate, values, joint, time, q, dq, ddq, load, geometry, scratch, memory, out):
+def columns_along_with_memory(
+    kernel, rate, values, joint, time, q, dq, ddq, load, temperature, geometry, scratch, memory, out
+):
     """Evaluate a reaction kernel along one unbroken stretch, its memory settled, into ``out`` (n, J, p).
 
     Between samples the motion is taken as linear in time. ``scratch`` is (11, J), ``memory`` (3, states), the
@@ -193,27 +206,27 @@ def columns_along_with_memory(kernel, rate, values, joint, time, q, dq, ddq, loa
     if q.shape[0] > 1:
         h = (time[1] - time[0]) / MEMORY_SUBSTEPS
         t = _between(time, q, dq, ddq, load, 0, 0.0, now)
-        at = Instant(t, now[0], now[1], now[2], now[3], now[4])
+        at = Instant(t, now[0], now[1], now[2], now[3], now[4], temperature[0])
         for _ in range(int(SETTLING_S / h)):
             _advance(rate, at, at, h, state, middle, slope, values, geometry, joint)
     for k in range(q.shape[0]):
         for j in range(q.shape[1]):
             now[3, j] = np.sign(dq[k, j])
-        at = Instant(time[k], q[k], dq[k], ddq[k], now[3], load[k])
+        at = Instant(time[k], q[k], dq[k], ddq[k], now[3], load[k], temperature[k])
         _unit_columns(kernel, at, state, values, geometry, joint, scratch[10], out[k])
         if k + 1 == q.shape[0]:
             break
         h = (time[k + 1] - time[k]) / MEMORY_SUBSTEPS
         for i in range(MEMORY_SUBSTEPS):
             t = _between(time, q, dq, ddq, load, k, i / MEMORY_SUBSTEPS, now)
-            at = Instant(t, now[0], now[1], now[2], now[3], now[4])
+            at = Instant(t, now[0], now[1], now[2], now[3], now[4], temperature[k])
             t = _between(time, q, dq, ddq, load, k, (i + 0.5) / MEMORY_SUBSTEPS, later)
-            ahead = Instant(t, later[0], later[1], later[2], later[3], later[4])
+            ahead = Instant(t, later[0], later[1], later[2], later[3], later[4], temperature[k])
             _advance(rate, at, ahead, h, state, middle, slope, values, geometry, joint)
 
 
 @njit(_READ_ALONG, **ALLOCATING_NOTHING)
-def read_along(kernel, values, joint, time, torque, at_once, state, out):
+def read_along(kernel, values, joint, time, temperature, torque, at_once, state, out):
     """Write what a sensor makes of p torques (n, J, p) of one unbroken stretch into ``out`` (n, J, p), N·m.
 
     ``at_once`` has room for J, ``state`` for the sensor's memory.
@@ -223,7 +236,7 @@ def read_along(kernel, values, joint, time, torque, at_once, state, out):
         for k in range(torque.shape[0]):
             for j in range(at_once.shape[0]):
                 at_once[j] = torque[k, j, i]
-            kernel(time[k], at_once, values, joint, state)
+            kernel(time[k], at_once, values, joint, state, temperature[k])
             for j in range(at_once.shape[0]):
                 out[k, j, i] = at_once[j]
 

@@ -1,6 +1,6 @@
 """Friction in proportion to the load on the gear's teeth."""
 
-from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
 
@@ -10,6 +10,9 @@ class LoadDependentFriction(Effect):
     name = "load_dependent_friction"
     title = "Load-dependent friction"
     side = Side.DRIVE
+    family = Family.LOAD
+    resembles = ("load", "speed", "friction_by_angle")
+    forms_differ = "a real share differs between driving a load and being driven by it"
     holds = True
     equation = "tau = mu abs(transmitted torque) sgn(v)"
     source = "Hamon, Gautier, Garrec (2010), IROS: dry friction depending on load and velocity"

@@ -1,6 +1,6 @@
 """A segment whose centre of mass lies beside its axis."""
 
-from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.mechanics.mechanisms.leg import LEG
 
 
@@ -15,6 +15,9 @@ class MassOffAxis(Effect):
     name = "mass_off_axis"
     title = "Mass off the axis"
     side = Side.STRUCTURE
+    family = Family.ANGLE
+    resembles = ("angle", "other_angle", "both_angles")
+    forms_differ = "a real part may also move on its segment, as a cable does"
     equation = "tau = Y3 dA3 (shank) or Y4 dA4 (thigh): columns X3, X4 with the segment a right angle ahead"
     source = "Khalil, Dombre (2002), Modeling, Identification and Control of Robots, ch. 9 (first moments MX, MY)"
     looks_like = "gravity torque like the cosine of the link's angle: largest where the link hangs"

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 from pipelines.effects.torque_offset import TorqueOffset
 from pipelines.mechanics.machine import THE_LEG
@@ -27,6 +27,9 @@ class ParallelSpring(Effect):
     name = "parallel_spring"
     title = "Parallel spring"
     side = Side.STRUCTURE
+    family = Family.ANGLE
+    resembles = ("angle", "both_angles")
+    forms_differ = "a real spring hardens, goes slack at one end, or pulls at a lever that turns"
     equation = "tau = k (q - q0) = k q - b"
     source = "Wang, van Dijk, van der Kooij (2011), ICORR: spring uses in exoskeleton actuation design"
     looks_like = "residual against angle: a straight line, the same both ways; partly hidden in gravity and friction"

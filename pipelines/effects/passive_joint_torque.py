@@ -2,7 +2,7 @@
 
 from math import expm1
 
-from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
 
@@ -16,6 +16,9 @@ class PassiveJointTorque(Effect):
     name = "passive_joint_torque"
     title = "Passive joint torque"
     side = Side.HUMAN
+    family = Family.PERSON
+    resembles = ("angle", "both_angles")
+    forms_differ = "real muscles cross the next joint too, and lose energy when they are stretched"
     equation = "tau = k w (exp((q - q0) / w) - 1) beyond q0 on the side of w's sign, else 0"
     source = "Riener, Edrich (1999), J. Biomechanics 32(5): passive elastic joint moments in the lower extremities"
     looks_like = "residual against angle: flat, then steep at one end of the range; only with the human"

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.mechanics.machine import THE_LEG
 from pipelines.mechanics.mechanisms.leg import LEG
 
@@ -13,6 +13,9 @@ class PayloadChange(Effect):
     name = "payload_change"
     title = "Payload change"
     side = Side.STRUCTURE
+    family = Family.TIME
+    resembles = ("angle", "both_angles", "time")
+    forms_differ = "a real load is picked up over a second or so, and may swing"
     equation = "tau = p (t >= t0) dA/dp, p = m r; shank: A3 + r A2 + (r + L1²/r) A1 + L1/r A4; thigh: A4 + r A1"
     source = "Khalil, Gautier, Lemoine (2007), ICRA: identification of the payload inertial parameters"
     looks_like = "gravity residual that begins at one instant and stays"

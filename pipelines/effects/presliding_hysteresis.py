@@ -1,6 +1,6 @@
 """Presliding: after a reversal friction builds up over a small travel, like a spring that yields."""
 
-from pipelines.effects.effect import Effect, Parameter, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Side
 from pipelines.effects.kernel import derivative, reaction
 
 
@@ -10,6 +10,9 @@ class PreslidingHysteresis(Effect):
     name = "presliding_hysteresis"
     title = "Presliding hysteresis"
     side = Side.DRIVE
+    family = Family.REVERSAL
+    resembles = ("speed", "friction_by_angle")
+    forms_differ = "a real loop depends on where the joint turned before, and how long it stood"
     holds = True
     equation = "tau = F z, dz/dt = v / travel * (1 - z sgn(v))^i, i = 1 unless said"
     source = "Dahl (1976), AIAA Journal 14(12), eq. 4"

@@ -1,6 +1,6 @@
 """Drag that grows with the square of speed."""
 
-from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
 
@@ -10,6 +10,9 @@ class QuadraticDrag(Effect):
     name = "quadratic_drag"
     title = "Quadratic drag"
     side = Side.DRIVE
+    family = Family.SPEED
+    resembles = ("speed",)
+    forms_differ = "real drag has another power of the speed, and none below some speed"
     equation = "tau = c v abs(v)"
     source = "Olsson, Åström, Canudas de Wit, Gäfvert, Lischinsky (1998), European J. Control 4(3), eq. 4, exponent 2"
     looks_like = "friction against speed: curved upward at the fast end on both sides"

@@ -28,9 +28,12 @@ def facts(effect: type[Effect]) -> dict[str, Any]:
         "side": effect.side.value,
         "joints": where(effect),
         "runs": list(effect.acts_in),
+        "family": effect.family.value,
+        "resembles": list(effect.resembles),
         "equation": effect.equation,
         "meaning": inspect.cleandoc(effect.__doc__ or ""),
         "typical": typical_size(effect),
+        "forms_differ": effect.forms_differ,
         "looks_like": effect.looks_like,
         "confirm": effect.confirm,
         "source": effect.source,
@@ -71,6 +74,11 @@ def typical_range(parameter: Parameter) -> str:
     return f"{low:.3g} to {high:.3g}{unit}"
 
 
+def laws_in_words(effect: type[Effect]) -> str:
+    """Name the smooth laws that contain an effect approximately."""
+    return ", ".join(law.replace("_", " ") for law in effect.resembles) or "none"
+
+
 def page(effect: type[Effect]) -> str:
     """Return an effect's page as Markdown."""
     told = facts(effect)
@@ -91,12 +99,19 @@ def page(effect: type[Effect]) -> str:
             "",
             f"**Looks like:** {told['looks_like']}.",
             "",
+            *_paragraph("How the real one may differ", told["forms_differ"]),
+            f"**Family:** {told['family']}; **resembles** the laws: {laws_in_words(effect)}.",
+            "",
             f"**To confirm it on the rig:** {told['confirm']}.",
             "",
             f"**Source:** {told['source']}.",
             "",
         ]
     )
+
+
+def _paragraph(title: str, text: str) -> list[str]:
+    return [f"**{title}:** {text}.", ""] if text else []
 
 
 def _row(parameter: Parameter) -> str:

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.mechanics.mechanism import Mechanism
 from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.mechanics.motion import Motion
@@ -23,6 +23,9 @@ class RigidBody(Effect):
     name = "rigid_body"
     title = "Rigid body"
     side = Side.STRUCTURE
+    family = Family.ANGLE
+    resembles = ("inertia_by_angle", "angle", "other_angle", "both_angles")
+    forms_differ = "real links bend a little, and cables and hoses pull at them"
     equation = _equation(LEG)
     source = "Lagrange's equations of a planar double pendulum, docs/errata.md"
     looks_like = "what every fit starts with: torque in step with acceleration and with gravity"

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
 
@@ -20,6 +20,9 @@ class RotorCoupling(Effect):
     name = "rotor_coupling"
     title = "Rotor coupling"
     side = Side.STRUCTURE
+    family = Family.TRANSMISSION
+    resembles = ("inertia_by_angle",)
+    forms_differ = "a real rotor sits behind a gear that twists"
     equation = "tau1 = c ddq2, tau2 = c ddq1; c = N Ir"
     source = "Sciavicco, Siciliano, Villani (1996), Advanced Robotics 10(3): motor inertia in gear-driven manipulators"
     looks_like = "nothing of its own: the second rotor's inertia smaller by c beside an X2 larger by c"

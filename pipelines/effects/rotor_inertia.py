@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
 
@@ -12,6 +12,9 @@ class RotorInertia(Effect):
     name = "rotor_inertia"
     title = "Rotor inertia"
     side = Side.DRIVE
+    family = Family.TRANSMISSION
+    resembles = ("inertia_by_angle",)
+    forms_differ = "a real rotor sits behind a gear that twists"
     equation = "tau = J ddq, at its own joint only"
     source = "Sciavicco, Siciliano, Villani (1996), Advanced Robotics 10(3): motor inertia in gear-driven manipulators"
     looks_like = "residual in step with its joint's own acceleration; X2 too large for a link of that weight"

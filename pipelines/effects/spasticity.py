@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.effect import Effect, Parameter, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Side
 from pipelines.effects.kernel import reaction
 
 
@@ -13,6 +13,9 @@ class Spasticity(Effect):
     name = "spasticity"
     title = "Spasticity"
     side = Side.HUMAN
+    family = Family.PERSON
+    resembles = ("speed",)
+    forms_differ = "a real reflex comes some 40 ms late, and its threshold depends on the angle"
     equation = "tau = gain (v - v0) beyond v0 on the side of v0's sign, else 0"
     source = "Lance (1980), in Spasticity: Disordered Motor Control; Falisse et al. (2018), PLoS ONE 13(12)"
     looks_like = "residual against speed: flat, then a ramp beyond a speed, one way only and only with the human"

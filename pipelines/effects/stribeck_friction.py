@@ -2,7 +2,7 @@
 
 from math import exp
 
-from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
 
@@ -12,6 +12,9 @@ class StribeckFriction(Effect):
     name = "stribeck_friction"
     title = "Stribeck friction"
     side = Side.DRIVE
+    family = Family.SPEED
+    resembles = ("speed",)
+    forms_differ = "a real fall may have another exponent, and come back a moment late"
     holds = True
     equation = "tau = F exp(-abs(v / vs)^d) sgn(v), d = 2 unless said"
     source = "Stribeck (1902); Armstrong-Hélouvry, Dupont, Canudas de Wit (1994), Automatica 30(7), eq. 3"

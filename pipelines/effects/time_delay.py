@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.effect import Effect, Parameter, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Side
 from pipelines.effects.kernel import torque_reading
 from pipelines.mechanics.motion import Motion
 
@@ -17,6 +17,9 @@ class TimeDelay(Effect):
     name = "time_delay"
     title = "Time delay"
     side = Side.SENSOR
+    family = Family.SENSOR
+    resembles = ("load", "speed", "inertia_by_angle")
+    forms_differ = "a real channel is a filter, later at one frequency than at another"
     equation = "measured torque(t) = true torque(t - delay)"
     source = "Björklund (2003), A Survey and Comparison of Time-Delay Estimation Methods in Linear Systems, Linköping"
     looks_like = "residual in step with the torque's rate of change; friction steps smeared to one side of reversals"
@@ -25,7 +28,7 @@ class TimeDelay(Effect):
     reading_states = 1 + 2 * SLOTS
 
     @torque_reading
-    def torque_reading(t, torque, values, joint, state):
+    def torque_reading(t, torque, values, joint, state, temperature):
         """Return the torque of then, in a straight line between samples; the first one's until there is one."""
         newest = int(state[0])
         state[0] += 1.0

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import torque_reading
 from pipelines.effects.torque_offset import TorqueOffset
 
@@ -13,6 +13,9 @@ class TorqueDrift(Effect):
     name = "torque_drift"
     title = "Torque drift"
     side = Side.SENSOR
+    family = Family.TIME
+    resembles = ("time",)
+    forms_differ = "a real zero wanders to and fro, and settles as the electronics warm"
     equation = "measured torque = true torque + level + rate t"
     source = "Fraden (2016), Handbook of Modern Sensors, 5th ed., ch. 3 (zero drift)"
     looks_like = "a residual that climbs through the run and does not repeat from period to period"
@@ -33,6 +36,6 @@ class TorqueDrift(Effect):
             object.__setattr__(self, "shape", (replace(level, per_run=False, forms=(0.0,)),))
 
     @torque_reading
-    def torque_reading(t, torque, values, joint, state):
+    def torque_reading(t, torque, values, joint, state, temperature):
         """Shift the torque by what has gathered."""
         torque[joint] += values[0] * t + values[1]

@@ -2,7 +2,7 @@
 
 from numpy.typing import NDArray
 
-from pipelines.effects.effect import Effect, Parameter, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Side
 from pipelines.effects.kernel import torque_reading
 from pipelines.mechanics.motion import Motion
 
@@ -13,6 +13,9 @@ class TorqueGain(Effect):
     name = "torque_gain"
     title = "Torque gain"
     side = Side.SENSOR
+    family = Family.SENSOR
+    resembles = ("load", "gain_over_time")
+    forms_differ = "a real gain may differ with the sign of the torque, or fall at large ones"
     equation = "measured torque = gain * true torque"
     source = "Gautier, Briot (2014), ASME J. Dyn. Sys. Meas. Control 136(5): identification of joint drive gains"
     looks_like = "the joints disagree about the second link: what both carry, X2 and X3, differs between the rows"
@@ -20,7 +23,7 @@ class TorqueGain(Effect):
     shape = (Parameter("gain", "1", "measured per true torque", "g", (0.7, 1.4)),)
 
     @torque_reading
-    def torque_reading(t, torque, values, joint, state):
+    def torque_reading(t, torque, values, joint, state, temperature):
         """Multiply the torque."""
         torque[joint] *= values[0]
 

@@ -1,6 +1,6 @@
 """A torque channel whose zero is off."""
 
-from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import torque_reading
 
 
@@ -10,6 +10,9 @@ class TorqueOffset(Effect):
     name = "torque_offset"
     title = "Torque offset"
     side = Side.SENSOR
+    family = Family.SENSOR
+    resembles = ("angle", "time")
+    forms_differ = "a real zero creeps, and steps when the sensor is loaded"
     equation = "measured torque = true torque + offset"
     source = "Janot, Vandanjon, Gautier (2014), IEEE Trans. Control Systems Technology 22(1): the drive chain's offset"
     looks_like = "a residual whose mean is not zero, moving or standing"
@@ -22,6 +25,6 @@ class TorqueOffset(Effect):
     parity = Parity.EVEN
 
     @torque_reading
-    def torque_reading(t, torque, values, joint, state):
+    def torque_reading(t, torque, values, joint, state, temperature):
         """Shift the torque."""
         torque[joint] += values[0]

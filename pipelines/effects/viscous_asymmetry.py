@@ -1,6 +1,6 @@
 """Viscous friction that differs with direction."""
 
-from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
 
@@ -10,6 +10,9 @@ class ViscousAsymmetry(Effect):
     name = "viscous_asymmetry"
     title = "Viscous asymmetry"
     side = Side.DRIVE
+    family = Family.SPEED
+    resembles = ("speed",)
+    forms_differ = "a real slope is not straight either way"
     equation = "tau = c abs(v): Km + c forward, Km - c backward"
     source = "Armstrong-Hélouvry (1991), Control of Machines with Friction, Kluwer, ch. 4"
     looks_like = "torque against speed: a V, zero at standstill"

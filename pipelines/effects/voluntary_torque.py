@@ -6,7 +6,7 @@ from math import cos, pi, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.effect import Effect, Parameter, Parity, Side
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
 
@@ -16,6 +16,9 @@ class VoluntaryTorque(Effect):
     name = "voluntary_torque"
     title = "Voluntary torque"
     side = Side.HUMAN
+    family = Family.PERSON
+    resembles = ("time", "hum")
+    forms_differ = "a real rhythm drifts in frequency and size, and starts and stops"
     equation = "tau = A sin(2 pi f t) + B cos(2 pi f t) + c"
     source = "Hogan, Sternad (2007), Experimental Brain Research 181: rhythmic movement"
     looks_like = "a tone in residual and cuff forces, at a frequency that no period of the motion explains"

@@ -15,9 +15,12 @@ from pipelines.effects import Effect, Parameter, Side
 from pipelines.effects.kernel import Instant
 from pipelines.export.exported import Exported, column_of, shift_of
 from pipelines.export.format import Degree, Holding, exact, left_out
-from pipelines.export.formula import Branch, Elements, Formula, NotWritable, constant, constants_in, written
+from pipelines.export.formula import Branch, Elements, Formula, NotWritable, arrays_in, constant, constants_in, written
 from pipelines.export.language import identifier, unique
 from pipelines.model import Term
+
+TEMPERATURE = "at.temperature"
+"""What no written file is given."""
 
 GROUPS = ("link_inertia", "link_torque", "drive_inertia", "drive_torque")
 """Functions of a written file, in the order in which they are called."""
@@ -103,8 +106,8 @@ def holding(term: Term) -> Holding:
         return exact("a constant between angles") if is_shift else left_out("its reading is more than a shift")
     try:
         for kernel in (effect.reaction, effect.derivative, effect.torque_reading):
-            if kernel is not None:
-                _outcome(term, kernel, list(term.values), "at.q", 0)
+            if kernel is not None and TEMPERATURE in arrays_in(_outcome(term, kernel, list(term.values), "at.q", 0)):
+                return left_out("it needs the motor's temperature")
     except NotWritable as error:
         return left_out(str(error))
     if effect.torque_reading is not None:
@@ -175,13 +178,13 @@ def _outcome(term: Term, kernel: Any, values: list, angle: str, first: int) -> l
     geometry = [Formula("constant", (name,)) for name in GEOMETRY]
     joints, joint = len(term.effect.on.joints), column_of(term)
     memory = [Formula("element", ("at.memory", first + i)) for i in range(term.effect.states)]
-    whole = (Elements(name, joints) for name in (angle, "at.dq", "at.ddq", "at.direction", "at.load"))
+    whole = (Elements(name, joints) for name in (angle, "at.dq", "at.ddq", "at.direction", "at.load", TEMPERATURE))
     at: Any = Instant._make([Formula("constant", ("at.t",)), *whole])
 
     def arguments() -> tuple[tuple, list]:
         if kernel is term.effect.torque_reading:
             torque: list = list(Elements("tau", joints))
-            return (at.t, torque, values, joint, []), torque
+            return (at.t, torque, values, joint, [], list(Elements(TEMPERATURE, joints))), torque
         out = [0.0] * (joints if kernel is term.effect.reaction else term.effect.states)
         return (at, memory, values, geometry, joint, out), out
 

@@ -136,6 +136,20 @@ def constants_in(outcome: Any) -> Iterator[str]:
             yield from constants_in(list(outcome.operands))
 
 
+def arrays_in(outcome: Any) -> Iterator[str]:
+    """Yield the names of the arrays of which an outcome has elements, as often as they stand there."""
+    match outcome:
+        case Branch(condition, yes, no):
+            yield from arrays_in([condition.left, condition.right, yes, no])
+        case list():
+            for part in outcome:
+                yield from arrays_in(part)
+        case Formula(operator="element"):
+            yield outcome.operands[0]
+        case Formula():
+            yield from arrays_in(list(outcome.operands))
+
+
 @dataclass(frozen=True)
 class Elements:
     """An array that is filled later, such as ``q``: its elements are formulae."""

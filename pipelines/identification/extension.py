@@ -83,6 +83,26 @@ def chosen(labels: Iterable[str], machine: Machine) -> tuple[Term, ...]:
     return tuple(Term(effect, np.zeros(len(effect.linear))) for effect in effects)
 
 
+def refuse_unread(terms: Iterable[Term], runs: Sequence[Run]) -> None:
+    """Refuse runs that lack a temperature that an effect depends on.
+
+    Raises
+    ------
+    InputError
+        Names the effect, the run and the column.
+    """
+    for effect in (term.effect for term in terms if term.effect.needs_temperature):
+        for run in (run for run in runs if effect.acts(run.run)):
+            first = next(iter(run.pieces(0))).motion
+            if effect.explains(first):
+                continue
+            column = f"{effect.joint}_temperature_c"
+            raise InputError(
+                f"{run.file}: holds no {column}, on which {effect.label} depends; "
+                "record the temperature, or leave the effect out"
+            )
+
+
 def _shapeless(effect: type[Effect]) -> bool:
     """Tell whether amplitudes are all that is to be known of an effect, and are the same in every run."""
     told = all(p.default is not None for p in effect.shape)

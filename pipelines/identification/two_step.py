@@ -23,7 +23,7 @@ from pipelines.estimation.least_squares import WeightedLeastSquares
 from pipelines.estimation.parameter_table import Row, table_of
 from pipelines.estimation.problem import Problem, Training
 from pipelines.estimation.regression import mask_in_words
-from pipelines.identification.extension import Extension
+from pipelines.identification.extension import Extension, refuse_unread
 from pipelines.identification.parameter_rows import rows
 from pipelines.identification.runs import Runs, checked
 from pipelines.identification.validation import Validation, validate
@@ -133,6 +133,7 @@ def identify(
     estimator, extension = estimator or WeightedLeastSquares(), extension or Extension()
     runs = checked(on_one_scale(motions))
     loud = is_loud(runs.of("train"))
+    refuse_unread(extension.terms, [*runs.of("train"), *runs.of("validate")])
     training, at_rest = _training(runs, extension, reversals, CUTOFF_HZ if loud else None)
     judged = [training.loaded(run) for run in runs.of("validate")]
     steps = {kind: Step(one.problem, estimated(one.fit)) for kind, one in _in_steps(training, estimator).items()}

@@ -25,8 +25,8 @@ LOAD_CUTOFF_HZ = 5.0
 MOST_UNREAD_S = 0.1
 """Forces read further apart than this are not known between: a leg that moves at 1 Hz goes a tenth of its way there."""
 
-LOADS = ("transmitted", "on_limb", "link_swing", "limb_swing")
-"""What a motion knows of loads, and keeps."""
+KEPT = ("transmitted", "on_limb", "link_swing", "limb_swing", "motor_temperature")
+"""What a motion knows of loads and temperatures, and keeps with other kinematics."""
 
 CUFFS = tuple(f"{segment}_{side}" for segment in ("thigh", "shank") for side in ("front", "back"))
 
@@ -122,6 +122,19 @@ class Motion:
                 made[stretch, cuff] = between_readings(self.forces[stretch, cuff], longest)
         return made
 
+    @cached_property
+    def motor_temperature(self) -> NDArray:
+        """Temperature of each joint's motor at every sample, (n, J) °C, in straight lines between readings.
+
+        NaN at a joint whose motor's was never read.
+        """
+        read = np.full(self.q.shape, np.nan) if self.temperature is None else self.temperature.copy()
+        for column in read.T:
+            known = np.isfinite(column)
+            if known.any() and not known.all():
+                column[:] = np.interp(self.time, self.time[known], column[known])
+        return read
+
     @property
     def on_segments(self) -> NDArray | None:
         """Cuff forces on thigh and shank, front and back together, (n, 2, 3) N; None where there are none."""
@@ -199,7 +212,7 @@ class Motion:
         """Return the same run with other kinematics, (n, J) each, as a corrected measurement has."""
         made = replace(self, q=q, dq=dq, ddq=ddq)
         # The torques are the same, and smoothing them costs more than the correction did.
-        made.__dict__.update({name: self.__dict__[name] for name in LOADS if name in self.__dict__})
+        made.__dict__.update({name: self.__dict__[name] for name in KEPT if name in self.__dict__})
         return made
 
 

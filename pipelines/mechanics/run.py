@@ -68,10 +68,14 @@ class StoredRun:
     """As a motion's."""
 
     @cached_property
+    def _first(self) -> pa.Table:
+        """The first row, with every column that there is."""
+        return next(iter(self.rows.pieces())).slice(0, 1)
+
+    @cached_property
     def _facts(self) -> Motion:
         """All that is known of the run, without a sample of it."""
-        first = next(iter(self.rows.pieces(self._columns)))
-        return self._motion(first.slice(0, 0))
+        return self._motion(self._first.slice(0, 0).select(self._columns))
 
     @property
     def run(self) -> str:
@@ -113,10 +117,12 @@ class StoredRun:
         """What a file computed from this run says of its joints."""
         return self._facts.joint_metadata
 
-    @property
+    @cached_property
     def _columns(self) -> list[str]:
+        """What a fit needs: temperatures too, where they were read."""
         quantities = [joint.column(quantity) for quantity in FITTED for joint in self.rows.joints]
-        return ["time_s", *quantities, "segment", "valid"]
+        read = [joint.column("temperature") for joint in self.rows.joints]
+        return ["time_s", *quantities, "segment", "valid", *(c for c in read if c in self._first.column_names)]
 
     def _motion(self, rows: Any) -> Motion:
         table = Table(rows.to_pandas(), self.rows.metadata, Path(self.file))

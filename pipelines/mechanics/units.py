@@ -21,10 +21,13 @@ class Unit(NamedTuple):
 
 UNITS = {
     "N·m": Unit("N", 1, 0, 0),
+    "N·m/°C": Unit("N/°C", 1, 0, 0),
+    "N·m·s/(rad·°C)": Unit("N·s/(m·°C)", 1, 0, -1),
     "N·m/s": Unit("N/s", 1, 0, 0),
     "N·m·s/rad": Unit("N·s/m", 1, 0, -1),
     "N·m·s²/rad²": Unit("N·s²/m²", 1, 0, -2),
     "N·m/rad": Unit("N/m", 1, -1, 0),
+    "N·m/rad²": Unit("N/m²", 1, -2, 0),
     "kg·m²": Unit("kg", 1, 1, -2),
     "kg·m": Unit("kg", 1, 0, 0),
     "rad": Unit("m", 0, 1, 0),

@@ -94,7 +94,9 @@ class Plant:
         # Of its own: what an empty machine's sensors say must not change what its drives do.
         self._unfelt = np.random.default_rng([seed, 1])
         self._ripple = np.zeros(len(JOINTS))
-        self._temperature = np.full(len(JOINTS), settings.temperature.ambient_c)
+        warming = settings.temperature
+        self._warming = (warming.ambient_c, warming.heating_c_nm2, warming.time_constant_s)
+        self._assembly.temperature[:] = warming.ambient_c
         self._zeros = np.random.default_rng(settings.seed).normal(0.0, settings.cuff.zero_n, (4, 3))
         self._samples = 0
 
@@ -118,9 +120,9 @@ class Plant:
         reference = np.ascontiguousarray(reference, dtype=float)
         out = _run(
             self._assembly, self._drives, *self._scratch, self._loop, self._samples, period, reference, enabled,
-            self._of_human,
+            self._of_human, self._warming,
         )  # fmt: skip
-        angle, velocity, torque, truth, human = out
+        angle, velocity, torque, temperature, truth, human = out
         sequence = self._samples + np.arange(n)
         self._samples += n
         torque = torque + self._torque_error(n)
@@ -130,7 +132,7 @@ class Plant:
             angle=angle,
             velocity=velocity,
             torque=torque,
-            temperature=self._warm(torque, period),
+            temperature=temperature,
             reference=reference,
             forces=self._felt(human, truth) if self.has_human else self._noise_alone(n),
             truth=truth,
@@ -144,12 +146,6 @@ class Plant:
             memory = np.exp(-1.0 / (self.sample_rate_hz * settings.ripple_correlation_s))
         white = self._noise.standard_normal((n, len(JOINTS))) * settings.ripple_nm
         return _first_order(np.sqrt(1.0 - memory**2) / (1.0 - memory) * white, 1.0 - memory, self._ripple)
-
-    def _warm(self, torque: NDArray, period: float) -> NDArray:
-        """Return the motors' temperature, driven by the square of their torque, (n, J) °C."""
-        settings = self.settings.temperature
-        final = settings.ambient_c + settings.heating_c_nm2 * torque**2
-        return _first_order(final, period / settings.time_constant_s, self._temperature)
 
     def _felt(self, human_torque: NDArray, truth: NDArray) -> NDArray:
         forces = cuff_forces(human_torque, truth[:, Q], self.settings)
@@ -206,22 +202,32 @@ def _first_order(wanted, share, state):
 
 
 @njit(cache=True)
-def _run(a: Assembly, d, w, s, loop, first, period, reference, enabled, of_human):
+def _run(a: Assembly, d, w, s, loop, first, period, reference, enabled, of_human, warming):
     """Carry the loop on along set-points (n, J).
 
-    Returns measured angle, speed and torque (n, J), truth (n, 4, J), and the torque that the terms marked in
-    ``of_human`` take of the drives' (n, J).
+    ``warming`` is the temperature of the room (°C), the final rise per squared torque, and the rise's time constant.
+
+    Returns measured angle, speed and torque (n, J), the motors' temperature (n, J), truth (n, 4, J), and the torque
+    that the terms marked in ``of_human`` take of the drives' (n, J).
     """
+    ambient, heating, time_constant = warming
     n, joints = reference.shape
     angle, speed, torque = np.empty((n, joints)), np.empty((n, joints)), np.empty((n, joints))
-    truth, human = np.empty((n, 4, joints)), np.zeros((n, joints))
+    truth, human, temperature = np.empty((n, 4, joints)), np.zeros((n, joints)), np.empty((n, joints))
     for k in range(n):
         t = (first + k) * period
         advance(a, d, w, s, loop, t, reference[k], enabled, angle[k], speed[k], torque[k], truth[k])
-        at = Instant(t + 0.5 * period, truth[k, Q], truth[k, DQ], truth[k, 2], np.sign(truth[k, DQ]), loop.load)
+        temperature[k] = a.temperature
+        for j in range(joints):
+            final = ambient + heating * torque[k, j] ** 2
+            a.temperature[j] += period / time_constant * (final - a.temperature[j])
+        direction = np.sign(truth[k, DQ])
+        at = Instant(
+            t + 0.5 * period, truth[k, Q], truth[k, DQ], truth[k, 2], direction, loop.load, temperature[k]
+        )  # fmt: skip
         for i in range(a.bounds[4]):
             if of_human[i]:
                 values = a.values[a.value_at[i] : a.value_at[i + 1]]
                 state = loop.memory[a.state_at[i] : a.state_at[i + 1]]
                 reaction_at(a.reactions[i])(at, state, values, a.geometry, a.joint[i], human[k])
-    return angle, speed, torque, truth, human
+    return angle, speed, torque, temperature, truth, human

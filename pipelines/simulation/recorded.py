@@ -10,7 +10,7 @@ from pipelines.contracts import Joint
 from pipelines.contracts.joints import the
 from pipelines.dynamics.pd_loop import Drives, LoopState, follow, loop_at_rest, make_drives, read_encoders
 from pipelines.dynamics.plant import Plant
-from pipelines.dynamics.replay import EVERY_S, WINDOW_S, ReplayResult
+from pipelines.dynamics.replay import EVERY_S, WINDOW_S, ReplayResult, known_temperature
 from pipelines.mechanics.motion import Motion
 
 NO_LIMIT_NM = 1e9
@@ -54,14 +54,15 @@ def follow_references(plant: Plant, motion: Motion) -> UnderReferences:
 
     Every segment begins in its recorded state; ``why_no_closed_loop`` must have nothing to say.
     """
-    drives = _drives(motion)
+    drives, temperature = _drives(motion), known_temperature(motion)
     simulated = [np.full(motion.q.shape, np.nan) for _ in range(3)]
     assert motion.reference is not None
     for segment in motion.segments():
         period = 1.0 / motion.sample_rate_hz
         loop = _loop_as_recorded(plant, motion, segment.start, period)
         reference = np.ascontiguousarray(motion.reference[segment])
-        told = follow(plant.assembly, drives, loop, reference, motion.time[segment.start] - 0.5 * period)
+        begin = motion.time[segment.start] - 0.5 * period
+        told = follow(plant.assembly, drives, loop, reference, begin, temperature[segment])
         for whole, part in zip(simulated, told, strict=False):
             whole[segment] = part
     angle, velocity, torque = simulated

@@ -17,12 +17,16 @@ RICH = FourierTrajectory(
 
 @pytest.fixture(scope="session")
 def with_human():
-    """One period with exact derivatives, under a torque that changes sign."""
+    """One period with exact derivatives, under a torque that changes sign and from motors that warm."""
     time = np.arange(0.0, 10.0, 0.005)
     q, dq, ddq = RICH.at(time)
     torque = 25.0 * np.sin(q) + 4.0 * ddq
     everywhere = np.ones(len(time), dtype=bool)
-    return Motion(time, q, dq, ddq, torque, np.zeros(len(time), dtype=np.int64), everywhere, run="with_human")
+    temperature = np.column_stack([26.0 + 0.5 * time, 28.0 + 0.8 * time])
+    return Motion(
+        time, q, dq, ddq, torque, np.zeros(len(time), dtype=np.int64), everywhere, run="with_human",
+        temperature=temperature,
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="session")

@@ -18,7 +18,7 @@ BY_NAME = {effect.name: effect for effect in EFFECTS}
 
 def test_every_cause_is_an_effect_and_every_effect_a_cause_or_the_baseline():
     causes = {row[0].strip("`") for row in ROWS}
-    assert len(causes) == 25
+    assert len(causes) == 31
     assert {effect.name for effect in EFFECTS} == causes | {"rigid_body", "friction"}
 
 

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from pipelines.contracts import Joint
 from pipelines.dynamics.assembly import assemble
 from pipelines.dynamics.forward import DQ, DTHETA, accelerations, workspace
-from pipelines.effects import EFFECTS, Side
+from pipelines.effects import EFFECTS, LAWS, Effect, Family, Side
 from pipelines.effects.friction import Friction
 from pipelines.effects.outside import STATED
 from pipelines.effects.parallel_spring import ParallelSpring
@@ -43,6 +43,30 @@ def test_every_effect_says_what_it_is_and_how_to_make_sure(effect):
         assert parameter.default is None or parameter.default in (parameter.forms or (parameter.default,))
     defaults = [parameter.default is not None for parameter in effect().fitted]
     assert defaults == sorted(defaults), "values that may be left out come last"
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_every_effect_states_its_family_the_laws_that_contain_it_and_how_the_real_one_differs(effect):
+    assert "family" in vars(effect) and isinstance(effect.family, Family)
+    assert effect.resembles and set(effect.resembles) <= set(LAWS)
+    assert len(set(effect.resembles)) == len(effect.resembles)
+    assert effect.forms_differ and not effect.forms_differ.endswith(".")
+
+
+@pytest.mark.parametrize(
+    ("side", "family", "laws"),
+    [
+        (Side.STRUCTURE, Family.ANGLE, ("angle", "both_angles")),
+        (Side.DRIVE, Family.SPEED, ("speed",)),
+        (Side.SENSOR, Family.SENSOR, ("angle", "load")),
+        (Side.HUMAN, Family.PERSON, ("angle", "both_angles", "speed")),
+    ],
+)
+def test_an_effect_that_states_no_family_has_that_of_its_side(side, family, laws):
+    silent = type("Silent", (Effect,), {"side": side})
+    assert (silent.family, silent.resembles, silent.forms_differ) == (family, laws, "")
+    told = type("Told", (Effect,), {"side": side, "family": Family.TIME})
+    assert told.resembles == ("time", "friction_over_time")
 
 
 @every(TERMS)
@@ -109,6 +133,7 @@ def test_forward_dynamics_undo_inverse_dynamics(term, with_human):
     for k in range(3, len(with_human), 97):
         q, dq = with_human.q[k], with_human.dq[k]
         state = np.array([q, dq, q, dq])
+        a.temperature[:] = with_human.motor_temperature[k]
         accelerations(a, w, with_human.time[k], state, memory, np.sign(dq), load[k], torque[k], rates)
         assert_allclose(rates[[DQ, DTHETA]], [with_human.ddq[k]] * 2, atol=1e-8)
 

@@ -80,7 +80,8 @@ def torque(made, states, *, measured=False, memory=0.3):
 
     ``measured`` asks for what the torque channels say instead. Memories hold ``memory``.
     """
-    terms = [t for t in made.model if t.effect.spring is None and not t.effect.reading_states]
+    untold = ("spring", "reading_states", "needs_temperature")
+    terms = [t for t in made.model if not any(getattr(t.effect, what) for what in untold)]
     names = [joint.name for joint in made.joints]
     on_links = [t for t in terms if t.effect.side in (Side.STRUCTURE, Side.HUMAN)]
     on_drives = [t for t in terms if t.effect.side is Side.DRIVE]
@@ -93,12 +94,14 @@ def torque(made, states, *, measured=False, memory=0.3):
             joint = names.index(term.effect.joint) if term.effect.joint else -1
             state = np.full(term.effect.states, memory)
             for k in range(len(states.t)):
-                at = Instant(states.t[k], angle[k], states.dq[k], states.ddq[k], np.sign(states.dq[k]), load[k])
+                at = Instant(
+                    states.t[k], angle[k], states.dq[k], states.ddq[k], np.sign(states.dq[k]), load[k], load[k]
+                )
                 term.effect.reaction(at, state, term.values, made.geometry.array(), joint, tau[k])
     for term in (t for t in terms if measured and t.effect.torque_reading is not None):
         for k in range(len(states.t)):
             joint = names.index(term.effect.joint)
-            term.effect.torque_reading(states.t[k], tau[k], term.values, joint, np.zeros(0))
+            term.effect.torque_reading(states.t[k], tau[k], term.values, joint, np.zeros(0), np.zeros(2))
     return tau
 
 

@@ -65,7 +65,7 @@ def test_control_is_the_torque_that_the_channel_would_say(order, states, drive):
     said = drive.copy()
     for term in (t for t in made.model if t.effect.side is Side.SENSOR):
         for k in range(len(said)):
-            term.effect.torque_reading(states.t[k], said[k], term.values, 1, np.zeros(0))
+            term.effect.torque_reading(states.t[k], said[k], term.values, 1, np.zeros(0), np.zeros(2))
     agree(simulated(made, states, said), acceleration(made, states, drive)[0])
 
 

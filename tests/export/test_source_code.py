@@ -107,7 +107,7 @@ def test_a_memory_moves_as_ours_does(library, octave, models, states):
     expected, found = np.zeros((len(at.t), 1)), np.zeros((len(at.t), 1))
     memory = np.full(1, 0.3)
     for k in range(len(at.t)):
-        now = Instant(at.t[k], at.q[k], at.dq[k], np.zeros(2), np.sign(at.dq[k]), np.zeros(2))
+        now = Instant(at.t[k], at.q[k], at.dq[k], np.zeros(2), np.sign(at.dq[k]), np.zeros(2), np.zeros(2))
         term.effect.derivative(now, memory, term.values, made.geometry.array(), 1, expected[k])
         arrays = [np.ascontiguousarray(part[k]) for part in (at.q, at.dq)]
         library[f"{stem}_memory_rate"](

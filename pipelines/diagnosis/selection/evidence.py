@@ -199,11 +199,11 @@ def _of_cause(
     resembles = list(_resembled(effect, laws, names, two))
     total = sum(v for _, v in resembles)
     return Element(
-        effect.label, effect.name, effect.joint, family_of(effect), False, places,
+        effect.label, effect.name, effect.joint, str(effect.family), False, places,
         [1.0 / len(places)] * len(places), at.derivatives[number].tolist(),
         [p for p, _ in resembles], [v / total for _, v in resembles],
         cause.amplitudes[_positive(cause)].tolist(),
-        not effect.goes_with_time and family_of(effect) != TIME, cause.first, effect.each_run,
+        not effect.goes_with_time and effect.family != TIME, cause.first, effect.each_run,
         effect.run is not None, place=number,
     )  # fmt: skip
 
@@ -211,6 +211,8 @@ def _of_cause(
 def _positive(cause: Cause) -> list[int]:
     """Return which of the effect's amplitudes are never negative."""
     effect, bends = cause.candidate.effect, cause.candidate.bends
+    if cause.candidate.directions:
+        return []
     if bends:
         # A column is the effect at its shape: turned over, it would be a spring that pushes.
         free = [p for p in effect.shape if p.default is None]
@@ -220,39 +222,10 @@ def _positive(cause: Cause) -> list[int]:
     return [i for i, p in enumerate(effect.linear) if p.typical[0] >= 0]
 
 
-RESEMBLES = {
-    "stribeck_friction": ("speed",), "coulomb_asymmetry": ("speed",),
-    "viscous_asymmetry": ("speed",), "quadratic_drag": ("speed",),
-    "load_dependent_friction": ("load", "speed"),
-    "presliding_hysteresis": ("speed", "friction_by_angle"),
-    "friction_warmup": ("friction_over_time", "speed"), "cogging": ("angle",),
-    "parallel_spring": ("angle", "speed"), "passive_joint_torque": ("angle",),
-    "rotor_inertia": ("inertia_by_angle",),
-    "backlash": ("load", "angle", "speed", "inertia_by_angle"),
-    "joint_elasticity": ("load", "angle", "speed", "inertia_by_angle", "other_load"),
-    "time_delay": ("load", "speed", "inertia_by_angle"),
-    "base_tilt": ("angle", "other_angle", "both_angles"),
-    "encoder_offset": ("angle", "other_angle", "both_angles"),
-    "mass_off_axis": ("angle", "both_angles", "inertia_by_angle"),
-    "payload_change": ("angle", "both_angles", "time"),
-    "torque_gain": ("load", "gain_over_time"), "torque_drift": ("time",),
-    "voluntary_torque": ("time",), "spasticity": ("speed",),
-    "cuff_compliance": (
-        "angle", "load", "speed", "inertia_by_angle", "other_load", "both_angles"
-    ),
-    "rotor_coupling": ("inertia_by_angle",),
-}  # fmt: skip
-
-
-def family_of(effect: Effect) -> str:
-    """Return the family that an effect belongs to."""
-    return str(effect.side)
-
-
 def _resembled(effect: Effect, laws: Laws, names: Sequence[str], two: bool):
     """Yield place and variance of the laws that an effect's true form may differ by."""
     wearer = "human" if effect.on_limb and two else "all"
-    for kind in RESEMBLES.get(effect.name, ()):
+    for kind in effect.resembles:
         for j, name in enumerate(names):
             if effect.joint in (None, name):
                 yield from laws.get((kind, j, "all" if kind == TIME else wearer), [])

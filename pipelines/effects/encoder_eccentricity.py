@@ -1,0 +1,109 @@
+"""An encoder that does not turn about the joint's own axis."""
+
+from collections.abc import Sequence
+from math import cos, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.effects.effect import Effect, Family, Parameter, Side
+from pipelines.effects.kernel import reading
+from pipelines.mechanics.machine import Machine
+from pipelines.mechanics.motion import Motion
+
+NEWTON_STEPS = 8
+"""From the measured angle to the true one; each squares the error, which begins below 0.1 rad."""
+PHASE = (-np.pi, np.pi)
+
+
+class EncoderEccentricity(Effect):
+    """The measured angle errs once a turn, and twice where tracks or windings are unequal.
+
+    Over less than half a turn the errors resemble an encoder's offset and a scale of the angle.
+    """
+
+    name = "encoder_eccentricity"
+    title = "Encoder eccentricity"
+    side = Side.SENSOR
+    family = Family.SENSOR
+    resembles = ("angle", "other_angle", "both_angles", "inertia_by_angle", "friction_by_angle")
+    forms_differ = "a real scale also errs at higher multiples of a turn, and where it was spliced"
+    equation = "measured angle = q + a sin(q + phi) + b sin(2 q + psi), q the true angle"
+    source = "Lu, Graetz, Amin-Shahidi, Smeds (2010), CIRP Annals 59(1): self-calibrated encoders"
+    looks_like = "gravity and inertia torques off by a share that changes along the joint's way"
+    confirm = "turn the joint to marks of known angle all the way round, and read the encoder"
+    shape = (
+        Parameter("sine", "rad", "amplitude of sin(q)", "A1", (-0.06, 0.06)),
+        Parameter("cosine", "rad", "amplitude of cos(q)", "B1", (-0.06, 0.06)),
+        Parameter("sine_twice", "rad", "amplitude of sin(2 q)", "A2", (-0.03, 0.03), default=0.0),
+        Parameter("cosine_twice", "rad", "amplitude of cos(2 q)", "B2", (-0.03, 0.03), default=0.0),
+    )
+    reported = (
+        Parameter("amplitude", "rad", "of the error once a turn", "a", (0.005, 0.06)),
+        Parameter("phase", "rad", "of that error at angle zero", "phi", PHASE),
+        Parameter("amplitude_twice", "rad", "of that twice a turn", "b", (0.0, 0.03), default=0.0),
+        Parameter("phase_twice", "rad", "of that at angle zero", "psi", PHASE, default=0.0),
+    )
+
+    @classmethod
+    def possible(cls, machine: Machine) -> list[str | None]:
+        """Return the joints that turn: what slides has no turns."""
+        joints = super().possible(machine)
+        return [name for name in joints if name and machine.joint(name).kind == "revolute"]
+
+    @reading
+    def reading(angle, values, joint):
+        """Add A1 sin q + B1 cos q + A2 sin 2q + B2 cos 2q."""
+        q = angle[joint]
+        once = values[0] * sin(q) + values[1] * cos(q)
+        angle[joint] = q + once + values[2] * sin(2.0 * q) + values[3] * cos(2.0 * q)
+
+    def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
+        """Return the motion with the true angle, speed and acceleration."""
+        values, j = self.completed(shape), self.column(motion)
+        q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
+        true = q[:, j].copy()
+        for _ in range(NEWTON_STEPS):
+            error, slope, _ = _errors(true, values)
+            true -= (true + error - q[:, j]) / (1.0 + slope)
+        _, slope, curvature = _errors(true, values)
+        q[:, j] = true
+        dq[:, j] /= 1.0 + slope
+        ddq[:, j] = (ddq[:, j] - curvature * dq[:, j] ** 2) / (1.0 + slope)
+        return motion.with_state(q, dq, ddq)
+
+    def directions(self, motions: Sequence[Motion]) -> tuple[tuple[tuple[float, ...], ...], ...]:
+        """Return sine and cosine once a turn, and the same with those twice a turn."""
+        units = 0.01 * np.eye(4)
+        every = tuple(tuple(unit.tolist()) for unit in units)
+        return every[:2], every
+
+    def physical(self, values: NDArray) -> NDArray:
+        """Return amplitude and phase, once and twice a turn."""
+        sines, cosines = np.reshape(values, (2, 2)).T
+        return np.column_stack([np.hypot(sines, cosines), np.arctan2(cosines, sines)]).ravel()
+
+    def values_from(self, physical: NDArray) -> NDArray:
+        """Return the amplitudes of sines and cosines."""
+        amplitudes, phases = np.reshape(physical, (2, 2)).T
+        return np.column_stack([amplitudes * np.cos(phases), amplitudes * np.sin(phases)]).ravel()
+
+    def jacobian(self, values: NDArray) -> NDArray:
+        """Return how amplitudes and phases change; an error that is zero has no phase to change."""
+        jacobian = np.zeros((4, 4))
+        for k in (0, 2):
+            sine, cosine = values[k : k + 2]
+            if (amplitude := np.hypot(sine, cosine)) > 0.0:
+                jacobian[k, k : k + 2] = sine / amplitude, cosine / amplitude
+                jacobian[k + 1, k : k + 2] = -cosine / amplitude**2, sine / amplitude**2
+        return jacobian
+
+
+def _errors(q: NDArray, values: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Return the encoder's error at true angles (n,), its slope and its curvature, (n,) each."""
+    (s1, c1), (s2, c2) = ((np.sin(k * q), np.cos(k * q)) for k in (1, 2))
+    a1, b1, a2, b2 = values
+    error = a1 * s1 + b1 * c1 + a2 * s2 + b2 * c2
+    slope = a1 * c1 - b1 * s1 + 2.0 * (a2 * c2 - b2 * s2)
+    curvature = -a1 * s1 - b1 * c1 - 4.0 * (a2 * s2 + b2 * c2)
+    return error, slope, curvature

@@ -1,0 +1,43 @@
+"""Friction that depends on the temperature of the drive."""
+
+from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
+from pipelines.effects.kernel import reaction
+from pipelines.mechanics.instant import REFERENCE_C
+
+
+class FrictionTemperature(Effect):
+    """Friction that changes in proportion to the recorded temperature, in all runs alike.
+
+    The baseline's friction is then that at 25 °C. A run without temperatures cannot show it. The
+    virtual rig warms by its own ``[plant.temperature]``; other simulations take the recorded
+    temperature, or 25 °C where there is none.
+    """
+
+    name = "friction_temperature"
+    title = "Friction and temperature"
+    side = Side.DRIVE
+    family = Family.TIME
+    resembles = ("friction_over_time", "speed")
+    forms_differ = "viscosity falls exponentially, and the motor warms before the gear does"
+    needs_temperature = True
+    equation = "tau = (cv v + cs sgn(v)) (T - 25 °C), T the recorded temperature"
+    source = "Bittencourt, Wernholt, Sander-Tavallaey, Brogårdh (2010), IROS: load and temperature"
+    looks_like = "residual in step with speed whose size follows the motor's temperature"
+    confirm = "repeat one motion from cold to warm, and plot friction against the temperature"
+    linear = (
+        Parameter(
+            "viscous_per_degree",
+            "N·m·s/(rad·°C)",
+            "of viscous friction",
+            "cv",
+            (-0.4, 0.1),
+        ),
+        Parameter("coulomb_per_degree", "N·m/°C", "of Coulomb friction", "cs", (-0.2, 0.1)),
+    )
+    parity = Parity.ODD
+
+    @reaction
+    def reaction(at, state, values, geometry, joint, out):
+        """Add (cv v + cs sgn v) (T - 25 °C) at the joint."""
+        level = values[0] * at.dq[joint] + values[1] * at.direction[joint]
+        out[joint] += level * (at.temperature[joint] - REFERENCE_C)
