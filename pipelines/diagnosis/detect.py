@@ -3,12 +3,13 @@
 An effect of magnitude theta adds theta c to the measured torques; the baseline takes up its share P c and
 leaves theta (I - P) c. With each output's rows divided by its noise and multiplied by the root of the share
 of independent samples, the log likelihood that naming the effect gains is half a noncentral chi-square of
-noncentrality theta^2 |(I - P) c|^2. It is named where that gain exceeds its price (``search.cost``), so
+noncentrality theta^2 |(I - P) c|^2. It is named where that gain exceeds its price: the prior odds against
+a cause, and half the logarithm of the independent samples for each amplitude. So
 
     theta_min = (z_a + z_b) / |(I - P) c|
 
-with z_a^2 twice the price and z_b for the power asked for. What is named must also be material: the smallest
-size is at least the one that takes away ``MATERIAL`` of a joint's error.
+with z_a^2 twice the price and z_b for the power asked for. A good rig shows a little of every cause
+(``Criteria.background_cause``), so the smallest size also exceeds that by as much.
 """
 
 import itertools
@@ -29,16 +30,14 @@ from pipelines.diagnosis.candidates import (
     proposals,
     torque_columns,
 )
-from pipelines.diagnosis.choice import MATERIAL, NEEDED
+from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evaluate import evaluate
 from pipelines.diagnosis.fit import fit
-from pipelines.diagnosis.floor import MOST_INDEPENDENT, Floor, noise_floor
+from pipelines.diagnosis.floor import Floor, noise_floor
 from pipelines.diagnosis.gram import solve
-from pipelines.diagnosis.imperfection import imperfection
 from pipelines.diagnosis.known import known_effects
 from pipelines.diagnosis.observations import Baseline, Run, baseline_of, observe, with_load
-from pipelines.diagnosis.scan import BENDING, values_in, values_of
-from pipelines.diagnosis.search import SHAPE_COST
+from pipelines.diagnosis.shape_grid import BENDING, values_in, values_of
 from pipelines.diagnosis.session import refuse_unfit
 from pipelines.diagnosis.thinned import thinned
 from pipelines.effects import Effect, Parameter
@@ -136,8 +135,6 @@ class Sight:
     """(O,) root of the independent share over the noise and what a good rig leaves; nought without such an output."""
     noise: NDArray
     """(O,) N·m."""
-    imperfect: NDArray
-    """(O,) N·m that even a good rig leaves."""
     independent: float
     """Independent samples of the output that has most."""
     basis: NDArray
@@ -151,15 +148,16 @@ class Sight:
         untouched = tuple(columns_under((), run, baseline)[0] for run in runs)
         plain = gram_of_runs(runs, untouched)
         there = np.isfinite(floor.rms) & (floor.rms > 0)
-        noise, imperfect = np.where(there, floor.rms, 1.0), imperfection(runs)
-        share = np.minimum(floor.independent_share, MOST_INDEPENDENT)
-        root = np.where(there, np.sqrt(share) / np.hypot(noise, imperfect), 0.0)
+        noise, share = np.where(there, floor.rms, 1.0), floor.independent_share
+        drives = len(noise) // 2
+        counts = np.repeat([CRITERIA.drive_weight, CRITERIA.cuff_weight], drives)
+        root = np.where(there, np.sqrt(counts * share) / noise, 0.0)
         independent = float(np.max(share * plain.count.sum(axis=0)))
         values = solve(plain, root**2)
         loaded = tuple(with_load(run, baseline, values) for run in runs)
         torque = np.concatenate([(c @ values)[run.valid] for run, c in zip(runs, untouched, strict=True)])
         rms = np.sqrt(np.mean(torque**2, axis=0))
-        sight = cls(loaded, baseline, untouched, values, root, noise, imperfect, independent, np.zeros((0, 0)), rms)
+        sight = cls(loaded, baseline, untouched, values, root, noise, independent, np.zeros((0, 0)), rms)
         return replace(sight, basis=np.linalg.qr(sight.rows(untouched))[0])
 
     def rows(self, columns: Sequence[NDArray]) -> NDArray:
@@ -181,6 +179,10 @@ class Sight:
     def joint(self, effect: Effect) -> int:
         """Return the joint at which an effect's size is told: a whole machine's at its first."""
         return max(effect.column(self.runs[0].motion), 0)
+
+    def share(self, effect: Effect, column: Sequence[NDArray]) -> float:
+        """Return the share of the joint's torque that a column (m, O, 1) makes."""
+        return self.rms(effect, column) / max(float(self.torque_rms[self.joint(effect)]), np.finfo(float).tiny)
 
     def rms(self, effect: Effect, column: Sequence[NDArray]) -> float:
         """Return the rms (N·m) of a column (m, O, 1) at the effect's joint, over the runs in which it acts."""
@@ -321,7 +323,7 @@ def _added(candidate: Candidate, sight: Sight, power: float) -> Look:
     own = candidate.columns_in([run.motion.run for run in sight.runs])
     span = sight.left([own.expand(column, r) for r, column in enumerate(columns)])
     left = sight.left(direction)[:, 0]
-    growth, by = _growth(effect, left, sight.rows(direction)[:, 0], span.shape[1], sight, power)
+    growth, by = _growth(effect, left, direction, span.shape[1], sight, power)
     size, unit = float(np.sqrt(growth)), sight.rms(effect, direction)
     least, largest = np.sort(np.abs(effect.linear[0].typical))
     if effect.linear[0].typical[0] < 0:
@@ -379,7 +381,7 @@ def _bent(candidate: Candidate, sight: Sight, power: float) -> Look:
         shape = zero + (start - zero) / reach * np.exp(x)
         column = _bend(replace(candidate, shapes=(tuple(shape),) * len(sight.runs)), sight)
         left = sight.left(column)[:, 0]
-        growth, by = _growth(effect, left, sight.rows(column)[:, 0], 1, sight, power)
+        growth, by = _growth(effect, left, column, 1, sight, power)
         return growth, by, left, column, float(effect.physical(effect.completed(shape))[0])
 
     x0 = float(np.log(reach))
@@ -410,24 +412,19 @@ def _bend(candidate: Candidate, sight: Sight) -> list[NDArray]:
     ]
 
 
-def _growth(effect: Effect, left: NDArray, raw: NDArray, columns: int, sight: Sight, power: float) -> tuple[float, str]:
+def _growth(
+    effect: Effect, left: NDArray, column: Sequence[NDArray], columns: int, sight: Sight, power: float
+) -> tuple[float, str]:
     """Return the factor by which an effect's square must grow to be named, and what asks for it."""
-    if _squared(left) <= NOTHING * _squared(raw):
+    if _squared(left) <= NOTHING * _squared(sight.rows(column)[:, 0]):
         return np.inf, "noise"
-    price = NEEDED + SHAPE_COST * len(effect.shape) + 0.5 * columns * np.log(sight.independent)
+    price = 0.5 * columns * np.log(sight.independent) - CRITERIA.cause
     by_noise = needed_noncentrality(columns, price, power) / _squared(left)
-    by_size = min(_material(left, sight))
-    return (by_noise, "noise") if by_noise >= by_size else (by_size, "materiality")
-
-
-def _material(left: NDArray, sight: Sight) -> Iterator[float]:
-    """Yield for each joint the growth of the square that makes an effect worth naming there."""
-    outputs = sight.outputs()
-    for j in range(len(sight.baseline.joints)):
-        rows = outputs == j
-        square = np.mean((left[rows] / sight.root[j]) ** 2) if sight.root[j] and rows.any() else 0.0
-        asked = max(sight.noise[j] ** 2 * (1.0 / (1.0 - MATERIAL) ** 2 - 1.0), sight.imperfect[j] ** 2)
-        yield asked / square if square > 0 else np.inf
+    # A good rig has a little of the effect, as if its amplitude were known to so much.
+    by_background = 2.0 * price * (CRITERIA.background_cause / sight.share(effect, column)) ** 2
+    if by_noise >= by_background:
+        return by_noise, "noise"
+    return by_background, "materiality"
 
 
 def _usual(looks: list[Look]) -> Look:

@@ -94,8 +94,17 @@ def _grid(
 def _tried(effect: Effect, parameter: Parameter, few: int, runs: Sequence[Run]) -> NDArray:
     if effect.swings and parameter.unit in HARDENING:
         return np.array([parameter.default])
-    values = values_of(parameter, few)
+    values = values_in(effect, parameter, few, runs)
     return values[values >= lowest(effect, parameter, runs)]
+
+
+def values_in(effect: Effect, parameter: Parameter, count: int, runs: Sequence[Run]) -> NDArray:
+    """Return the values of an effect's shape parameter that are tried on some runs."""
+    if not parameter.swept or effect.joint is None:
+        return values_of(parameter, count)
+    j = runs[0].motion.joint_index(effect.joint)
+    angles = np.concatenate([run.state[0][:, j] for run in runs])
+    return np.linspace(np.min(angles), np.max(angles), count + 2)[1:-1]
 
 
 def values_of(parameter: Parameter, count: int) -> NDArray:
