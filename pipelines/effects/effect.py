@@ -24,7 +24,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.effects.kernel import columns_along, columns_along_with_memory, read_along
+from pipelines.effects.kernel import address, columns_along, columns_along_with_memory, read_along
 from pipelines.mechanics.machine import THE_LEG, Machine
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.run import RUNS
@@ -387,11 +387,11 @@ class Effect(ABC):
         arrays = [np.ascontiguousarray(array) for array in of_motion]
         joint, geometry, joints = self.column(motion), motion.geometry.array(), len(motion.joints)
         if self.derivative is None:
-            columns_along(self.reaction, values, joint, *arrays, geometry, np.zeros(2 * joints), out)
+            columns_along(address(self.reaction), values, joint, *arrays, geometry, np.zeros(2 * joints), out)
             return
         for stretch in motion.segments():
             columns_along_with_memory(
-                self.reaction, self.derivative, values, joint, *(a[stretch] for a in arrays), geometry,
+                address(self.reaction), address(self.derivative), values, joint, *(a[stretch] for a in arrays), geometry,
                 np.zeros((11, joints)), np.zeros((3, self.states)), out[stretch],
             )  # fmt: skip
 
@@ -423,7 +423,7 @@ class Effect(ABC):
         time, temperature = (np.ascontiguousarray(x) for x in (motion.time, motion.motor_temperature))
         for stretch in motion.segments():
             read_along(
-                self.torque_reading, values, joint, time[stretch], temperature[stretch], torque[stretch],
+                address(self.torque_reading), values, joint, time[stretch], temperature[stretch], torque[stretch],
                 np.zeros(len(motion.joints)), np.zeros(self.reading_states), out[stretch],
             )  # fmt: skip
         return out

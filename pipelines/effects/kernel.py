@@ -6,6 +6,7 @@ signature, so that the dynamics can hold a tuple of them without being compiled 
 """
 
 import warnings
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -70,6 +71,7 @@ def _at_any_temperature(kernel):
     return torque_reading
 
 
+@cache
 def address(kernel) -> int:
     """Return where a kernel's machine code stands in memory.
 
@@ -105,17 +107,15 @@ torque_reading_at = _kernel_at(TORQUE_READING)
 _table = float64[:, ::1]
 _columns = float64[:, :, ::1]
 _MOTION = (vector, *(_table,) * 5, vector)  # time, q, dq, ddq, load, temperature, geometry
-# Signatures are spelt out so that one compilation serves every effect: the kernel is an argument.
-_ALONG = void(types.FunctionType(REACTION), vector, int64, *_MOTION, vector, _columns)
-_ALONG_WITH_MEMORY = void(
-    types.FunctionType(REACTION), types.FunctionType(DERIVATIVE), vector, int64, *_MOTION, _table, _table, _columns
-)
+# Signatures are spelt out so that one compilation serves every effect: the kernel's address is an argument.
+_ALONG = void(int64, vector, int64, *_MOTION, vector, _columns)
+_ALONG_WITH_MEMORY = void(int64, int64, vector, int64, *_MOTION, _table, _table, _columns)
 _READ_ALONG = void(
-    types.FunctionType(TORQUE_READING), vector, int64, vector, _table, types.Array(float64, 3, "A"), vector, vector,
+    int64, vector, int64, vector, _table, types.Array(float64, 3, "A"), vector, vector,
     types.Array(float64, 3, "A"),
 )  # fmt: skip
 
-_SWING_ALONG = void(types.FunctionType(SPRING), vector, float64, float64, float64, *(vector,) * 4, vector)
+_SWING_ALONG = void(int64, vector, float64, float64, float64, *(vector,) * 4, vector)
 
 MEMORY_SUBSTEPS = 8
 """Steps per sample along a measured motion: a presliding state turns over within a few milliseconds."""
@@ -155,11 +155,12 @@ def _unit_columns(kernel, at, state, values, geometry, joint, torque, out):
 
 
 @njit(_ALONG, **ALLOCATING_NOTHING)
-def columns_along(kernel, values, joint, time, q, dq, ddq, load, temperature, geometry, scratch, out):
-    """Evaluate a reaction kernel without memory along a motion, into ``out`` (n, J, p) N·m per unit.
+def columns_along(where, values, joint, time, q, dq, ddq, load, temperature, geometry, scratch, out):
+    """Evaluate the reaction kernel at an address along a motion, into ``out`` (n, J, p) N·m per unit.
 
-    ``values`` are zero but for the shape; ``scratch`` has room for 2 J.
+    It has no memory. ``values`` are zero but for the shape; ``scratch`` has room for 2 J.
     """
+    kernel = reaction_at(where)
     joints = q.shape[1]
     direction, torque = scratch[:joints], scratch[joints:]
     for k in range(q.shape[0]):
@@ -194,13 +195,16 @@ def _advance(rate, at, ahead, h, state, middle, slope, values, geometry, joint):
 
 @njit(_ALONG_WITH_MEMORY, **ALLOCATING_NOTHING)
 def columns_along_with_memory(
-    kernel, rate, values, joint, time, q, dq, ddq, load, temperature, geometry, scratch, memory, out
+    where, where_rate, values, joint, time, q, dq, ddq, load, temperature, geometry, scratch, memory, out
 ):
-    """Evaluate a reaction kernel along one unbroken stretch, its memory settled, into ``out`` (n, J, p).
+    """Evaluate the reaction kernel at an address along one unbroken stretch, into ``out`` (n, J, p).
+
+    The rate of its memory, which settles first, is the kernel at the other address.
 
     Between samples the motion is taken as linear in time. ``scratch`` is (11, J), ``memory`` (3, states), the
     first row zero.
     """
+    kernel, rate = reaction_at(where), derivative_at(where_rate)
     state, middle, slope = memory[0], memory[1], memory[2]
     now, later = scratch[:5], scratch[5:10]
     if q.shape[0] > 1:
@@ -226,11 +230,12 @@ def columns_along_with_memory(
 
 
 @njit(_READ_ALONG, **ALLOCATING_NOTHING)
-def read_along(kernel, values, joint, time, temperature, torque, at_once, state, out):
+def read_along(where, values, joint, time, temperature, torque, at_once, state, out):
     """Write what a sensor makes of p torques (n, J, p) of one unbroken stretch into ``out`` (n, J, p), N·m.
 
-    ``at_once`` has room for J, ``state`` for the sensor's memory.
+    The sensor is the kernel at an address; ``at_once`` has room for J, ``state`` for its memory.
     """
+    kernel = torque_reading_at(where)
     for i in range(torque.shape[2]):
         state[:] = 0.0
         for k in range(torque.shape[0]):
@@ -255,14 +260,16 @@ def _twist_at_rest(kernel, values, torque, stiffness):
 
 
 @njit(_SWING_ALONG, **ALLOCATING_NOTHING)
-def swing_along(kernel, values, ratio, least, h, torque, inertia, damping, stiffness, out):
+def swing_along(where, values, ratio, least, h, torque, inertia, damping, stiffness, out):
     """Let a load swing on a spring along one unbroken stretch, from rest, the twist (n,) rad into ``out``.
 
     inertia twist'' + damping twist' + stiffness twist + spring(twist, twist') = torque, each but the spring given
     by sample and linear between samples; ``ratio`` is that of damping added to what the spring has, ``least`` the
     inertia that any load has: a fit may make it negative where a light link hardly shows. The midpoint
     rule, linearised at each step's begin, neither damps nor excites, and is stable however stiff the spring.
+    The spring is the kernel at an address.
     """
+    kernel = spring_at(where)
     twist, rate = _twist_at_rest(kernel, values, torque[0], stiffness[0]), 0.0
     out[0] = twist
     s = h / SWING_SUBSTEPS

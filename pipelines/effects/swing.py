@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.effects.effect import Effect
-from pipelines.effects.kernel import swing_along
+from pipelines.effects.kernel import address, swing_along
 from pipelines.mechanics.load import Load
 from pipelines.mechanics.motion import Motion
 from pipelines.signals.low_pass import derivative, low_pass, shortest
@@ -45,7 +45,7 @@ def behind_spring(
     moved = [state.copy() for state in (motion.q, motion.dq, motion.ddq)]
     for stretch in motion.segments():
         parts = (part[stretch] for part in along)
-        swing_along(effect.spring, np.array(values, dtype=float), ratio, least, h, *parts, twist[stretch])
+        swing_along(address(effect.spring), np.array(values, dtype=float), ratio, least, h, *parts, twist[stretch])
         if stretch.stop - stretch.start < shortest(motion.sample_rate_hz, motion.cutoff_hz):
             continue
         turned = twist[stretch, np.newaxis] * direction[stretch, :][:, joints]

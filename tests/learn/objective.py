@@ -6,8 +6,8 @@ are weighed again, so that thousands of sessions can be scored many times.
 
 import json
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -113,12 +113,30 @@ def score(session: Session, criteria: Criteria) -> float:
     return float(np.log(max(p[session.right].sum() / p.sum(), FLOOR)))
 
 
-def scores(sessions: Sequence[Session], criteria: Criteria, pool: Executor | None = None) -> NDArray:
-    """Return the score of each session, (n,)."""
-    todo = [(session, criteria) for session in sessions]
-    found = pool.map(_scored, todo, chunksize=8) if pool else map(_scored, todo)
-    return np.array(list(found))
+class Scores:
+    """Scores many sessions on several processes, which have them from the beginning."""
+
+    def __init__(self, sessions: Sequence[Session], workers: int) -> None:
+        """Fork the processes: what they would otherwise be sent at each call is gigabytes."""
+        global _SESSIONS
+        _SESSIONS = sessions
+        self._pool = get_context("fork").Pool(workers)
+        self._count = len(sessions)
+
+    def __call__(self, criteria: Criteria) -> NDArray:
+        """Return the score of each session, (n,)."""
+        jobs = [(i, criteria) for i in range(self._count)]
+        return np.array(self._pool.map(_scored, jobs, chunksize=4))
+
+    def close(self) -> None:
+        """End the processes."""
+        self._pool.terminate()
+        self._pool.join()
 
 
-def _scored(job: tuple[Session, Criteria]) -> float:
-    return score(*job)
+_SESSIONS: Sequence[Session] = ()
+
+
+def _scored(job: tuple[int, Criteria]) -> float:
+    number, criteria = job
+    return score(_SESSIONS[number], criteria)

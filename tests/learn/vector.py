@@ -27,10 +27,10 @@ def _free(name: str, k: int) -> bool:
 
 def to_vector(criteria: Criteria) -> NDArray:
     """Return logarithms of positive numbers, and log odds as they are."""
-    return np.array([_scaled(value) for value in _values(criteria)])
+    return np.array([_scaled(value) for value in plain_values(criteria)])
 
 
-def _values(criteria: Criteria) -> list[float]:
+def plain_values(criteria: Criteria) -> list[float]:
     found: list[float] = []
     for field in fields(Criteria):
         value = getattr(criteria, field.name)

@@ -1,0 +1,92 @@
+"""``python -m tests.learn``: evidence of simulated sessions, and the criteria learned from it."""
+
+import json
+import os
+import time
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from pipelines.diagnosis.criteria import CRITERIA
+from tests.blind.seeds import RANGES
+from tests.learn.evidence import ONE_THREAD, write_evidence
+
+app = typer.Typer(add_completion=False, no_args_is_help=True)
+OUT = Annotated[Path, typer.Option(help="Folder of evidence and results.")]
+HERE = Path("build/learn")
+
+
+class World(StrEnum):
+    """Whose sessions."""
+
+    mujoco = "mujoco"
+    planar = "planar"
+    two_mass = "two_mass"
+    all = "all"
+
+
+@app.command()
+def evidence(
+    world: Annotated[World, typer.Option(help="Which world.")] = World.all,
+    cases: Annotated[int, typer.Option(min=1, help="Sessions of each world.")] = 400,
+    seed_base: Annotated[int, typer.Option(help="First seed.")] = RANGES["tuning"].start,
+    out: OUT = HERE,
+    workers: Annotated[int, typer.Option(min=1)] = os.cpu_count() or 1,
+) -> None:
+    """Write the evidence of simulated sessions; goes on where it was stopped."""
+    from tests.blind.cases import mixed
+
+    worlds = [w for w in World if w is not World.all] if world is World.all else [world]
+    planned = [mixed(cases, seed_base, world=w.value) for w in worlds]
+    # Turn about, so that a campaign that is stopped has as many of each world.
+    turns = [case for row in zip(*planned, strict=True) for case in row]
+    began, done = time.monotonic(), 0
+    for name in write_evidence(turns, out.resolve(), workers):
+        done += 1
+        pace = (time.monotonic() - began) / done
+        typer.echo(f"{done} {name} ({pace:.1f} s each)")
+
+
+@app.command()
+def fit(
+    out: OUT = HERE,
+    worlds: Annotated[str, typer.Option(help="Worlds to learn from, commas between.")] = "",
+    folds: Annotated[str, typer.Option(help="Folds of forms left out, commas between.")] = "",
+    most: Annotated[int, typer.Option(help="Sessions at most, of each world.")] = 100000,
+    workers: Annotated[int, typer.Option(min=1)] = os.cpu_count() or 1,
+    name: Annotated[str, typer.Option(help="Name of the result.")] = "learned",
+) -> None:
+    """Learn the criteria from stored evidence, and write them to OUT/NAME.json."""
+    from tests.learn.learning import learn
+
+    for variable in ONE_THREAD:
+        os.environ[variable] = "1"
+    chosen = [w for w in worlds.split(",") if w]
+    left_out = {int(f) for f in folds.split(",") if f}
+    result = learn(out.resolve(), chosen, left_out, most, workers, CRITERIA)
+    (out / f"{name}.json").write_text(json.dumps(result, indent=1))
+    typer.echo(json.dumps(result["criteria"], indent=1))
+
+
+@app.command()
+def show(out: OUT = HERE) -> None:
+    """Count the stored evidence."""
+    from tests.learn.objective import rows
+
+    counts: dict[tuple[str, str], int] = {}
+    seconds = []
+    for row in rows(out.resolve()):
+        truth = json.loads(row["truth"])
+        key = (row["world"], truth["case"]["category"])
+        counts[key] = counts.get(key, 0) + 1
+        seconds.append(row["seconds"])
+    for key, count in sorted(counts.items()):
+        typer.echo(f"{' '.join(key)}: {count}")
+    typer.echo(f"{np.median(seconds):.1f} s of processor time each")
+
+
+if __name__ == "__main__":
+    app()
