@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+PASSES = 3
+"""Passes in which outputs are weighted by their own errors."""
 RIDGE = 1e-9
 """Of a column's own square: keeps solves of nearly dependent sets finite."""
 
@@ -89,13 +91,11 @@ def error(gram: Gram, values: NDArray, folds: NDArray | None = None) -> NDArray:
     return np.maximum(gram.square[chosen].sum(axis=0) - 2 * linear + quadratic, 0.0)
 
 
-def held_out_error(gram: Gram, weights: NDArray) -> NDArray:
-    """Return the squared error of each fold under the fit to the others, summed: (O,)."""
-    folds = len(gram.square)
-    total = np.zeros(gram.square.shape[1])
-    for f in range(folds):
-        if gram.count[f].sum() == 0:
-            continue
-        others = np.array([g for g in range(folds) if g != f])
-        total += error(gram, solve(gram, weights, others), np.array([f]))
-    return total
+def weights_under(gram: Gram) -> NDArray:
+    """Return each output's inverse variance under the fit to all columns, iterated, (O,) 1/(N·m)²."""
+    counts = gram.count.sum(axis=0)
+    weights = np.where(counts > 0, 1.0, 0.0)
+    for _ in range(PASSES):
+        squares = error(gram, solve(gram, weights))
+        weights = np.where(counts > 0, counts / np.maximum(squares, 1e-9 * np.maximum(counts, 1)), 0.0)
+    return weights

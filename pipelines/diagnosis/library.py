@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.bank import weights_under
 from pipelines.diagnosis.candidates import (
     Candidate,
     columns_under,
@@ -22,7 +21,7 @@ from pipelines.diagnosis.candidates import (
 from pipelines.diagnosis.evidence.block_rate import at_block_rate, needs_full_rate
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.evidence.noise_model import NoiseModel, noise_model
-from pipelines.diagnosis.gram import solve
+from pipelines.diagnosis.gram import solve, weights_under
 from pipelines.diagnosis.imperfection import telling_torque
 from pipelines.diagnosis.observations import Baseline, Run, with_load
 from pipelines.diagnosis.shape_grid import others_of, screened
