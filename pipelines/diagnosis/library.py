@@ -109,6 +109,8 @@ class Library:
     """Joint, run and relative prior variance of each curve of time."""
     curve_columns: NDArray
     """(N, t)."""
+    left_out: tuple[str, ...] = ()
+    """Labels of effects whose columns are not finite at any shape, or add nothing."""
 
 
 def build_library(prepared: Prepared, report: Report = silent) -> Library:
@@ -125,13 +127,17 @@ def build_library(prepared: Prepared, report: Report = silent) -> Library:
     listed = proposals(prepared.baseline, [motion.run for motion in motions])
     effects = [effect for effect in listed if effect.shows_in(motions)]
     causes: list[Cause] = []
+    left_out: list[str] = []
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
         fits = screened(effect, fast.fit, prepared.runs, regression)
-        causes += _shapes(fits, exact, regression)
+        shapes = _shapes(fits, exact, regression)
+        causes += shapes
+        left_out += [] if shapes else [effect.label]
     return Library(
-        prepared, regression, tuple(causes), tuple(laws), law_columns, tuple(curves), curve_columns
-    )
+        prepared, regression, tuple(causes), tuple(laws), law_columns, tuple(curves),
+        curve_columns, tuple(dict.fromkeys(left_out)),
+    )  # fmt: skip
 
 
 def _shapes(

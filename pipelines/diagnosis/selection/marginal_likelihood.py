@@ -72,9 +72,18 @@ class MarginalLikelihood:
         return float(self.log_prior[list(chosen)].sum()) + self.criteria.further * (len(chosen) - 1)
 
     def __call__(self, chosen: Sequence[int]) -> float:
-        """Return the log posterior odds of a set against the empty one."""
+        """Return the log posterior odds of a set against the empty one.
+
+        Minus infinity where rounding makes its matrix not positive definite.
+        """
         if not chosen:
             return 0.0
+        try:
+            return self._log_odds(chosen)
+        except np.linalg.LinAlgError:
+            return -np.inf
+
+    def _log_odds(self, chosen: Sequence[int]) -> float:
         elements = [self.evidence.elements[i] for i in chosen]
         sizes = self.sizes(chosen)
         amplitudes = np.array(self.criteria.amplitudes)
@@ -172,10 +181,10 @@ class MarginalLikelihood:
         diagonal = np.arange(columns.shape[1])
         system[:, diagonal, diagonal] += 1.0
         u = self.right[columns] * sd
-        lower = np.linalg.cholesky(system)
+        sign, log_determinant = np.linalg.slogdet(system)
         solved = np.linalg.solve(system, u[:, :, np.newaxis])[:, :, 0]
-        spread = np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
-        return 0.5 * np.sum(solved * u, axis=1) - spread
+        odds = 0.5 * (np.sum(solved * u, axis=1) - log_determinant)
+        return np.where(sign > 0.0, odds, -np.inf)
 
     def rough(self, chosen: Sequence[int]) -> float:
         """Return a set's log odds without what its forms may differ by."""

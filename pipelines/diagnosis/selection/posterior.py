@@ -74,7 +74,7 @@ def posterior(evidence: Evidence, criteria: Criteria = CRITERIA) -> Posterior:
         odds[chosen] = weigh(chosen)
     sets = sorted(odds, key=lambda chosen: -odds[chosen])
     values = np.array([odds[chosen] for chosen in sets])
-    p = np.exp(values - values.max())
+    p = np.exp(values - values.max())  # the empty set is always finite
     return Posterior(evidence.elements, tuple(sets), p / p.sum())
 
 

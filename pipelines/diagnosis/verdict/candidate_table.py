@@ -22,6 +22,7 @@ def candidates(d: Diagnosis) -> pd.DataFrame:
         for effect in EFFECTS
         for joint, into in _taken_up(effect, d.baseline.machine).items()
     ]
+    rows += [_left_out(d, label) for label in _not_fitted(d)]
     rows.sort(key=lambda r: (ORDER[r["verdict"]], -(r["probability"] or 0.0)))
     frame = pd.DataFrame(rows)
     frame.insert(0, "rank", range(1, len(frame) + 1))
@@ -110,14 +111,30 @@ def _taken_up(effect: type[Effect], machine: Machine) -> dict[str, str]:
     return {joint: into for joint, into in by_joint.items() if into}
 
 
+def _not_fitted(d: Diagnosis) -> tuple[str, ...]:
+    return () if d.selected.library is None else d.selected.library.left_out
+
+
+def _left_out(d: Diagnosis, label: str) -> dict[str, Any]:
+    return _without_numbers(
+        d, label, "rejected", "it was left out: on these runs its torque is zero or not finite"
+    )
+
+
 def _absorbed(d: Diagnosis, name: str, joint: str, into: str) -> dict[str, Any]:
+    return _without_numbers(
+        d, f"{name}@{joint}", "absorbed", f"it is part of {into} and cannot be seen apart from it"
+    )
+
+
+def _without_numbers(d: Diagnosis, label: str, verdict: str, reason: str) -> dict[str, Any]:
     blank = {
         j.column(f"rmse_{when}"): None
         for j in d.baseline.machine.joints
         for when in ("before", "after")
     }
     return {
-        "causes": [f"{name}@{joint}"], "parameters": [], "train_score": None, "gain_nm": None,
+        "causes": [label], "parameters": [], "train_score": None, "gain_nm": None,
         "gain_low_nm": None, "gain_high_nm": None, "probability": None, **blank,
-        "verdict": "absorbed", "reason": f"it is part of {into} and cannot be seen apart from it",
+        "verdict": verdict, "reason": reason,
     }  # fmt: skip

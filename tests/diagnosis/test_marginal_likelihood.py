@@ -1,0 +1,125 @@
+"""The evidence of a set is that of the Gaussian model it states, and signs count as they should."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from pipelines.diagnosis.criteria import Criteria
+from pipelines.diagnosis.selection.evidence import Element, Evidence
+from pipelines.diagnosis.selection.marginal_likelihood import MarginalLikelihood
+from pipelines.diagnosis.selection.posterior import posterior
+
+ROWS = 60
+CRITERIA = Criteria(drive_weight=1.0, cuff_weight=1.0, misfits=(0.0, 0.05, 0.2))
+
+
+def problem(seed: int = 0, strength: float = 0.0) -> tuple[np.ndarray, np.ndarray, Evidence]:
+    """Return columns (rows, 8), a measurement and its evidence: two causes, a law, a background."""
+    rng = np.random.default_rng(seed)
+    X = rng.normal(size=(ROWS, 8)) * 10.0
+    y = rng.normal(size=ROWS) + X[:, 0] * strength
+    elements = (
+        Element("spring@hip", "spring", "hip", "angle", False, [0], [1.0], [2], [3, 4], [0.5, 0.5]),
+        Element("drag@knee", "drag", "knee", "speed", False, [1], [1.0]),
+        Element("law:angle@hip", "angle", "hip", "angle", True, [3, 4], [0.7, 0.3]),
+    )
+    background = (("law", 5, 1.0), ("cuff", 6, 1.0), ("wander", 7, 1.0))
+    none = np.zeros((8, 8))
+    return X, y, Evidence(X.T @ X, none, X.T @ y, np.zeros(8), elements, background, {})
+
+
+def background_covariance(X: np.ndarray) -> np.ndarray:
+    shares = (CRITERIA.background_law, CRITERIA.background_cuff, CRITERIA.background_wander)
+    return np.eye(ROWS) + sum(s**2 * np.outer(x, x) for s, x in zip(shares, X.T[5:], strict=True))
+
+
+def test_a_law_has_the_evidence_of_its_gaussian_model():
+    X, y, evidence = problem(strength=0.05)
+    weigh = MarginalLikelihood(evidence, CRITERIA)
+    (size,) = weigh.sizes((2,))
+    amplitude = min(CRITERIA.amplitudes, key=lambda a: abs(np.log(a / size)))
+    plain = background_covariance(X)
+    with_law = plain + amplitude**2 * (
+        0.7 * np.outer(X[:, 3], X[:, 3]) + 0.3 * np.outer(X[:, 4], X[:, 4])
+    )
+    ratio = multivariate_normal.logpdf(y, cov=with_law) - multivariate_normal.logpdf(y, cov=plain)
+    assert weigh((2,)) == pytest.approx(ratio - np.log(3.0) + CRITERIA.law, abs=1e-8)
+
+
+def test_a_cause_may_differ_by_its_shape_and_by_what_it_resembles():
+    X, y, evidence = problem(strength=0.1)
+    weigh = MarginalLikelihood(evidence, CRITERIA)
+    (size,) = weigh.sizes((0,))
+    amplitude = min(CRITERIA.amplitudes, key=lambda a: abs(np.log(a / size)))
+    plain = background_covariance(X)
+    named = plain + amplitude**2 * np.outer(X[:, 0], X[:, 0])
+    named += CRITERIA.shape_sd**2 * np.outer(X[:, 2], X[:, 2])
+    logs = []
+    for misfit in CRITERIA.misfits:
+        free = (misfit * size) ** 2 * 0.5 * X[:, 3:5] @ X[:, 3:5].T
+        logs.append(multivariate_normal.logpdf(y, cov=named + free))
+    ratio = np.logaddexp.reduce(logs) - np.log(3.0) - multivariate_normal.logpdf(y, cov=plain)
+    expected = ratio - np.log(3.0) + CRITERIA.cause
+    assert weigh((0,)) == pytest.approx(expected, abs=1e-7)
+
+
+@pytest.mark.parametrize("strength", [-0.2, 0.0, 0.03, 0.2])
+def test_a_forbidden_sign_counts_as_half_of_the_prior_that_is_not_there(strength):
+    X, y, evidence = problem(strength=strength)
+    cause = replace(evidence.elements[0], derivative=[], resembles=[], resembles_variance=[])
+    one_way = replace(cause, amplitudes=[[1.0]])
+    both = replace(evidence, elements=(cause, *evidence.elements[1:]))
+    signed = replace(evidence, elements=(one_way, *evidence.elements[1:]))
+    difference = (
+        MarginalLikelihood(signed, CRITERIA)((0,)) - MarginalLikelihood(both, CRITERIA)((0,))
+    )
+    # By sampling the same posterior.
+    (size,) = MarginalLikelihood(both, CRITERIA).sizes((0,))
+    amplitude = min(CRITERIA.amplitudes, key=lambda a: abs(np.log(a / size)))
+    inverse = np.linalg.inv(background_covariance(X))
+    variance = 1.0 / (X[:, 0] @ inverse @ X[:, 0] + amplitude**-2)
+    mean = variance * X[:, 0] @ inverse @ y
+    drawn = np.random.default_rng(1).normal(mean, np.sqrt(variance), 400_000)
+    share = np.mean(drawn > 0.0)
+    if share > 1e-3:
+        assert difference == pytest.approx(np.log(2.0 * share), abs=0.02)
+    else:
+        assert difference < -5.0
+
+
+def test_screening_ranks_pairs_as_the_exact_weighing_does_without_misfit():
+    _, _, evidence = problem(strength=0.1)
+    weigh = MarginalLikelihood(evidence, replace(CRITERIA, misfits=(0.0, 0.0, 0.0)))
+    pairs, odds = weigh.pairs([0, 1, 2])
+    assert len(pairs) == 3
+    for pair, value in zip(pairs, odds, strict=True):
+        assert value == pytest.approx(weigh.rough(pair.tolist()), abs=1e-9)
+
+
+def test_probabilities_add_up_to_one_and_nothing_wins_where_nothing_is_hidden():
+    silent = [posterior(problem(seed)[2], CRITERIA) for seed in range(20)]
+    for weighed in silent:
+        assert weighed.probabilities.sum() == pytest.approx(1.0)
+    assert np.mean([weighed.nothing > 0.5 for weighed in silent]) == 1.0
+
+
+def test_a_strong_cause_is_found_and_a_set_that_cannot_be_weighed_is_left_out():
+    _, _, evidence = problem(strength=0.5)
+    broken = evidence.drives.copy()
+    broken[1, 1] = -1e9  # no product of columns: its matrix is not positive definite
+    weighed = posterior(replace(evidence, drives=broken), CRITERIA)
+    assert weighed.probabilities.sum() == pytest.approx(1.0)
+    assert weighed.marginals["spring@hip"] > 0.99
+    assert weighed.marginals.get("drag@knee", 0.0) == 0.0
+
+
+def test_evidence_survives_being_packed():
+    _, _, evidence = problem(strength=0.2)
+    again = Evidence.unpacked(evidence.packed())
+    np.testing.assert_allclose(again.drives, evidence.drives, rtol=1e-6)
+    assert again.elements == evidence.elements
+    assert again.background == evidence.background
+    ours, theirs = posterior(evidence, CRITERIA), posterior(again, CRITERIA)
+    assert ours.nothing == pytest.approx(theirs.nothing, rel=1e-3)
