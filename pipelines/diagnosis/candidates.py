@@ -187,4 +187,7 @@ def bent_column(columns: NDArray, measured: NDArray, values: NDArray, untouched:
 
 def torque_columns(candidate: Candidate, number: int, run: Run) -> NDArray:
     """Return a torque effect's columns in one run, (m, O, k): in the drives, and in the cuffs where a person has it."""
-    return run.average(Model((candidate.term(number),)).regressor(run.motion, cuffs=True))
+    # As Model.regressor has it of one term that transforms nothing, which is called thousands of times.
+    columns = candidate.effect.columns(run.motion, candidate.shapes[number])
+    cuffs = candidate.effect.cuff_columns(run.motion, columns)
+    return run.average(np.concatenate([columns, cuffs], axis=1))

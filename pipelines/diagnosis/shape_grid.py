@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.candidates import TURNS, Candidate, bends_motion, lowest
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.observations import Run
-from pipelines.diagnosis.onset import NEVER
+from pipelines.diagnosis.onset import ALWAYS, NEVER
 from pipelines.diagnosis.shape_refinement import TONE_STEP_HZ, Fitted
 from pipelines.effects import Effect, Parameter
 
@@ -38,7 +38,7 @@ def screened(
     if chosen := effect.directions([run.motion for run in runs]):
         starts = [_along(effect, directions, len(runs)) for directions in chosen]
     elif any(p.per_run for p in effect.shape) and not bends_motion(effect):
-        starts = [_with_onsets(effect, fit, runs)]
+        starts = [_with_onsets(effect, fit, runs, regression)]
     else:
         starts = [
             Candidate(effect, (shape,) * len(runs)) for shape in _grid(effect, runs, regression)
@@ -140,24 +140,32 @@ def _rhythms(effect: Effect, runs: Sequence[Run], regression: DecisionRegression
     return tried[peaks[np.argsort(-power[peaks])[:VALUES]]].tolist()
 
 
-def _with_onsets(effect: Effect, fit: Fit, runs: Sequence[Run]) -> Candidate:
+def _with_onsets(
+    effect: Effect, fit: Fit, runs: Sequence[Run], regression: DecisionRegression
+) -> Candidate:
     """Return the candidate with the instant in each run at which it explains most.
 
-    Never in a run in which it explains next to nothing.
+    Never in a run in which it explains next to nothing. What has begun acts as if it had always
+    been there: the column of an instant is that of all the run, zero before it.
     """
     defaults = [p.default or 0.0 for p in effect.shape]
     at = next(i for i, p in enumerate(effect.shape) if p.per_run)
-    never = tuple(NEVER if i == at else d for i, d in enumerate(defaults))
-    shapes, gains = [never] * len(runs), np.zeros(len(runs))
+
+    def shape(onset: float) -> tuple[float, ...]:
+        return tuple(onset if i == at else d for i, d in enumerate(defaults))
+
+    onsets, gains = [NEVER] * len(runs), np.zeros(len(runs))
     for r, run in enumerate(runs):
-        if not effect.explains(run.motion):
+        alone = tuple(shape(ALWAYS if k == r else NEVER) for k in range(len(runs)))
+        throughout = fit(Candidate(effect, alone)) if effect.explains(run.motion) else None
+        if throughout is None:
             continue
-        for onset in np.linspace(run.time[0], run.time[-1], ONSETS + 2)[1:-1]:
-            own = tuple(float(onset) if i == at else d for i, d in enumerate(defaults))
-            alone = tuple(own if k == r else never for k in range(len(runs)))
-            fitted = fit(Candidate(effect, alone))
-            if fitted is not None and fitted.gain > gains[r]:
-                shapes[r], gains[r] = own, fitted.gain
+        tried = np.linspace(run.time[0], run.time[-1], ONSETS + 2)[1:-1]
+        begun = (regression.time[:, np.newaxis] >= tried) & (regression.run == r)[:, np.newaxis]
+        columns = regression.project(throughout.columns[:, :1] * begun)
+        square = np.maximum(np.sum(columns**2, axis=0), np.finfo(float).tiny)
+        gain = (columns.T @ regression.measured) ** 2 / square
+        onsets[r], gains[r] = float(tried[np.argmax(gain)]), gain.max()
     worth = WORTH * gains.max()
-    chosen = [s if g > worth else never for s, g in zip(shapes, gains, strict=True)]
-    return Candidate(effect, tuple(chosen))
+    chosen = [t if g > worth else NEVER for t, g in zip(onsets, gains, strict=True)]
+    return Candidate(effect, tuple(shape(onset) for onset in chosen))

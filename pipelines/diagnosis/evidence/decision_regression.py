@@ -7,9 +7,11 @@ projected out of everything, which is the same as a flat prior on its parameters
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from pipelines.diagnosis.evidence.decision_band import LENGTH_S, DecisionBand
 from pipelines.diagnosis.evidence.noise_model import NoiseModel
@@ -26,6 +28,8 @@ class DecisionRegression:
     bands: tuple[DecisionBand, ...]
     roots: tuple[NDArray, ...]
     """(M, O) of each run: the root of each row's weight over its noise, 1/(N·m)."""
+    operator: sparse.csr_matrix
+    """(N, sum of m O): takes the blocks of all runs to weighted rows; those without weight are left out."""
     weighty: NDArray
     """(rows,) whether a row has any weight; N of them do."""
     output: NDArray
@@ -59,7 +63,9 @@ class DecisionRegression:
         roots = tuple(np.sqrt(band.weight) * precision for band in bands)
         weighty = np.concatenate([root.ravel() for root in roots]) > 0.0
         output = np.concatenate([np.tile(np.arange(len(torque)), len(root)) for root in roots])
-        blank = cls(bands, roots, weighty, output[weighty], torque, np.zeros(0), np.zeros(0))
+        operator = sparse.block_diag([_operator(b, r) for b, r in zip(bands, roots, strict=True)])
+        operator = operator.tocsr()[weighty]
+        blank = cls(bands, roots, operator, weighty, output[weighty], torque, *[np.zeros(0)] * 2)
         basis = _orthonormal(blank.rows(baseline))
         measured = blank.rows([run.measured[:, :, np.newaxis] for run in runs])[:, 0]
         return replace(blank, basis=basis, measured=measured - basis @ (basis.T @ measured))
@@ -69,6 +75,18 @@ class DecisionRegression:
         """Number of drives; the cuffs' outputs come after them."""
         return len(self.torque) // 2
 
+    @cached_property
+    def time(self) -> NDArray:
+        """The time of each row, (N,) s."""
+        outputs = len(self.torque)
+        return np.concatenate([np.repeat(b.time, outputs) for b in self.bands])[self.weighty]
+
+    @cached_property
+    def run(self) -> NDArray:
+        """The number of each row's run, (N,)."""
+        sizes = [root.size for root in self.roots]
+        return np.repeat(np.arange(len(sizes)), sizes)[self.weighty]
+
     @property
     def of_drives(self) -> NDArray:
         """Whether a row is of a drive, (N,) bool."""
@@ -76,11 +94,8 @@ class DecisionRegression:
 
     def rows(self, parts: Sequence[NDArray]) -> NDArray:
         """Return weighted rows (N, k) of columns (m, O, k) in each run."""
-        averaged = [
-            (band.average(part) * root[:, :, np.newaxis]).reshape(-1, part.shape[2])
-            for band, root, part in zip(self.bands, self.roots, parts, strict=True)
-        ]
-        return np.concatenate(averaged)[self.weighty]
+        flat = [part.reshape(-1, part.shape[2]) for part in parts]
+        return np.asarray(self.operator @ np.nan_to_num(np.concatenate(flat)))
 
     def project(self, columns: NDArray) -> NDArray:
         """Return columns (N, k) less what the baseline imitates."""
@@ -107,6 +122,20 @@ class DecisionRegression:
         total = np.bincount(output, weight, minlength=self.joints)[output]
         scale = np.sqrt(weight / total) / self.torque[output] / roots
         return columns[use] * scale[:, np.newaxis]
+
+
+def _operator(band: DecisionBand, root: NDArray) -> sparse.csr_matrix:
+    """Return what takes a run's blocks and outputs, m O, to its weighted averages and outputs, M O."""
+    outputs = root.shape[1]
+    weighted = [sparse.diags(root[:, o]) @ op for o, op in enumerate(band.operators)]
+    M, m = weighted[0].shape
+    parts = []
+    for o, op in enumerate(weighted):
+        coo = op.tocoo()
+        shape = (M * outputs, m * outputs)
+        place = (coo.row * outputs + o, coo.col * outputs + o)
+        parts.append(sparse.csr_matrix((coo.data, place), shape=shape))
+    return sum(parts[1:], start=parts[0])
 
 
 def _orthonormal(columns: NDArray) -> NDArray:

@@ -1,0 +1,55 @@
+"""The noise is read off above what wanders, and extended downwards by its spectrum."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from pipelines.diagnosis.evidence.noise_model import _first_order, noise_model
+from pipelines.diagnosis.evidence.residual_shares import residual_shares
+from pipelines.diagnosis.observations import observe
+from tests.diagnosis.sessions import session
+
+RATE_HZ = 40.0
+
+
+def coloured(rng: np.random.Generator, n: int, rms: float, tau: float) -> np.ndarray:
+    """Return first-order noise."""
+    memory = np.exp(-1.0 / (RATE_HZ * tau)) if tau else 0.0
+    white = rng.normal(size=n) * rms * np.sqrt(1.0 - memory**2)
+    return lfilter([1.0], [1.0, -memory], white, zi=[memory * rng.normal() * rms])[0]
+
+
+def density(rms: float, tau: float) -> float:
+    """Return the density at low frequencies of the same, sampled."""
+    memory = np.exp(-1.0 / (RATE_HZ * tau)) if tau else 0.0
+    return rms**2 * (1.0 + memory) / (1.0 - memory) / RATE_HZ
+
+
+@pytest.mark.parametrize("tau", [0.0, 0.02, 0.06])
+def test_the_density_at_low_frequencies_is_that_of_the_noise(tau):
+    rng = np.random.default_rng(3)
+    found = [
+        _first_order([coloured(rng, 2400, 0.5, tau) for _ in range(2)], RATE_HZ, (1.5, 6.0))[0]
+        for _ in range(20)
+    ]
+    assert np.mean(found) == pytest.approx(density(0.5, tau), rel=0.15)
+    assert np.std(found) < 0.35 * np.mean(found)
+
+
+def test_what_wanders_is_not_counted_as_noise():
+    rng = np.random.default_rng(4)
+    time = np.arange(2400) / RATE_HZ
+    noise = coloured(rng, 2400, 0.3, 0.0)
+    wander = 2.0 * np.sin(2.0 * np.pi * 0.05 * time) + np.sin(2.0 * np.pi * 0.17 * time + 1.0)
+    still, _ = _first_order([noise], RATE_HZ, (1.5, 6.0))
+    moved, _ = _first_order([noise + wander], RATE_HZ, (1.5, 6.0))
+    assert moved == pytest.approx(still, rel=0.1)
+
+
+def test_samples_that_are_not_usable_change_nothing_but_the_spread():
+    rng = np.random.default_rng(5)
+    noise = coloured(rng, 4800, 0.4, 0.02)
+    gaps = np.where(rng.random(4800) < 0.3, np.nan, noise)
+    whole, _ = _first_order([noise], RATE_HZ, (1.5, 6.0))
+    holed, _ = _first_order([gaps], RATE_HZ, (1.5, 6.0))
+    assert holed == pytest.approx(whole, rel=0.25)
