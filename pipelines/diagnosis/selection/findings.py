@@ -130,13 +130,14 @@ def _joints(posterior: Posterior, root: tuple[str, Any, float]) -> Iterator[Find
 
 
 def _repeatability(posterior: Posterior, root: tuple[str, Any, float]) -> Finding:
+    """Return that something is missing, and whether it repeats where that is likely."""
     chances = {r: _chance(posterior, lambda e, r=r: e.repeats == r) for r in (True, False)}
     repeats = max(chances, key=lambda r: chances[r])
-    chance = chances[repeats]
-    return Finding(
-        "repeatability", repeats, None, None, max(chance, root[2]),
-        _closest(posterior, lambda e: True), (root, ("repeats", repeats, chance)),
-    )  # fmt: skip
+    chance, close = chances[repeats], _closest(posterior, lambda e: True)
+    if chance < LIKELY:
+        return Finding("repeatability", None, None, None, root[2], close, (root,))
+    path = (root, ("repeats", repeats, chance))
+    return Finding("repeatability", repeats, None, None, chance, close, path)
 
 
 def _chance(posterior: Posterior, belongs: Callable[[Element], bool]) -> float:

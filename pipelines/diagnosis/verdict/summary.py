@@ -126,6 +126,8 @@ def _thing(finding: Finding) -> str:
         return FAMILY[str(finding.family)].format(joint=joint)
     if finding.level == "joint":
         return f"something at {joint}"
+    if finding.repeats is None:
+        return "something that may repeat with the motion or not"
     return "something that " + ("repeats" if finding.repeats else "does not repeat")
 
 

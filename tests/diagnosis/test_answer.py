@@ -1,0 +1,113 @@
+"""What is named, what is tied, and at which depth something is known, read off a posterior."""
+
+import numpy as np
+import pytest
+
+from pipelines.diagnosis.selection.answer import answer_of
+from pipelines.diagnosis.selection.evidence import Element
+from pipelines.diagnosis.selection.findings import findings
+from pipelines.diagnosis.selection.posterior import Posterior
+
+
+def cause(name: str, joint: str, family: str) -> Element:
+    return Element(f"{name}@{joint}", name, joint, family, False, [0], [1.0])
+
+
+def law(kind: str, joint: str, family: str, repeats: bool = True) -> Element:
+    label = f"law:{kind}@{joint}"
+    return Element(label, kind, joint, family, True, [0], [1.0], repeats=repeats)
+
+
+SPRING = cause("parallel_spring", "knee", "angle")
+STOP = cause("end_stop", "knee", "angle")
+DRAG = cause("quadratic_drag", "hip", "speed")
+PEAK = cause("stribeck_friction", "hip", "speed")
+ANGLE = law("angle", "knee", "angle")
+TIME = law("time", "hip", "time", repeats=False)
+ELEMENTS = (SPRING, STOP, DRAG, PEAK, ANGLE, TIME)
+
+
+def weighed(**sets: float) -> Posterior:
+    """Return the posterior of sets named by their elements' numbers, as ``_02``."""
+    chosen = {tuple(int(c) for c in name[1:]): p for name, p in sets.items()}
+    order = sorted(chosen, key=lambda s: -chosen[s])
+    p = np.array([chosen[s] for s in order])
+    return Posterior(ELEMENTS, tuple(order), p / p.sum())
+
+
+def test_a_likely_cause_is_named_and_a_rival_that_is_not_far_behind_is_tied():
+    posterior = weighed(_2=0.7, _3=0.25, _=0.03, _4=0.02)
+    answer = answer_of(posterior)
+    (named,) = answer.named
+    assert named.element.label == "quadratic_drag@hip"
+    assert dict(named.ties) == pytest.approx({"stribeck_friction@hip": 0.25})
+    assert named.probability == pytest.approx(0.95)
+    (finding,) = findings(posterior, answer)
+    assert finding.level == "cause"
+    assert [level for level, _, _ in finding.path] == [
+        "missing", "repeats", "joint", "family", "cause",
+    ]  # fmt: skip
+
+
+def test_a_third_cause_beside_the_named_one_is_no_tie():
+    posterior = weighed(_2=0.5, _02=0.4, _=0.1)
+    (named,) = answer_of(posterior).named
+    assert named.ties == ()
+    assert named.probability == pytest.approx(0.9)
+
+
+def test_two_causes_are_named_each_with_its_own_ties():
+    posterior = weighed(_02=0.6, _12=0.3, _0=0.05, _2=0.05)
+    named = {one.element.label: one for one in answer_of(posterior).named}
+    assert set(named) == {"parallel_spring@knee", "quadratic_drag@hip"}
+    assert dict(named["parallel_spring@knee"].ties).keys() == {"end_stop@knee"}
+    assert named["quadratic_drag@hip"].ties == ()
+
+
+def test_an_unlisted_law_is_a_finding_of_its_family_with_the_closest_causes():
+    posterior = weighed(_4=0.6, _0=0.3, _1=0.07, _=0.03)
+    answer = answer_of(posterior)
+    assert answer.named == ()
+    assert answer.unlisted == pytest.approx(0.6)
+    (finding,) = findings(posterior, answer)
+    assert (finding.level, finding.joint, finding.family) == ("family", "knee", "angle")
+    assert finding.probability == pytest.approx(0.97)
+    assert finding.causes[0] == ("parallel_spring@knee", pytest.approx(0.3))
+
+
+def test_a_cause_and_an_unlisted_remainder_are_told_together():
+    posterior = weighed(_25=0.9, _2=0.1)
+    answer = answer_of(posterior)
+    told = findings(posterior, answer)
+    assert [one.element.label for one in answer.named] == ["quadratic_drag@hip"]
+    assert {(one.level, one.family) for one in told} == {("cause", "speed"), ("family", "time")}
+    assert next(one for one in told if one.family == "time").repeats is False
+
+
+def test_where_families_are_in_doubt_the_joint_is_told_and_else_whether_it_repeats():
+    joint = weighed(_2=0.3, _3=0.05, _5=0.4, _=0.25)
+    (finding,) = findings(joint, answer_of(joint))
+    assert (finding.level, finding.joint) == ("joint", "hip")
+    two_joints = weighed(_4=0.35, _3=0.02, _2=0.25, _=0.38)
+    (finding,) = findings(two_joints, answer_of(two_joints))
+    assert (finding.level, finding.repeats) == ("repeatability", True)
+    split = weighed(_4=0.3, _5=0.3, _=0.4)
+    (finding,) = findings(split, answer_of(split))
+    assert (finding.level, finding.repeats) == ("repeatability", None)
+    assert finding.probability == pytest.approx(0.6)
+
+
+def test_nothing_missing_has_no_findings():
+    posterior = weighed(_=0.8, _2=0.2)
+    assert findings(posterior, answer_of(posterior)) == []
+
+
+def test_validation_lowers_a_cause_that_harms_and_raises_none():
+    answer = answer_of(weighed(_02=0.95, _0=0.05))
+    helped = answer.judged({"parallel_spring@knee": 40.0, "quadratic_drag@hip": 9.0})
+    assert [one.probability for one in helped.named] == [one.probability for one in answer.named]
+    harmed = answer.judged({"parallel_spring@knee": 40.0, "quadratic_drag@hip": -6.0})
+    assert [one.element.label for one in harmed.named] == ["parallel_spring@knee"]
+    doubted = answer.judged({"quadratic_drag@hip": -1.0})
+    (drag,) = [one for one in doubted.named if one.element.label == "quadratic_drag@hip"]
+    assert 0.5 < drag.probability < 0.95
