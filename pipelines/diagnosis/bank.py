@@ -45,9 +45,7 @@ class Bank:
 
     def columns_of(self, chosen: Sequence[int]) -> NDArray:
         """Return the columns of the baseline and some candidates, (c,) places in ``gram``."""
-        places = np.arange(len(self.gram.columns[0, 0]))
-        parts = [slice(self.baseline.size), *(self.columns[i].slice for i in chosen)]
-        return np.concatenate([places[part] for part in parts])
+        return np.r_[slice(0, self.baseline.size), *(self.columns[i].slice for i in chosen)]
 
 
 def weights_under(gram: Gram) -> NDArray:
