@@ -5,7 +5,6 @@ validation run fits for itself: on one half of its seconds to be scored on the o
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,6 +134,4 @@ def _slope(
 
 def _with_shape(terms: list[Term], number: int, i: int, value: float) -> list[Term]:
     """Return the terms with another shape of one of them."""
-    values = terms[number].values.copy()
-    values[len(terms[number].effect.linear) + i] = value
-    return [replace(t, values=values) if k == number else t for k, t in enumerate(terms)]
+    return [term.with_shape(i, value) if k == number else term for k, term in enumerate(terms)]

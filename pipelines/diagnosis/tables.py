@@ -32,7 +32,8 @@ def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.Data
     for term in baseline.layout.terms:
         if not isinstance(term.effect, (RigidBody, ForceSensorZero)):
             step = "extension" if term.effect in baseline.known else "friction"
-            rows += rows_of(term.effect, values[term.slice], units[term.slice], step)
+            fitted = term.effect.completed(values[term.slice])
+            rows += rows_of(term.effect, fitted, units[term.slice], step)
     onsets: dict[int, tuple[float, float]] = {}
     for number in range(len(fit.causes)):
         first = fit.columns_of(number).runs[0]

@@ -16,7 +16,7 @@ class ForceSensorZero(Effect):
     name = "force_sensor_zero"
     title = "Force sensor zeros"
     side = Side.SENSOR
-    equation = "torque on the leg + d_s F_y at the knee; hip as well: d_t F_y + L1 (F_y cos q2 + F_x sin q2)"
+    equation = "knee: d_s F_sy; hip: d_t F_ty + d_s F_sy + L1 (F_sy cos q2 + F_sx sin q2)"
     source = "docs/contracts.md, recording/1: the cuffs' torque on the leg"
     whole_leg = True
     acts_in = ("with_human",)

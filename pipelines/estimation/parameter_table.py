@@ -39,14 +39,15 @@ def rows_of(
         What the rows are of.
     values : (v,) array
         Of its linear parameters, then of its shape.
-    slopes : (v, s) array
-        How they change with what the covariance is of.
+    slopes : (k, s) array
+        How the first k of them change with what the covariance is of; the others are certain.
     step : str
         In which they were found.
     positive : collection of Parameter
         Of those, the interval of one that is never negative, as play or a stiffness, ends at zero.
     """
-    rows = zip(effect.parameters, effect.physical(values), effect.jacobian(values) @ slopes, strict=True)
+    of_rows = effect.jacobian(values)[:, : len(slopes)] @ slopes
+    rows = zip(effect.parameters, effect.physical(values), of_rows, strict=True)
     return [Row(effect, p, step, float(value), slope, p in positive and p.typical[0] >= 0) for p, value, slope in rows]
 
 

@@ -74,9 +74,7 @@ class Training:
         for file in files:
             before = own[file][term]
             if before is not None:
-                moved = before.values.copy()
-                moved[len(before.linear) + shape] += step
-                own[file][term] = Term(before.effect, moved)
+                own[file][term] = before.with_shape(shape, before.shape[shape] + step)
         return replace(self, own={file: tuple(terms) for file, terms in own.items()})
 
     def loaded(self, run: Run) -> Run:
@@ -90,11 +88,11 @@ class Training:
 
     def regressions(self, run: Run) -> Iterator[Regression]:
         """Yield a run's regression on the p columns, piece by piece."""
-        number, present = self.number_of(run), [term is not None for term in self.terms_of(run)]
+        number = self.number_of(run)
+        present = [i for i, term in enumerate(self.terms_of(run)) if term is not None]
         model = self.model_of(run, np.zeros(self.layout.size))
         for r in regressions(run, model, self.cutoff_hz):
-            regressor = self.layout.expand(r.regressor, number, np.flatnonzero(present))
-            r = replace(r, regressor=regressor)
+            r = replace(r, regressor=self.layout.expand(r.regressor, number, present))
             yield replace(r, usable=np.repeat(r.valid[:, np.newaxis], r.torque.shape[1], 1)) if self.reversals else r
 
     @cached_property

@@ -1,7 +1,9 @@
-"""A model: a tuple of effects with their values. Everything a stage asks of physics, it asks here."""
+"""A model: a tuple of effects with their values, which every stage asks for its physics."""
 
+import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +43,12 @@ class Term:
         """Values of the shape parameters, (s,)."""
         return self.values[len(self.effect.linear) :]
 
+    def with_shape(self, i: int, value: float) -> "Term":
+        """Return the term with another value of shape parameter ``i``."""
+        values = self.values.copy()
+        values[len(self.effect.linear) + i] = value
+        return Term(self.effect, values)
+
 
 class Motions(NamedTuple):
     """A measured motion, corrected for what sensors, transmissions and cuffs do to it."""
@@ -55,7 +63,10 @@ class Motions(NamedTuple):
 
 @dataclass(frozen=True)
 class Model:
-    """Terms whose torques add up, on a motion corrected for what sensors and transmissions do to it."""
+    """Terms whose torques add up.
+
+    They act on a motion that is corrected for what sensors and transmissions do to it.
+    """
 
     terms: tuple[Term, ...]
 
@@ -80,10 +91,15 @@ class Model:
 
     def with_linear(self, values: NDArray) -> "Model":
         """Return the model with other linear parameters, (p,)."""
-        ends = np.cumsum([len(term.effect.linear) for term in self.terms])[:-1]
-        parts = np.split(np.asarray(values, float), ends)
-        terms = (Term(term.effect, np.append(part, term.shape)) for term, part in zip(self.terms, parts, strict=True))
-        return Model(tuple(terms))
+        values = np.asarray(values, dtype=float)
+        chosen = zip(self.terms, self._columns, strict=True)
+        return Model(tuple(Term(t.effect, np.append(values[own], t.shape)) for t, own in chosen))
+
+    @cached_property
+    def _columns(self) -> list[slice]:
+        """Each term's columns in the regressor."""
+        ends = np.cumsum([0, *(len(term.effect.linear) for term in self.terms)]).tolist()
+        return [slice(start, stop) for start, stop in itertools.pairwise(ends)]
 
     def for_run(self, run: str) -> "Model":
         """Return the terms that are there in a kind of run."""
@@ -113,7 +129,13 @@ class Model:
                 motion = term.effect.corrected(motion, term.shape)
         return motion
 
-    def regressor(self, motion: Motion, *, cuffs: bool = False, motions: Motions | None = None) -> NDArray:
+    def regressor(
+        self,
+        motion: Motion,
+        *,
+        cuffs: bool = False,
+        motions: Motions | None = None,
+    ) -> NDArray:
         """Return the measured torque per unit of each linear parameter.
 
         Drive effects see the motors' motion, those on the wearer's side of the cuffs the limb's,
@@ -136,14 +158,12 @@ class Model:
         """
         motor, link, limb = motions or self.motions(motion)
         n, joints = motion.q.shape
-        ends = np.cumsum([0, *(len(term.effect.linear) for term in self.terms)])
-        out = np.zeros((n, 2 * joints if cuffs else joints, ends[-1]))
+        out = np.zeros((n, 2 * joints if cuffs else joints, len(self.linear_parameters)))
         drives = out[:, :joints]
-        last_sensors = sorted(range(len(self.terms)), key=lambda i: self.terms[i].effect.side is Side.SENSOR)
-        for i in last_sensors:
-            effect, shape = self.terms[i].effect, self.terms[i].shape
+        terms = zip(self.terms, self._columns, strict=True)
+        for term, own in sorted(terms, key=lambda one: one[0].effect.side is Side.SENSOR):
+            effect, shape = term.effect, term.shape
             at = limb if effect.on_limb else motor if effect.side is Side.DRIVE else link
-            own = slice(ends[i], ends[i + 1])
             # Columns that are still to come are in there too: they are written over.
             measured = effect.observed(drives, motion, shape)
             if measured is not drives:
@@ -161,7 +181,7 @@ class Model:
         return columns
 
     def delivered(self, motion: Motion) -> NDArray:
-        """Return what the drives deliver where their sensors measured ``motion.torque``, (n, J) N·m."""
+        """Return what drives deliver where sensors measured ``motion.torque``, (n, J) N·m."""
         torque = motion.torque
         for term in reversed(self.terms):
             torque = term.effect.delivered(torque, motion, term.values)

@@ -6,7 +6,7 @@ has one column, which the runs share. Nothing else counts columns.
 """
 
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -135,11 +135,9 @@ class ParameterLayout:
         start = 0
         for number, effect in enumerate(effects):
             one = TermColumns.of(effect, kinds, start=start)
-            if absent:
-                runs = tuple(run for run in one.runs if (number, run) not in absent)
-                one = TermColumns(effect, one.per_run, runs, start)
-            terms.append(one)
-            start += one.width
+            runs = tuple(run for run in one.runs if (number, run) not in absent)
+            terms.append(replace(one, runs=runs))
+            start += terms[-1].width
         return cls(tuple(terms), tuple(kinds))
 
     @cached_property
@@ -150,7 +148,8 @@ class ParameterLayout:
     @cached_property
     def columns(self) -> tuple[Column, ...]:
         """The p columns."""
-        return tuple(Column(term.effect, term.effect.linear[k], run) for term in self.terms for k, run in term.columns)
+        columns = ((term.effect, *column) for term in self.terms for column in term.columns)
+        return tuple(Column(effect, effect.linear[k], run) for effect, k, run in columns)
 
     @property
     def per_run(self) -> NDArray:
@@ -164,9 +163,8 @@ class ParameterLayout:
         return [np.arange(term.start, term.start + term.width) for term in bodies]
 
     def bodies_in(self, kind: str) -> NDArray:
-        """Return the columns of each rigid body that moves in a kind of run, (bodies, parameters)."""
-        bodies = self.bodies if kind == "with_human" else self.bodies[:1]
-        return np.array(bodies)
+        """Return the columns of each body that moves in a kind of run, (bodies, parameters)."""
+        return np.array(self.bodies if kind == "with_human" else self.bodies[:1])
 
     def column_of(self, effect: str, joint: str | None, parameter: str) -> int:
         """Return the first column of a parameter, by its name and its effect's."""
@@ -182,7 +180,7 @@ class ParameterLayout:
         return np.array(list(acts), dtype=bool)
 
     def shapes(self, term: int) -> slice:
-        """Return where a term's shapes are, where all terms' shapes follow the p columns' values."""
+        """Return the places of a term's shapes, where all terms' shapes follow the p columns."""
         counts = [len(one.effect.shape) for one in self.terms]
         start = self.size + sum(counts[:term])
         return slice(start, start + counts[term])
@@ -192,7 +190,12 @@ class ParameterLayout:
         parts = [term.select(values, run, np.zeros(len(term.per_run))) for term in self.terms]
         return np.concatenate(parts)
 
-    def expand(self, columns: NDArray, run: int | None, terms: Iterable[int] | None = None) -> NDArray:
+    def expand(
+        self,
+        columns: NDArray,
+        run: int | None,
+        terms: Iterable[int] | None = None,
+    ) -> NDArray:
         """Put the columns of one run's regressor, (..., q), where they belong, (..., p).
 
         ``terms`` are the numbers of the terms that the regressor has, all unless given; ``run`` is
