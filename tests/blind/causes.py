@@ -471,7 +471,7 @@ def settling(rng, joint):
 
     def install(plan: Plan, size: float, run: Run) -> None:
         plan.channel.offset[joint] += sign * size
-        plan.channel.moving_offset[joint] = lambda t: 0.1 * sign * size * np.exp(-t / time)
+        plan.channel.moving_offset[joint].append(lambda t: 0.1 * sign * size * np.exp(-t / time))
 
     return dict(install=install, start=1.0, shape=(time,))
 
@@ -479,7 +479,7 @@ def settling(rng, joint):
 def _drift(curve_of, rng, joint, parameters=lambda s: {}):
     def install(plan: Plan, size: float, run: Run) -> None:
         curve = curve_of(run)
-        plan.channel.moving_offset[joint] = lambda t: size * curve(t)
+        plan.channel.moving_offset[joint].append(lambda t: size * curve(t))
 
     return dict(install=install, start=2.0, slow=True, parameters=parameters)
 
@@ -517,7 +517,7 @@ def with_slight_eccentricity(rng, joint):
 
     def install(plan: Plan, size: float, run: Run) -> None:
         plan.encoder_offset[joint] += sign * size
-        plan.wobble[joint] = depth * size, phase
+        plan.wobble[joint, :2] = depth * size, phase
 
     return dict(install=install, start=0.05, largest=0.3, shape=(depth, phase))
 

@@ -13,13 +13,23 @@ ASYMMETRY, ASYMMETRY_SMOOTH = 4, 5
 LOAD_LINEAR, LOAD_ROOT, LOAD_OFFSET = 7, 8, 9
 WARMUP_EXPONENTIAL, WARMUP_POWER = 10, 11
 OTHER_JOINT = 12
-LAST_DRY = 19
+LAST_DRY, FIRST_DRY_AGAIN = 19, 100
+"""Numbers up to the one and from the other on are dry friction, those between them are smooth torques."""
 
 
 @njit(cache=True)
-def dry_levels(kind, p, t, speed, load, other_angle):
-    """Levels added forward and backward, N·m; ``load`` is the torque passed on to the link."""
-    v = abs(speed)
+def is_dry(kind):
+    """Tell whether a kind of hidden torque is dry friction."""
+    return kind <= LAST_DRY or kind >= FIRST_DRY_AGAIN
+
+
+@njit(cache=True)
+def dry_levels(kind, p, table, t, j, angle, other_angle, speed, load):
+    """Levels added forward and backward at joint ``j``, N·m.
+
+    ``angle`` is the joint's own, ``speed`` and ``load`` (the torque passed on to the link) are of both joints.
+    """
+    v = abs(speed[j])
     level = 0.0
     if kind == STRIBECK_GAUSS:
         level = p[0] * exp(-((v / p[1]) ** 2))
@@ -32,11 +42,11 @@ def dry_levels(kind, p, t, speed, load, other_angle):
     elif kind == ASYMMETRY_SMOOTH:
         return p[0] * tanh(v / p[1]), -p[0] * tanh(v / p[1])
     elif kind == LOAD_LINEAR:
-        level = p[0] * abs(load)
+        level = p[0] * abs(load[j])
     elif kind == LOAD_ROOT:
-        level = p[0] * sqrt(abs(load) * p[1])
+        level = p[0] * sqrt(abs(load[j]) * p[1])
     elif kind == LOAD_OFFSET:
-        level = p[0] * max(0.0, abs(load) - p[1])
+        level = p[0] * max(0.0, abs(load[j]) - p[1])
     elif kind == WARMUP_EXPONENTIAL:
         level = p[0] * exp(-max(t, 0.0) / p[1])
     elif kind == WARMUP_POWER:

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from tests.blind.body import PAYLOAD_INERTIA, evaluate
-from tests.blind.dry import LAST_DRY, dry_levels
+from tests.blind.dry import dry_levels, is_dry
 from tests.blind.smooth import smooth_torque
 
 DT = 0.25e-3
@@ -22,20 +22,28 @@ SAMPLE_S = DT * STEPS_PER_TICK * TICKS_PER_SAMPLE
 LEAD_IN_S = 5.0
 """From rest into the periodic motion before anything is recorded."""
 BLEND_S = 3.0
+TABLE_STEP_S = 0.02
 RIGID, ELASTIC, WIND_UP, PLAY, PLAY_HERTZ = 0, 1, 2, 3, 4
 
 
 class Excited(NamedTuple):
-    """Fourier coefficients, (2,), (2, n), (2, n)."""
+    """Fourier coefficients, (2,), (2, n), (2, n); or, where there is one, a table of the motion.
+
+    ``table`` (m, 4): angles and speeds of hip and knee each ``TABLE_STEP_S`` from ``-LEAD_IN_S`` on.
+    """
 
     theta0: np.ndarray
     a: np.ndarray
     b: np.ndarray
     omega: float
+    table: np.ndarray
 
 
 class Drives(NamedTuple):
-    """PD loops and encoders, arrays (2,); ``wobble`` is (2, 2): amplitude and phase of the eccentricity."""
+    """PD loops and encoders, arrays (2,).
+
+    ``wobble`` (2, 4): amplitude and phase of the encoder's error once a turn, and twice a turn.
+    """
 
     kp: np.ndarray
     kd: np.ndarray
@@ -105,10 +113,26 @@ class Log(NamedTuple):
 
 
 @njit(cache=True)
+def tabulated(table, t, j):
+    """Angle of joint ``j`` at time ``t``, by cubic Hermite interpolation of angles and speeds."""
+    place = min(max((t + LEAD_IN_S) / TABLE_STEP_S, 0.0), len(table) - 1.001)
+    i = int(place)
+    f = place - i
+    q0, q1 = table[i, j], table[i + 1, j]
+    v0, v1 = table[i, 2 + j] * TABLE_STEP_S, table[i + 1, 2 + j] * TABLE_STEP_S
+    rise = q1 - q0
+    return q0 + f * (v0 + f * (3.0 * rise - 2.0 * v0 - v1 + f * (v0 + v1 - 2.0 * rise)))
+
+
+@njit(cache=True)
 def reference_at(x, t, out):
     """Set-point at time ``t``, a smooth start from the mean angle before time 0."""
     s = min(1.0, max(0.0, (t + LEAD_IN_S - 0.5) / BLEND_S))
     share = s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+    if len(x.table) > 0:
+        for j in range(2):
+            out[j] = x.theta0[j] + share * (tabulated(x.table, t, j) - x.theta0[j])
+        return
     for j in range(2):
         swing = 0.0
         for k in range(x.a.shape[1]):
@@ -119,7 +143,8 @@ def reference_at(x, t, out):
 
 @njit(cache=True)
 def _read(d, j, theta):
-    return theta + d.offset[j] + d.wobble[j, 0] * sin(theta + d.wobble[j, 1])
+    once = theta + d.offset[j] + d.wobble[j, 0] * sin(theta + d.wobble[j, 1])
+    return once + d.wobble[j, 2] * sin(2.0 * theta + d.wobble[j, 3])
 
 
 @njit(cache=True)
@@ -197,11 +222,12 @@ def _set_world(h, w, t):
 
 
 @njit(cache=True)
-def simulate(h, x, d, jt, w, hid, start, samples, with_drives, out):
-    """Run the leg from rest at ``start`` (2,) and log ``samples`` samples from time 0 on into ``out``.
+def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
+    """Run the leg from rest at ``start`` (2,) and log ``samples`` samples of ``ticks`` ms into ``out``.
 
     Without drives there is no lead-in and no torque: the leg swings freely.
     """
+    sample_s = DT * STEPS_PER_TICK * ticks
     model, data, qpos, qvel, _, bias, M, pattern, columns = h[:9]
     nv = len(qpos)
     soft = np.where(jt.transmission != RIGID)[0]
@@ -223,15 +249,15 @@ def simulate(h, x, d, jt, w, hid, start, samples, with_drives, out):
     angle, speed = np.zeros(2), np.zeros(2)
     up, down, lam, load, human = np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2)
     opened, pressed = np.zeros(n), np.zeros(2)
-    first = -round(LEAD_IN_S / SAMPLE_S) if with_drives else 0
-    reference_at(x, first * SAMPLE_S, old_ref)
+    first = -round(LEAD_IN_S / sample_s) if with_drives else 0
+    reference_at(x, first * sample_s, old_ref)
     for j in range(2):
         angle[j] = _read(d, j, z[place[j]])
-    half = STEPS_PER_TICK * TICKS_PER_SAMPLE // 2
+    half = STEPS_PER_TICK * ticks // 2
     for k in range(first, samples):
         opened[:] = u
-        for s in range(STEPS_PER_TICK * TICKS_PER_SAMPLE):
-            t = k * SAMPLE_S + s * DT
+        for s in range(STEPS_PER_TICK * ticks):
+            t = k * sample_s + s * DT
             if s == 0:
                 _set_world(h, w, t)
             if with_drives and s % STEPS_PER_TICK == 0:
@@ -247,7 +273,7 @@ def simulate(h, x, d, jt, w, hid, start, samples, with_drives, out):
                     drive[j] = min(d.limit[j], max(-d.limit[j], wanted))
                     old_ref[j] = ref[j]
                 if k >= 0:
-                    out.torque[k * TICKS_PER_SAMPLE + s // STEPS_PER_TICK] = drive
+                    out.torque[k * ticks + s // STEPS_PER_TICK] = drive
             for i in range(nv):
                 # Speeds belong half a step before the positions; Coriolis torque wants both at one instant.
                 qpos[i], qvel[i] = z[i], 1.5 * u[i] - 0.5 * before[i]
@@ -280,8 +306,10 @@ def simulate(h, x, d, jt, w, hid, start, samples, with_drives, out):
                 _press(jt, z, u, force, pressed)
             for i in range(len(hid.kind)):
                 j = hid.joint[i]
-                if hid.kind[i] <= LAST_DRY:
-                    more, less = dry_levels(hid.kind[i], hid.p[i], t, om[j], load[j], q[1 - j])
+                if is_dry(hid.kind[i]):
+                    more, less = dry_levels(
+                        hid.kind[i], hid.p[i], hid.table[i], t, j, th[j], q[1 - j], om, load
+                    )
                     up[j] += more
                     down[j] += less
                 elif hid.human[i]:
@@ -319,11 +347,13 @@ def simulate(h, x, d, jt, w, hid, start, samples, with_drives, out):
         if k >= 0:
             for j in range(2):
                 at = z[place[j]] + d.wobble[j, 1]
-                mean = (u[place[j]] - opened[place[j]]) / SAMPLE_S
+                mean = (u[place[j]] - opened[place[j]]) / sample_s
                 bent = d.wobble[j, 0] * (cos(at) * mean - sin(at) * u[place[j]] ** 2)
+                twice = 2.0 * z[place[j]] + d.wobble[j, 3]
+                bent += 2.0 * d.wobble[j, 2] * (cos(twice) * mean - 2.0 * sin(twice) * u[place[j]] ** 2)
                 out.acceleration[k, j] = mean + bent
             for i in range(2):
-                out.link[k, 4 + i] = (u[i] - opened[i]) / SAMPLE_S
+                out.link[k, 4 + i] = (u[i] - opened[i]) / sample_s
 
 
 @njit(cache=True)
@@ -351,7 +381,9 @@ def _latch(out, k, z, u, place, d, human, ref, speed, pressed):
         seen = _read(d, j, theta)
         out.angle[k, j] = seen
         out.reading[k, j] = d.count[j] * np.round(seen / d.count[j]) if d.count[j] > 0.0 else seen
-        out.speed[k, j] = u[place[j]] * (1.0 + d.wobble[j, 0] * cos(theta + d.wobble[j, 1]))
+        turns = d.wobble[j, 0] * cos(theta + d.wobble[j, 1])
+        turns += 2.0 * d.wobble[j, 2] * cos(2.0 * theta + d.wobble[j, 3])
+        out.speed[k, j] = u[place[j]] * (1.0 + turns)
         out.human[k, j] = human[j]
         out.reference[k, j] = ref[j]
         out.drive_speed[k, j] = speed[j]

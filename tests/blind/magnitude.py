@@ -5,9 +5,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from tests.blind.causes import Cause
-from tests.blind.floor import blocks, moving
 from tests.blind.plan import HIP
-from tests.blind.plant import Recorded
+from tests.blind.recorded import Recorded
 
 PASSES = 7
 CLOSE = 0.04
@@ -24,9 +23,9 @@ def magnitude(cause: Cause, runs: Sequence[Recorded]) -> float:
 def rms(cause: Cause, runs: Sequence[Recorded]) -> tuple[float, float]:
     """Return rms of what is hidden and of the torque, N·m, away from reversals, over the runs where the cause acts."""
     j = HIP if cause.joint is None else cause.joint
-    acting = [(r, moving(r)[:, j]) for r in runs if cause.acts_in(r.run.kind)]
-    hidden = np.concatenate([blocks(r.effect)[rows, j] for r, rows in acting])
-    torque = np.concatenate([blocks(r.clean_torque)[rows, j] - r.weight for r, rows in acting])
+    acting = [(r, r.moving()[:, j]) for r in runs if cause.acts_in(r.run.kind)]
+    hidden = np.concatenate([r.blocks(r.effect)[rows, j] for r, rows in acting])
+    torque = np.concatenate([r.blocks(r.clean_torque)[rows, j] - r.weight for r, rows in acting])
     if not len(hidden):
         raise FloatingPointError("the simulated leg is stuck")
     return float(np.sqrt(np.mean(hidden**2))), float(np.sqrt(np.mean(torque**2)))

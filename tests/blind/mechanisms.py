@@ -19,7 +19,7 @@ from tests.blind.excitation import Excitation, random_excitation
 from tests.blind.machine import DRIVE_RATE_HZ, random_machine
 from tests.blind.people import random_person
 from tests.blind.plan import HIP, JOINTS, Run
-from tests.blind.plant import Recorded, Rig
+from tests.blind.recorded import Recorded, Rig
 from tests.blind.units import Units
 
 WEIGHTLESS = Segment(1e-4, 0.0, 1e-5)

@@ -83,7 +83,7 @@ def eccentric_encoder(rng, joint):
     phase = rng.uniform(0.0, 2 * np.pi)
 
     def install(plan: Plan, size: float, run: Run) -> None:
-        plan.wobble[joint] = size, phase
+        plan.wobble[joint, :2] = size, phase
 
     return dict(install=install, start=0.08, largest=0.3, shape=(phase,))
 

@@ -1,12 +1,13 @@
 """What is hidden in one run: every place where an effect can act, gathered before the run is simulated."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
 from tests.blind.body import Payload, Segment
+from tests.blind.channel import Channel
 from tests.blind.loop import RIGID, Hidden
 from tests.blind.smooth import MEMORIES
 
@@ -29,24 +30,6 @@ class Run:
         return self.kind == "with_human"
 
 
-@dataclass
-class Channel:
-    """What becomes of a joint's torque between motor and file; arrays (2,)."""
-
-    gain: NDArray = field(default_factory=lambda: np.ones(2))
-    bend: NDArray = field(default_factory=lambda: np.zeros(2))
-    """Change of gain per N·m of the torque's size."""
-    fade: NDArray = field(default_factory=lambda: np.zeros((2, 2)))
-    """Change of gain as the sensor warms, and its time constant."""
-    offset: NDArray = field(default_factory=lambda: np.zeros(2))
-    moving_offset: list = field(default_factory=lambda: [None, None])
-    """Function of time, N·m."""
-    delay_s: NDArray = field(default_factory=lambda: np.zeros(2))
-    lag_s: NDArray = field(default_factory=lambda: np.zeros(2))
-    cross: NDArray = field(default_factory=lambda: np.zeros((2, 2)))
-    """Share of the other joint's torque that leaks in."""
-
-
 class Plan:
     """Everything hidden in one run."""
 
@@ -57,7 +40,8 @@ class Plan:
         self.transmission = np.full(2, RIGID)
         self.spring = np.zeros((2, 5))
         self.encoder_offset = np.zeros(2)
-        self.wobble = np.zeros((2, 2))
+        self.wobble = np.zeros((2, 4))
+        """Of the encoders: amplitude and phase once a turn, amplitude and phase twice a turn."""
         self.tilt = np.zeros(3)
         self.lumps: list[tuple[int, Segment]] = []
         self.payload: Payload | None = None

@@ -18,12 +18,13 @@ from tests.blind.cases import Case
 from tests.blind.causes import SOFT, Cause, log_uniform, random_cause
 from tests.blind.excitation import PERIOD_S
 from tests.blind.faults import IN_EVERY_RUN, fault_named
-from tests.blind.floor import left_by_the_baseline, moving, noise_floor, ripple_floor
+from tests.blind.floor import left_by_the_baseline, noise_floor, ripple_floor
 from tests.blind.imperfections import random_imperfections
 from tests.blind.magnitude import rms, size_for
 from tests.blind.mechanisms import MECHANISMS, Mechanism
 from tests.blind.plan import HIP, KNEE, Plan, Run
-from tests.blind.plant import Recorded, Rig, record
+from tests.blind.plant import record
+from tests.blind.recorded import Recorded, Rig
 from tests.blind.smooth import SPRING
 
 LEAST, MOST = 0.03, 0.25
@@ -94,7 +95,7 @@ class _Draw:
         causes = [(cause, size) for cause, size, _ in hidden]
         recorded = [self._record(causes, kind, purpose, self.duration) for kind, purpose in runs]
         joints = len(self.mechanism.joints)
-        if min(moving(r).mean(axis=0)[:joints].min() for r in recorded) < LEAST_MOVING:
+        if min(r.moving().mean(axis=0)[:joints].min() for r in recorded) < LEAST_MOVING:
             raise FloatingPointError("the simulated machine is stuck most of the time")
         return Session(self.case, self.rig, hidden, recorded)
 
