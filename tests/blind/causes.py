@@ -14,8 +14,8 @@ from numpy.random import Generator
 from tests.blind import dry, smooth
 from tests.blind.body import Payload, Segment
 from tests.blind.excitation import HIGHEST, LOWEST
-from tests.blind.loop import ELASTIC, PLAY, PLAY_HERTZ, WIND_UP
 from tests.blind.plan import HIP, JOINTS, KNEE, Plan, Run
+from tests.blind.transmissions import ELASTIC, PLAY, PLAY_HERTZ, WIND_UP
 from tests.blind.wandering import random_walk
 
 Install = Callable[[Plan, float, Run], None]
@@ -44,6 +44,8 @@ class Cause:
     human: bool = False
     slow: bool = False
     """Does it change over a whole run?"""
+    follows_temperature: bool = False
+    """Is it read off the recorded temperature?"""
     kin: tuple[str, ...] = ()
     """Causes of the contract that a person would call it by, where it is none of them."""
 
@@ -61,15 +63,27 @@ Form = Callable[[Generator, int], Cause]
 FORMS: dict[str, list[Form]] = {}
 
 
-def form(effect: str, *, own: bool = False) -> Callable:
-    """Register a form of a cause; the function's name is the form's."""
+WORLDS = ("mujoco", "planar", "two_mass")
+
+
+def form(
+    effect: str, *, own: bool = False, worlds: tuple[str, ...] = WORLDS, plain: bool = True
+) -> Callable:
+    """Register a form of a cause; the function's name is the form's.
+
+    ``worlds`` are those whose plants have it; ``plain`` cases draw from the forms of the first examinations only.
+    """
 
     def register(draw: Callable) -> Callable:
         def made(rng: Generator, joint: int | None) -> Cause:
-            return Cause(effect=effect, form=draw.__name__, own=own, joint=joint, **draw(rng, joint))
+            return Cause(
+                effect=effect, form=draw.__name__, own=own, joint=joint, **draw(rng, joint)
+            )
 
         made.own = own
         made.form = draw.__name__
+        made.worlds = worlds
+        made.plain = plain
         FORMS.setdefault(effect, []).append(made)
         return draw
 
@@ -91,7 +105,9 @@ def either(rng: Generator) -> float:
     return float(rng.choice([-1.0, 1.0]))
 
 
-def hidden_torque(kind: int, joint: int, *shape: float, sign: float = 1.0, human: bool = False) -> Install:
+def hidden_torque(
+    kind: int, joint: int, *shape: float, sign: float = 1.0, human: bool = False
+) -> Install:
     """Return an installer of a torque whose first parameter is the size."""
 
     def install(plan: Plan, size: float, run: Run) -> None:
@@ -131,14 +147,20 @@ def exponential(rng, joint):
 def by_direction(rng, joint):
     sign = either(rng)
     return dict(
-        install=hidden_torque(dry.ASYMMETRY, joint, sign=sign), start=1.0, parameters=lambda s: {"asymmetry": sign * s}
+        install=hidden_torque(dry.ASYMMETRY, joint, sign=sign),
+        start=1.0,
+        parameters=lambda s: {"asymmetry": sign * s},
     )
 
 
 @form("coulomb_asymmetry")
 def smooth_transition(rng, joint):
     width = rng.uniform(0.05, 0.2)
-    return dict(install=hidden_torque(dry.ASYMMETRY_SMOOTH, joint, width, sign=either(rng)), start=1.0, shape=(width,))
+    return dict(
+        install=hidden_torque(dry.ASYMMETRY_SMOOTH, joint, width, sign=either(rng)),
+        start=1.0,
+        shape=(width,),
+    )
 
 
 @form("viscous_asymmetry", own=True)
@@ -170,18 +192,24 @@ def proportional(rng, joint):
 @form("load_dependent_friction")
 def root(rng, joint):
     scale = rng.uniform(10.0, 40.0)
-    return dict(install=hidden_torque(dry.LOAD_ROOT, joint, scale), start=0.1, largest=0.45, shape=(scale,))
+    return dict(
+        install=hidden_torque(dry.LOAD_ROOT, joint, scale), start=0.1, largest=0.45, shape=(scale,)
+    )
 
 
 @form("load_dependent_friction")
 def above_a_preload(rng, joint):
     onset = rng.uniform(1.0, 5.0)
-    return dict(install=hidden_torque(dry.LOAD_OFFSET, joint, onset), start=0.1, largest=0.5, shape=(onset,))
+    return dict(
+        install=hidden_torque(dry.LOAD_OFFSET, joint, onset), start=0.1, largest=0.5, shape=(onset,)
+    )
 
 
 @form("quadratic_drag", own=True)
 def quadratic(rng, joint):
-    return dict(install=hidden_torque(smooth.DRAG, joint, 2.0), start=2.0, parameters=lambda s: {"drag": s})
+    return dict(
+        install=hidden_torque(smooth.DRAG, joint, 2.0), start=2.0, parameters=lambda s: {"drag": s}
+    )
 
 
 @form("quadratic_drag")
@@ -373,7 +401,11 @@ def swaying(rng, joint):
         plan.tilt += np.array([sign * size, depth * size, frequency])
 
     return dict(
-        install=install, start=0.05, largest=0.35, shape=(depth, frequency), parameters=lambda s: {"tilt": sign * s}
+        install=install,
+        start=0.05,
+        largest=0.35,
+        shape=(depth, frequency),
+        parameters=lambda s: {"tilt": sign * s},
     )
 
 
@@ -385,7 +417,12 @@ def point_mass(rng, joint):
     def install(plan: Plan, size: float, run: Run) -> None:
         plan.lumps.append((joint, Segment(size / distance, 0.15, 0.0, sign * distance)))
 
-    return dict(install=install, start=0.2, shape=(distance,), parameters=lambda s: {"mass_moment": sign * s})
+    return dict(
+        install=install,
+        start=0.2,
+        shape=(distance,),
+        parameters=lambda s: {"mass_moment": sign * s},
+    )
 
 
 @form("mass_off_axis")
@@ -399,7 +436,10 @@ def extended_body(rng, joint):
         plan.lumps.append((joint, Segment(mass, along, mass * gyration**2, sign * distance)))
 
     return dict(
-        install=install, start=0.2, shape=(distance, along, gyration), parameters=lambda s: {"mass_moment": sign * s}
+        install=install,
+        start=0.2,
+        shape=(distance, along, gyration),
+        parameters=lambda s: {"mass_moment": sign * s},
     )
 
 
@@ -487,7 +527,9 @@ def _drift(curve_of, rng, joint, parameters=lambda s: {}):
 @form("torque_drift", own=True)
 def steady(rng, joint):
     sign = either(rng)
-    return _drift(lambda run: lambda t: sign * t / 70.0, rng, joint, lambda s: {"rate": sign * s / 70.0})
+    return _drift(
+        lambda run: lambda t: sign * t / 70.0, rng, joint, lambda s: {"rate": sign * s / 70.0}
+    )
 
 
 @form("torque_drift")
@@ -527,7 +569,9 @@ def _late(rng, joint, delay, lag, parameters=lambda s: {}):
         plan.channel.delay_s[joint] += delay * size
         plan.channel.lag_s[joint] += lag * size
 
-    return dict(install=install, start=0.02, largest=0.08, shape=(delay, lag), parameters=parameters)
+    return dict(
+        install=install, start=0.02, largest=0.08, shape=(delay, lag), parameters=parameters
+    )
 
 
 @form("time_delay", own=True)
@@ -582,7 +626,9 @@ def _rhythm(kind, rng, joint, depth):
     def install(plan: Plan, size: float, run: Run) -> None:
         if run.has_human:
             phases = run.rng.uniform(0.0, 2 * np.pi, 2)
-            plan.torque(kind, joint, size, frequency, phases[0], depth, *slow, phases[1], human=True)
+            plan.torque(
+                kind, joint, size, frequency, phases[0], depth, *slow, phases[1], human=True
+            )
 
     own = kind == smooth.RHYTHM
     return dict(
@@ -622,20 +668,23 @@ def above_a_threshold(rng, joint):
 
 @form("spasticity")
 def smooth_threshold_with_latency(rng, joint):
-    return _reflex(smooth.REFLEX_SMOOTH, rng, joint, rng.uniform(0.03, 0.12), rng.uniform(0.02, 0.05))
+    return _reflex(
+        smooth.REFLEX_SMOOTH, rng, joint, rng.uniform(0.03, 0.12), rng.uniform(0.02, 0.05)
+    )
 
 
-FIRM_CUFF = (15000.0, 60.0, 0.0)
-"""The other cuff of a wearer whose leg is one of its own: N·m/rad, N·m·s/rad, 1/rad²."""
+FIRM_CUFF = (15000.0, 60.0, 0.0, 0.0, 0.0, 0.0)
+"""The other cuff of a wearer whose leg is one of its own, as ``Plan.cuffs``."""
 
 
-def _limb(rng, joint, hardens):
+def _limb(rng, joint, hardens, slack=0.0, creep=(0.0, 0.0)):
     lag = rng.uniform(0.01, 0.03)
 
     def install(plan: Plan, size: float, run: Run) -> None:
         if run.has_human:
-            plan.cuffs = np.array([FIRM_CUFF, FIRM_CUFF])
-            plan.cuffs[joint] = 1.0 / size, lag / size, hardens
+            if plan.cuffs is None:
+                plan.cuffs = np.array([FIRM_CUFF, FIRM_CUFF])
+            plan.cuffs[joint] = 1.0 / size, lag / size, hardens, slack, *creep
 
     return dict(
         install=install,
@@ -664,7 +713,17 @@ SOFT = ("backlash", "joint_elasticity")
 HUMAN_CAUSES = ("passive_joint_torque", "voluntary_torque", "spasticity", "cuff_compliance")
 
 
-def random_cause(rng: Generator, effect: str, joint: int | None, form_name: str | None = None) -> Cause:
-    """Draw one form of a cause, or the form of that name; shape and all."""
-    forms = [f for f in FORMS[effect] if form_name in (None, f.form)]
+def random_cause(
+    rng: Generator,
+    effect: str,
+    joint: int | None,
+    form_name: str | None = None,
+    world: str | None = None,
+) -> Cause:
+    """Draw one form of a cause, or the form of that name; shape and all.
+
+    Without a world the forms are those of plain cases.
+    """
+    known = [f for f in FORMS[effect] if (f.plain if world is None else world in f.worlds)]
+    forms = [f for f in known if form_name in (None, f.form)]
     return forms[int(rng.integers(len(forms)))](rng, joint)

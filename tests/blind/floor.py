@@ -68,4 +68,3 @@ def _scored(r: Recorded) -> NDArray:
     """Tell in which blocks every joint moves that ever does, (m,) bool."""
     found = r.moving()
     return found[:, found.any(axis=0)].all(axis=1)
-

@@ -14,6 +14,7 @@ from numba import njit
 from tests.blind.body import PAYLOAD_INERTIA, evaluate
 from tests.blind.dry import dry_levels, is_dry
 from tests.blind.smooth import smooth_torque
+from tests.blind.transmissions import RIGID, transmitted
 
 DT = 0.25e-3
 STEPS_PER_TICK = 4
@@ -23,7 +24,6 @@ LEAD_IN_S = 5.0
 """From rest into the periodic motion before anything is recorded."""
 BLEND_S = 3.0
 TABLE_STEP_S = 0.02
-RIGID, ELASTIC, WIND_UP, PLAY, PLAY_HERTZ = 0, 1, 2, 3, 4
 
 
 class Excited(NamedTuple):
@@ -52,6 +52,7 @@ class Drives(NamedTuple):
     offset: np.ndarray
     wobble: np.ndarray
     speed_share: float
+    recorded_count: np.ndarray
 
 
 class Joints(NamedTuple):
@@ -148,27 +149,6 @@ def _read(d, j, theta):
 
 
 @njit(cache=True)
-def _transmitted(kind, s, x, rate):
-    """Torque of a transmission wound up by ``x``; ``s``: stiffness, damping, and the form's own."""
-    if kind == ELASTIC:
-        return s[0] * x * (1.0 + s[2] * x * x) + s[1] * rate
-    if kind == WIND_UP:
-        # Harmonic drives: soft until the first torque step, then stiffer.
-        soft = min(s[2], max(-s[2], x))
-        return s[0] * soft + s[3] * s[0] * (x - soft) + s[1] * rate
-    gap = 0.5 * s[2]
-    if abs(x) <= gap:
-        return 0.0
-    depth = abs(x) - gap
-    side = 1.0 if x > 0 else -1.0
-    if kind == PLAY_HERTZ:
-        push = s[0] * 12.0 * depth**1.5 + s[1] * side * rate * min(1.0, depth / 1e-3)
-    else:
-        push = s[0] * depth + s[1] * side * rate
-    return side * max(0.0, push)
-
-
-@njit(cache=True)
 def _press(jt, z, u, force, pressed):
     """Let the machine's cuffs push the wearer's leg (coordinates 2 and 3): forces across thigh and shank."""
     thigh, shank, length = jt.levers
@@ -178,7 +158,9 @@ def _press(jt, z, u, force, pressed):
     for i in range(2):
         way = thigh * hip if i == 0 else bend * hip + shank * (hip + knee)
         rate = thigh * hip_rate if i == 0 else bend * hip_rate + shank * (hip_rate + knee_rate)
-        pressed[i] = jt.cuffs[i, 0] * way * (1.0 + jt.cuffs[i, 2] * way * way) + jt.cuffs[i, 1] * rate
+        pressed[i] = (
+            jt.cuffs[i, 0] * way * (1.0 + jt.cuffs[i, 2] * way * way) + jt.cuffs[i, 1] * rate
+        )
     at_hip = thigh * pressed[0] + (bend + shank) * pressed[1]
     at_knee = shank * pressed[1]
     force[2] += at_hip
@@ -269,7 +251,9 @@ def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
                         seen = d.count[j] * np.round(seen / d.count[j])
                     speed[j] += d.speed_share * ((seen - angle[j]) / tick - speed[j])
                     angle[j] = seen
-                    wanted = d.kp[j] * (ref[j] - seen) + d.kd[j] * ((ref[j] - old_ref[j]) / tick - speed[j])
+                    wanted = d.kp[j] * (ref[j] - seen) + d.kd[j] * (
+                        (ref[j] - old_ref[j]) / tick - speed[j]
+                    )
                     drive[j] = min(d.limit[j], max(-d.limit[j], wanted))
                     old_ref[j] = ref[j]
                 if k >= 0:
@@ -299,7 +283,9 @@ def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
                 human[j] = 0.0
                 if place[j] != j:
                     A[place[j], place[j]] += jt.motor_inertia[j]
-                    passed = _transmitted(int(jt.transmission[j]), jt.spring[j], th[j] - q[j], om[j] - v[j])
+                    passed = transmitted(
+                        int(jt.transmission[j]), jt.spring[j], th[j] - q[j], om[j] - v[j]
+                    )
                     force[j] += passed
                     force[place[j]] -= passed
             if nv == 4:
@@ -313,7 +299,9 @@ def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
                     up[j] += more
                     down[j] += less
                 elif hid.human[i]:
-                    extra = smooth_torque(hid.kind[i], hid.p[i], hid.memory[i], hid.table[i], t, DT, j, q, v, a)
+                    extra = smooth_torque(
+                        hid.kind[i], hid.p[i], hid.memory[i], hid.table[i], t, DT, j, q, v, a
+                    )
                     human[j] += extra
                     force[j + 2 if nv == 4 else j] -= extra
                 else:
@@ -336,7 +324,11 @@ def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
                 u[i] = V[i, 0] - V[i, 1] * lam[0] - V[i, 2] * lam[1]
             for j in range(2):
                 a[j] = (u[j] - before[j]) / DT
-                inert = jt.motor_inertia[j] * (u[place[j]] - before[place[j]]) / DT if place[j] != j else 0.0
+                inert = (
+                    jt.motor_inertia[j] * (u[place[j]] - before[place[j]]) / DT
+                    if place[j] != j
+                    else 0.0
+                )
                 load[j] = drive[j] - lam[j] / DT - jt.viscous[j] * u[place[j]] - inert
             if k >= 0 and s == half:
                 # Kicks come at the beginning of a step, where the drive's torque is spread over it: half a
@@ -350,7 +342,9 @@ def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
                 mean = (u[place[j]] - opened[place[j]]) / sample_s
                 bent = d.wobble[j, 0] * (cos(at) * mean - sin(at) * u[place[j]] ** 2)
                 twice = 2.0 * z[place[j]] + d.wobble[j, 3]
-                bent += 2.0 * d.wobble[j, 2] * (cos(twice) * mean - 2.0 * sin(twice) * u[place[j]] ** 2)
+                bent += (
+                    2.0 * d.wobble[j, 2] * (cos(twice) * mean - 2.0 * sin(twice) * u[place[j]] ** 2)
+                )
                 out.acceleration[k, j] = mean + bent
             for i in range(2):
                 out.link[k, 4 + i] = (u[i] - opened[i]) / sample_s
@@ -380,7 +374,8 @@ def _latch(out, k, z, u, place, d, human, ref, speed, pressed):
         theta = z[place[j]] - 0.5 * DT * u[place[j]]
         seen = _read(d, j, theta)
         out.angle[k, j] = seen
-        out.reading[k, j] = d.count[j] * np.round(seen / d.count[j]) if d.count[j] > 0.0 else seen
+        count = d.recorded_count[j]
+        out.reading[k, j] = count * np.round(seen / count) if count > 0.0 else seen
         turns = d.wobble[j, 0] * cos(theta + d.wobble[j, 1])
         turns += 2.0 * d.wobble[j, 2] * cos(2.0 * theta + d.wobble[j, 3])
         out.speed[k, j] = u[place[j]] * (1.0 + turns)

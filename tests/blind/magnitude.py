@@ -52,3 +52,19 @@ def size_for(cause: Cause, wanted: float, pilot: Callable[[float], Sequence[Reco
         # What is far from proportional is bisected.
         size = new if low <= new <= high else float(np.sqrt(low * high))
     return size
+
+
+def small_size_for(
+    cause: Cause, wanted: float, pilot: Callable[[float], Sequence[Recorded]]
+) -> float:
+    """Return the size at which a cause has a small magnitude, in proportion to that of one larger size."""
+    size = cause.start
+    for _ in range(3):
+        try:
+            found = magnitude(cause, pilot(size))
+        except FloatingPointError:
+            found = np.inf
+        if np.isfinite(found) and found > 0:
+            return float(min(size * wanted / found, cause.largest))
+        size *= 0.2
+    raise FloatingPointError(f"{cause.label} has no size")

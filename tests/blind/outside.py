@@ -75,7 +75,11 @@ def cross_talk(rng, joint):
 def ringing(rng, joint):
     """A cover that rings for a while after each reversal."""
     shape = rng.uniform(2.5, 7.0), rng.uniform(0.3, 0.8)
-    return dict(install=hidden_torque(smooth.RINGING, joint, *shape, sign=either(rng)), start=3.0, shape=shape)
+    return dict(
+        install=hidden_torque(smooth.RINGING, joint, *shape, sign=either(rng)),
+        start=3.0,
+        shape=shape,
+    )
 
 
 def eccentric_encoder(rng, joint):
@@ -108,7 +112,9 @@ def kicks(rng, joint):
         knocks = np.zeros_like(t)
         for start in np.cumsum(run.rng.exponential(1.2, int(run.duration_s))):
             since = t - start
-            knocks += np.where(since >= 0, run.rng.normal() * np.exp(-np.maximum(since, 0.0) / 0.25), 0.0)
+            knocks += np.where(
+                since >= 0, run.rng.normal() * np.exp(-np.maximum(since, 0.0) / 0.25), 0.0
+            )
         plan.torque(smooth.TABLE, joint, size / np.sqrt(np.mean(knocks**2)), table=knocks)
 
     return dict(install=install, start=2.0, slow=True)
@@ -124,13 +130,19 @@ def dead_zone_damper(rng, joint):
 def detent(rng, joint):
     """A magnet that pulls the joint into one place."""
     place, width = rng.uniform(-0.2, 0.8), rng.uniform(0.1, 0.25)
-    return dict(install=hidden_torque(smooth.DETENT, joint, place, width), start=3.0, shape=(place, width))
+    return dict(
+        install=hidden_torque(smooth.DETENT, joint, place, width), start=3.0, shape=(place, width)
+    )
 
 
 def rough_patch(rng, joint):
     """A bearing that is rough on one side of the range."""
     place, width = rng.uniform(0.0, 0.6), rng.uniform(0.05, 0.3)
-    return dict(install=hidden_torque(smooth.ROUGH, joint, place, width, either(rng)), start=2.0, shape=(place, width))
+    return dict(
+        install=hidden_torque(smooth.ROUGH, joint, place, width, either(rng)),
+        start=2.0,
+        shape=(place, width),
+    )
 
 
 OUTSIDE = (
@@ -147,4 +159,10 @@ OF_ONE_JOINT = (
 
 def random_outside(rng, kind, joint: int) -> Cause:
     """Draw the shape of something that is not in the catalogue."""
-    return Cause(effect=f"outside:{kind.__name__}", joint=joint, form=kind.__name__, own=False, **kind(rng, joint))
+    return Cause(
+        effect=f"outside:{kind.__name__}",
+        joint=joint,
+        form=kind.__name__,
+        own=False,
+        **kind(rng, joint),
+    )

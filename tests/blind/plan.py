@@ -1,15 +1,16 @@
 """What is hidden in one run: every place where an effect can act, gathered before the run is simulated."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from tests.blind.body import Payload, Segment
+from tests.blind.body import Leg, Payload, Segment
 from tests.blind.channel import Channel
-from tests.blind.loop import RIGID, Hidden
+from tests.blind.loop import Hidden
 from tests.blind.smooth import MEMORIES
+from tests.blind.transmissions import RIGID
 
 HIP, KNEE = 0, 1
 JOINTS = ("hip", "knee")
@@ -23,6 +24,8 @@ class Run:
     purpose: str
     duration_s: float
     rng: Generator
+    temperature: NDArray | None = None
+    """Of both motors at 50 Hz, (n, 2) degrees Celsius."""
 
     @property
     def has_human(self) -> bool:
@@ -48,12 +51,21 @@ class Plan:
         self.load = np.array([0.0, 0.0, 1.0, 1.0])
         """Payload's mass, start, ramp, and whether it comes (+1) or goes (-1)."""
         self.cuffs: NDArray | None = None
-        """(2, 3) stiffness (N·m/rad about the joint), damping (N·m·s/rad), hardening (1/rad²) of thigh and shank cuff.
+        """(2, 6) of thigh and shank cuff, about their joints; None where both legs move as one.
 
-        None where the wearer is strapped so firmly that both legs are one.
+        Stiffness (N·m/rad), damping (N·m·s/rad), hardening (1/rad²), slack (rad), share that relaxes, and its time (s).
         """
 
-    def torque(self, kind: int, joint: int, *p: float, human: bool = False, table: NDArray | None = None) -> None:
+    def with_lumps(self, leg: Leg) -> Leg:
+        """Return a leg with what is fixed to its segments."""
+        for joint, lump in self.lumps:
+            name = ("thigh", "shank")[joint]
+            leg = replace(leg, **{name: getattr(leg, name) + lump})
+        return leg
+
+    def torque(
+        self, kind: int, joint: int, *p: float, human: bool = False, table: NDArray | None = None
+    ) -> None:
         """Hide a torque at a joint."""
         self.rows.append((kind, joint, human, p, table))
 

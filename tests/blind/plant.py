@@ -1,7 +1,5 @@
 """One run on the simulated rig: build the leg with what is hidden in it, move it, and measure."""
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
@@ -11,11 +9,13 @@ from tests.blind import loop
 from tests.blind.body import Body
 from tests.blind.channel import through
 from tests.blind.conditions import PLAIN, Conditions
+from tests.blind.cuffs import firm_forces, pad_forces
 from tests.blind.excitation import PERIOD_S, Excitation
 from tests.blind.machine import DRIVE_RATE_HZ, SPEED_CUTOFF_HZ, Machine
 from tests.blind.plan import HIP, Plan, Run
 from tests.blind.recorded import Recorded, Rig
 from tests.blind.trajectories import Trajectory
+from tests.blind.transmissions import RIGID, per_metre
 
 FOLLOWED_HZ = 12.0
 
@@ -59,7 +59,7 @@ def _needed(rig: Rig, plan: Plan, run: Run, log: loop.Log, conditions: Condition
     """Torque that the faultless machine needs for the reported motion, encoder's errors and all, (n, 2) N·m."""
     machine = rig.machine
     acceleration = log.acceleration.copy()
-    soft = plan.transmission != loop.RIGID
+    soft = plan.transmission != RIGID
     # A motor behind something soft trembles alone; the leg follows only what is slower.
     followed = butter(2, FOLLOWED_HZ, fs=conditions.rate_hz, output="sos")
     acceleration[:, soft] = sosfiltfilt(followed, acceleration[:, soft], axis=0)
@@ -79,25 +79,33 @@ def move(
 ) -> loop.Log:
     """Run the compiled loop."""
     machine = rig.machine
-    leg, wearer = machine.leg, None
-    for joint, lump in plan.lumps:
-        leg = replace(leg, **{_NAMES[joint]: getattr(leg, _NAMES[joint]) + lump})
+    leg, wearer = plan.with_lumps(machine.leg), None
     if run.has_human and plan.cuffs is None:
         leg = leg + rig.person.leg
     elif run.has_human:
         wearer = rig.person.leg
     body = Body(leg, wearer, plan.payload)
     # The hip's rotor turns with the thigh unless something soft is between them.
-    mass = plan.added_mass + np.diag([machine.hip_rotor if plan.transmission[HIP] == loop.RIGID else 0.0, 0.0])
+    mass = plan.added_mass + np.diag(
+        [machine.hip_rotor if plan.transmission[HIP] == RIGID else 0.0, 0.0]
+    )
     levers = np.array([*machine.cuff_distance, leg.length])
-    cuffs = np.zeros((2, 3)) if plan.cuffs is None else plan.cuffs / levers[:2, np.newaxis] ** 2
+    cuffs = np.zeros((2, 6)) if plan.cuffs is None else per_metre(plan.cuffs, levers)
     joints = loop.Joints(
-        machine.coulomb, machine.viscous, mass, plan.transmission, machine.rotors, plan.spring, cuffs, levers
+        machine.coulomb,
+        machine.viscous,
+        mass,
+        plan.transmission,
+        machine.rotors,
+        plan.spring,
+        cuffs,
+        levers,
     )
     world = loop.World(leg.gravity, plan.tilt, np.array([body.payload, *plan.load], dtype=float))
+    drive_counts = machine.counts if machine.drive_counts is None else machine.drive_counts
     drives = loop.Drives(
-        machine.kp, machine.kd, machine.limit, 2 * np.pi / machine.counts, plan.encoder_offset, plan.wobble,
-        float(1.0 - np.exp(-2 * np.pi * SPEED_CUTOFF_HZ / DRIVE_RATE_HZ)),
+        machine.kp, machine.kd, machine.limit, 2 * np.pi / drive_counts, plan.encoder_offset, plan.wobble,
+        float(1.0 - np.exp(-2 * np.pi * SPEED_CUTOFF_HZ / DRIVE_RATE_HZ)), 2 * np.pi / machine.counts,
     )  # fmt: skip
     excited = _excited(motion, samples * conditions.sample_s)
     log = empty_log(samples, conditions.ticks)
@@ -107,9 +115,6 @@ def move(
     if not np.isfinite(log.angle).all():
         raise FloatingPointError("the simulated leg became unstable")
     return log
-
-
-_NAMES = ("thigh", "shank")
 
 
 def _excited(motion: Excitation | Trajectory, duration_s: float) -> loop.Excited:
@@ -122,7 +127,9 @@ def _excited(motion: Excitation | Trajectory, duration_s: float) -> loop.Excited
 
 def empty_log(samples: int, ticks: int = loop.TICKS_PER_SAMPLE) -> loop.Log:
     """Return arrays for the loop to write into."""
-    pairs = {name: np.zeros((samples, 2)) for name in loop.Log._fields if name not in ("link", "torque")}
+    pairs = {
+        name: np.zeros((samples, 2)) for name in loop.Log._fields if name not in ("link", "torque")
+    }
     return loop.Log(**pairs, link=np.zeros((samples, 6)), torque=np.zeros((samples * ticks, 2)))
 
 
@@ -147,47 +154,30 @@ def _ripple(machine: Machine, angle: NDArray, noise: Generator, conditions: Cond
         coloured, _ = lfilter([1.0], [1.0, -memory], white, zi=[memory * noise.standard_normal()])
         share = machine.ripple_share[j]
         with_angle = np.sqrt(2.0) * np.sin(machine.ripple_cycles[j] * angle[:, j])
-        out[:, j] = machine.ripple[j] * (np.sqrt(1.0 - share) * coloured + np.sqrt(share) * with_angle)
+        out[:, j] = machine.ripple[j] * (
+            np.sqrt(1.0 - share) * coloured + np.sqrt(share) * with_angle
+        )
     return out
 
 
 def _cuff_forces(
     rig: Rig, plan: Plan, log: loop.Log, noise: Generator, conditions: Conditions = PLAIN
 ) -> NDArray:
-    """What four sensors feel (n, 4, 3) N: thigh front and back, shank front and back; distal, forward, lateral."""
-    machine = rig.machine
+    """Return what four sensors feel (n, 4, 3) N."""
     along, across = np.zeros_like(log.cuff), log.cuff
     if plan.cuffs is None:
         along, across = _firmly_strapped(rig, plan, log, conditions)
-    forces = np.zeros((len(across), 4, 3))
-    for i in range(2):
-        # The back pushes forward, the front backward: pads press, they never pull.
-        pressed = np.abs(across[:, i]) + machine.preload
-        forces[:, 2 * i, 1] = 0.5 * (across[:, i] - pressed)
-        forces[:, 2 * i + 1, 1] = 0.5 * (across[:, i] + pressed)
-        forces[:, 2 * i : 2 * i + 2, 0] = 0.5 * along[:, i : i + 1]
-    return forces + machine.cuff_zero + noise.normal(0.0, machine.cuff_noise, forces.shape)
+    return pad_forces(rig, along, across, noise)
 
 
 def _firmly_strapped(
     rig: Rig, plan: Plan, log: loop.Log, conditions: Conditions
 ) -> tuple[NDArray, NDArray]:
-    """Forces along and across thigh and shank, (n, 2) N each, when the wearer's leg moves as the machine does.
-
-    MuJoCo says what torque the wearer's own leg takes, on a tilted base too; forces follow from the levers, the
-    shank's first.
-    """
-    machine, leg = rig.machine, rig.person.leg
+    """Return forces along and across thigh and shank: MuJoCo says what torque the wearer's own leg takes."""
     q, dq, ddq = (log.link[:, 2 * i : 2 * i + 2].copy() for i in range(3))
     base, sway, frequency = plan.tilt
     # Inertia does not depend on the hip's angle: gravity from elsewhere is a hip turned otherwise.
-    q[:, HIP] += base + sway * np.sin(2 * np.pi * frequency * (np.arange(len(q)) + 0.5) * conditions.sample_s)
-    torque = Body(leg).inverse(q, dq, ddq) + log.human
-    thigh_lever, shank_lever = machine.cuff_distance
-    weight = machine.carried * leg.gravity
-    along_thigh = -weight * leg.thigh.mass * np.cos(q[:, 0])
-    along_shank = -weight * leg.shank.mass * np.cos(q.sum(axis=1))
-    across_shank = torque[:, 1] / shank_lever
-    at_knee = across_shank * np.cos(q[:, 1]) + along_shank * np.sin(q[:, 1])
-    across_thigh = (torque[:, 0] - torque[:, 1] - leg.length * at_knee) / thigh_lever
-    return np.column_stack([along_thigh, along_shank]), np.column_stack([across_thigh, across_shank])
+    q[:, HIP] += base + sway * np.sin(
+        2 * np.pi * frequency * (np.arange(len(q)) + 0.5) * conditions.sample_s
+    )
+    return firm_forces(rig, q, Body(rig.person.leg).inverse(q, dq, ddq) + log.human)

@@ -47,7 +47,11 @@ class Score:
         return self.named[0][0] if self.named else self.status
 
 
-def score(truth: Mapping[str, Any], answer: Mapping[str, Any], smallest: Mapping[Named, float] | None = None) -> Score:
+def score(
+    truth: Mapping[str, Any],
+    answer: Mapping[str, Any],
+    smallest: Mapping[Named, float] | None = None,
+) -> Score:
     """Compare an answer with the truth.
 
     Parameters
@@ -60,7 +64,11 @@ def score(truth: Mapping[str, Any], answer: Mapping[str, Any], smallest: Mapping
         Smallest visible size of each cause, rms N·m; without it silence about an effect is always wrong.
     """
     category = truth["case"]["category"]
-    verdict = answer["verdict"] or {"status": _without_verdict(answer["exit_code"]), "causes": [], "data_faults": []}
+    verdict = answer["verdict"] or {
+        "status": _without_verdict(answer["exit_code"]),
+        "causes": [],
+        "data_faults": [],
+    }
     hidden = tuple((h["effect"], h["joint"]) for h in truth["hidden"])
     causes = verdict["causes"]
     kin = {(effect, h["joint"]) for h in truth["hidden"] for effect in h["kin"]}
@@ -70,7 +78,9 @@ def score(truth: Mapping[str, Any], answer: Mapping[str, Any], smallest: Mapping
         "pair": lambda: all(any(h in names_of(c) for c in causes) for h in hidden),
         "none": lambda: verdict["status"] == SILENT and not verdict["data_faults"],
         "imperfect": lambda: verdict["status"] == SILENT and not verdict["data_faults"],
-        "outside": lambda: verdict["status"] == "unknown_cause" or bool(causes and kin & names_of(causes[0])),
+        "outside": lambda: (
+            verdict["status"] == "unknown_cause" or bool(causes and kin & names_of(causes[0]))
+        ),
         "fault": lambda: fault_is_named(truth["fault"], verdict["data_faults"], answer["message"]),
     }[category]()
     return Score(
@@ -80,7 +90,10 @@ def score(truth: Mapping[str, Any], answer: Mapping[str, Any], smallest: Mapping
         forms=tuple(h["form"] for h in truth["hidden"]),
         own_form=all(h["own_form"] for h in truth["hidden"]),
         magnitude=truth["hidden"][0]["magnitude"] if len(hidden) == 1 else None,
-        visibility=max(left / truth["noise_floor_nm"][joint] for joint, left in truth["left_by_baseline_nm"].items()),
+        visibility=max(
+            left / truth["noise_floor_nm"][joint]
+            for joint, left in truth["left_by_baseline_nm"].items()
+        ),
         kinds=tuple(truth["case"]["kinds"]),
         status=verdict["status"],
         named=tuple((c["effect"], c["joint"]) for c in causes),
@@ -105,7 +118,9 @@ def names_of(cause: Mapping[str, Any]) -> set[Named]:
     return {(cause["effect"], cause["joint"])} | {(tie["effect"], tie["joint"]) for tie in ties}
 
 
-def fault_is_named(fault: Mapping[str, Any], found: Iterable[Mapping[str, Any]], message: str) -> bool:
+def fault_is_named(
+    fault: Mapping[str, Any], found: Iterable[Mapping[str, Any]], message: str
+) -> bool:
     """Tell whether a data fault was said, in the verdict or in the line with which the command refused the files.
 
     Right are a file that has the fault and a word for what it is; where one channel has it, that channel or joint.
@@ -131,10 +146,16 @@ def _unseen(truth: Mapping[str, Any], smallest: Mapping[Named, float] | None) ->
     return hidden["rms_nm"] < smallest.get((hidden["effect"], hidden["joint"]), 0.0)
 
 
-def _ratio(values: Mapping[str, float] | None, floor: Mapping[str, float], category: str) -> dict[str, float]:
+def _ratio(
+    values: Mapping[str, float] | None, floor: Mapping[str, float], category: str
+) -> dict[str, float]:
     if not values or category == "fault":
         return {}
-    return {joint: values[joint] / noise for joint, noise in floor.items() if values.get(joint) is not None}
+    return {
+        joint: values[joint] / noise
+        for joint, noise in floor.items()
+        if values.get(joint) is not None
+    }
 
 
 def _covered(hidden: Iterable[Mapping[str, Any]], causes: Iterable[Mapping[str, Any]]):

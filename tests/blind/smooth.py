@@ -103,7 +103,9 @@ def _rhythm(kind, p, m, t, dt):
     """``p``: amplitude, frequency, phase, depth of wandering and two slow frequencies of it."""
     if kind == RHYTHM:
         return p[0] * sin(2.0 * pi * p[1] * t + p[2])
-    wander = 1.0 + p[3] * (sin(2.0 * pi * p[4] * t + p[6]) + 0.6 * sin(2.0 * pi * p[5] * t + 2.0 * p[6]))
+    wander = 1.0 + p[3] * (
+        sin(2.0 * pi * p[4] * t + p[6]) + 0.6 * sin(2.0 * pi * p[5] * t + 2.0 * p[6])
+    )
     m[0] += dt * 2.0 * pi * p[1] * wander
     beat = sin(m[0] + p[2])
     if kind == RHYTHM_BURSTS:

@@ -42,7 +42,11 @@ def answer(s: Score) -> str:
 
 def summary(scores: Sequence[Score]) -> Page:
     """Show what is asked for, and what was measured."""
-    return Page("Summary", ("measure", "result", "target"), [(m.name, m.shown, m.target) for m in measures(scores)])
+    return Page(
+        "Summary",
+        ("measure", "result", "target"),
+        [(m.name, m.shown, m.target) for m in measures(scores)],
+    )
 
 
 def by_cause(scores: Sequence[Score]) -> Page:
@@ -64,13 +68,21 @@ def by_visibility(scores: Sequence[Score]) -> Page:
 def by_form(scores: Sequence[Score]) -> Page:
     """Count singles by each functional form."""
     singles = of(scores, "single")
-    return _rates("By functional form", singles, lambda s: f"{s.truth[0][0]}: {s.forms[0]}{' (own)' * s.own_form}")
+    return _rates(
+        "By functional form",
+        singles,
+        lambda s: f"{s.truth[0][0]}: {s.forms[0]}{' (own)' * s.own_form}",
+    )
 
 
 def by_origin(scores: Sequence[Score]) -> Page:
     """Count singles by whether the plant's form is the catalogue's."""
     singles = of(scores, "single")
-    return _rates("By origin of the form", singles, lambda s: "the catalogue's own" if s.own_form else "another")
+    return _rates(
+        "By origin of the form",
+        singles,
+        lambda s: "the catalogue's own" if s.own_form else "another",
+    )
 
 
 def by_machine(scores: Sequence[Score]) -> Page:
@@ -150,7 +162,10 @@ def confusion(scores: Sequence[Score]) -> Page:
     counts = Counter((s.truth[0][0], _column(s)) for s in singles)
     columns = [*known, "joint", *others]
     head = ("hidden", *(str(i + 1) for i in range(len(known))), "joint", *others)
-    rows = [(f"{i + 1} {effect}", *(str(counts[effect, c] or "") for c in columns)) for i, effect in enumerate(known)]
+    rows = [
+        (f"{i + 1} {effect}", *(str(counts[effect, c] or "") for c in columns))
+        for i, effect in enumerate(known)
+    ]
     return Page("Confusion: hidden against named first", head, rows if singles else [])
 
 
@@ -182,7 +197,9 @@ def coverage(scores: Sequence[Score]) -> Page:
     found = [c for s in scores for c in s.covered]
     names = sorted({c[:2] for c in found})
     rows = [(f"{e}: {p}", str(Rate.of(c[2] for c in found if c[:2] == (e, p)))) for e, p in names]
-    return Page("Coverage of the parameters' 95 % intervals", ("parameter", "holds the truth"), rows)
+    return Page(
+        "Coverage of the parameters' 95 % intervals", ("parameter", "holds the truth"), rows
+    )
 
 
 def _rates(title: str, scores: Sequence[Score], key: Callable[[Score], str]) -> Page:

@@ -77,7 +77,9 @@ def random_family(rng: Generator) -> str:
     return str(rng.choice(list(FAMILIES), p=list(FAMILIES.values())))
 
 
-def _within_bounds(rng: Generator, middle: NDArray, motion: Callable, duration_s: float) -> Callable:
+def _within_bounds(
+    rng: Generator, middle: NDArray, motion: Callable, duration_s: float
+) -> Callable:
     """Scale a motion about its middle until it keeps the bounds, and often a little more."""
     t = np.arange(-LEAD_IN_S, duration_s, 0.02)
     q, dq, ddq = motion(t)
@@ -85,7 +87,9 @@ def _within_bounds(rng: Generator, middle: NDArray, motion: Callable, duration_s
         (HIGHEST - middle) / np.maximum(q.max(axis=0), 1e-9),
         (LOWEST - middle) / np.minimum(q.min(axis=0), -1e-9),
     )
-    most = np.min([room, FASTEST / np.abs(dq).max(axis=0), STEEPEST / np.abs(ddq).max(axis=0)], axis=0)
+    most = np.min(
+        [room, FASTEST / np.abs(dq).max(axis=0), STEEPEST / np.abs(ddq).max(axis=0)], axis=0
+    )
     scale = MARGIN * most * rng.uniform(GENTLE, FULL)
 
     def scaled(t: NDArray) -> State:
@@ -194,7 +198,9 @@ def _course(rng: Generator, length: float, closed: bool) -> tuple[NDArray, NDArr
     angles[0] = side = rng.choice([-1.0, 1.0]) * rng.uniform(0.2, 1.0)
     for i in range(1, moves + 1):
         # Far enough to count: to the other side, or a good way on.
-        side = -np.sign(side) * rng.uniform(0.1, 1.0) if rng.random() < 0.8 else rng.uniform(-1.0, 1.0)
+        side = (
+            -np.sign(side) * rng.uniform(0.1, 1.0) if rng.random() < 0.8 else rng.uniform(-1.0, 1.0)
+        )
         angles[i] = side
     if closed:
         angles[-1] = angles[0]

@@ -47,7 +47,9 @@ class Units:
 
     def converted(self, effect: str, parameters: dict[str, float]) -> dict[str, float]:
         """Return parameters as the recording's units have them."""
-        return {name: self.factor(*POWERS[effect, name]) * value for name, value in parameters.items()}
+        return {
+            name: self.factor(*POWERS[effect, name]) * value for name, value in parameters.items()
+        }
 
     def factor(self, torque: int, angle: int) -> float:
         """Return what turns a simulated value into a recorded one whose unit has these powers of torque and angle."""
