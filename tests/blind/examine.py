@@ -19,9 +19,9 @@ from tests.blind.detection import smallest_visible
 from tests.blind.scoring import Score, score
 
 SIMULATOR = (
-    "body", "cases", "causes", "channel", "conditions", "cuffs", "dry", "excitation", "faults", "floor", "imperfections",
+    "body", "cases", "causes", "channel", "conditions", "cuffs", "dry", "excitation", "faults", "floor", "imperfections", "legs",
     "loop", "machine", "magnitude", "mechanisms", "outside", "people", "plan", "planar", "plant", "recorded",
-    "recorder", "session", "smooth", "temperature", "trajectories", "transmissions", "two_link", "units", "wandering",
+    "recorder", "session", "smooth", "temperature", "trajectories", "transmissions", "two_link", "two_mass", "units", "wandering",
     "worlds",
 )  # fmt: skip
 """What decides how a session looks: when one of these files changes, sessions are simulated anew."""

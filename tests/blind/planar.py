@@ -13,14 +13,14 @@ import numpy as np
 from numba import njit
 from numpy.random import Generator
 from numpy.typing import NDArray
-from scipy.signal import butter, lfilter, sosfiltfilt
+from scipy.signal import lfilter
 
 from tests.blind import two_link
 from tests.blind.body import Leg, Segment
 from tests.blind.channel import through
 from tests.blind.conditions import Conditions
-from tests.blind.cuffs import firm_forces, pad_forces
 from tests.blind.dry import dry_levels, is_dry
+from tests.blind.legs import Reported, check, cuff_forces, links_of, needed
 from tests.blind.loop import LEAD_IN_S, Excited, reference_at
 from tests.blind.plan import HIP, Plan, Run
 from tests.blind.recorded import Recorded, Rig
@@ -39,7 +39,6 @@ CHATTER_NM = 1.0
 """Torque of the velocity loop for one count."""
 COARSE = 2.0**15
 """Counts per turn below which a drive counts on its motor's side, finer than the angle that it reports."""
-FOLLOWED_HZ = 12.0
 STRIBECK_FREE = 1e-3
 """Least friction level, N·m, so that bristles always have one."""
 
@@ -206,19 +205,6 @@ class Joints(NamedTuple):
     levers: np.ndarray
 
 
-class Links(NamedTuple):
-    """Coefficients of the driven leg and of a wearer's own (``own`` 0 where there is none), and the base."""
-
-    driven: np.ndarray
-    wearer: np.ndarray
-    own: int
-    length: float
-    gravity: float
-    tilt: np.ndarray
-    payload: np.ndarray
-    """Joint (-1 for none), distance, mass, start, ramp, direction."""
-
-
 class Log(NamedTuple):
     """What happened, at the samples (n, 2), and torque and angle of the motors at each millisecond."""
 
@@ -226,6 +212,8 @@ class Log(NamedTuple):
     angle: np.ndarray
     speed: np.ndarray
     acceleration: np.ndarray
+    link_acceleration: np.ndarray
+    wound: np.ndarray
     link: np.ndarray
     cuff: np.ndarray
     human: np.ndarray
@@ -354,6 +342,11 @@ def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
         if w.own:
             two_link.accelerations(hM, hforce, ha)
         if s >= 0:
+            k = (s + sample_steps // 2) // sample_steps
+            if k < samples:
+                for j in range(2):
+                    out.link_acceleration[k, j] += a[j] / sample_steps
+                    out.wound[k, j] += (th[j] - q[j]) / sample_steps
             if s % STEPS_PER_MS == 0:
                 k = s // STEPS_PER_MS
                 for j in range(2):
@@ -403,10 +396,13 @@ def record(
     log = move(rig, motion, plan, run, n, conditions)
     t = np.arange(n) * conditions.sample_s
     clean = through(plan.channel, log.torque, 1e-3, log.motor)[:: conditions.ticks]
-    needed = _needed(rig, plan, run, log, conditions)
+    reported = Reported(log.angle, log.speed, log.acceleration, log.link_acceleration, log.wound)
+    soft = plan.transmission != RIGID
+    effect = clean - needed(rig, run, reported, soft, conditions.sample_s)
     forces = None
     if run.has_human and conditions.has_cuffs:
-        forces = _cuff_forces(rig, plan, log, t, noise)
+        across = None if plan.cuffs is None else log.cuff
+        forces = cuff_forces(rig, plan, log.link, log.human, across, t, noise)
     return Recorded(
         run=run,
         time=t,
@@ -417,7 +413,7 @@ def record(
         drive_speed=log.drive_speed,
         forces=forces,
         clean_torque=clean,
-        effect=clean - needed,
+        effect=effect,
         true_speed=log.speed,
         link=log.link,
         sample_s=conditions.sample_s,
@@ -441,11 +437,10 @@ def move(
     none = np.zeros((2, 1))
     excited = Excited(motion.middle, none, none, 1.0, motion.table(samples * conditions.sample_s))
     simulate(
-        excited, drives, _joints(rig, plan), _links(rig, plan, run), plan.hidden(), motion.middle, samples,
+        excited, drives, _joints(rig, plan), links_of(rig, plan, run), plan.hidden(), motion.middle, samples,
         sample_steps, True, log,
     )  # fmt: skip
-    if not np.isfinite(log.angle).all() or np.abs(log.angle).max() > 10.0:
-        raise FloatingPointError("the simulated leg became unstable")
+    check(log.angle, log.torque)
     return log
 
 
@@ -470,52 +465,6 @@ def _joints(rig: Rig, plan: Plan) -> Joints:
         m.coulomb, m.viscous, m.coulomb / m.presliding, m.bristle_damping, mass, plan.transmission, m.rotors,
         plan.spring, cuffs, levers,
     )  # fmt: skip
-
-
-def _links(rig: Rig, plan: Plan, run: Run) -> Links:
-    leg, own = rig.machine.leg, False
-    driven = two_link.coefficients(plan.with_lumps(leg))
-    if run.has_human:
-        own = plan.cuffs is not None
-        if not own:
-            driven = driven + two_link.coefficients(rig.person.leg)
-    payload = np.array([-1.0, 0.0, 0.0, 0.0, 1.0, 1.0])
-    if plan.payload:
-        payload = np.array([plan.payload.joint, plan.payload.distance, *plan.load])
-    wearer = two_link.coefficients(rig.person.leg)
-    return Links(driven, wearer, int(own), leg.length, leg.gravity, plan.tilt, payload)
-
-
-def _needed(rig: Rig, plan: Plan, run: Run, log: Log, conditions: Conditions) -> NDArray:
-    """Torque that the faultless machine needs for the reported motion, encoder's errors and all, (n, 2) N·m."""
-    m = rig.machine
-    acceleration = log.acceleration.copy()
-    soft = plan.transmission != RIGID
-    if soft.any():
-        # A motor behind something soft trembles alone; the leg follows only what is slower.
-        followed = butter(2, FOLLOWED_HZ, fs=conditions.rate_hz, output="sos")
-        acceleration[:, soft] = sosfiltfilt(followed, acceleration[:, soft], axis=0)
-    c = two_link.coefficients(rig.leg(run))
-    needed = two_link.inverse(
-        c, m.leg.gravity, np.zeros(len(log.angle)), log.angle, log.speed, acceleration
-    )
-    needed[:, HIP] += m.hip_rotor * acceleration[:, HIP]
-    needed += m.rotors * (log.acceleration - acceleration)
-    return needed + m.coulomb * np.sign(log.speed) + m.viscous * log.speed
-
-
-def _cuff_forces(rig: Rig, plan: Plan, log: Log, t: NDArray, noise: Generator) -> NDArray:
-    """Return what four sensors feel (n, 4, 3) N."""
-    if plan.cuffs is not None:
-        return pad_forces(rig, np.zeros_like(log.cuff), log.cuff, noise)
-    base, sway, frequency = plan.tilt
-    tilt = base + sway * np.sin(2 * np.pi * frequency * t)
-    q, dq, ddq = (np.ascontiguousarray(log.link[:, 2 * i : 2 * i + 2]) for i in range(3))
-    c = two_link.coefficients(rig.person.leg)
-    torque = two_link.inverse(c, rig.machine.leg.gravity, tilt, q, dq, ddq) + log.human
-    return pad_forces(
-        rig, *firm_forces(rig, q + np.column_stack([tilt, np.zeros_like(tilt)]), torque), noise
-    )
 
 
 def _error(

@@ -45,6 +45,9 @@ SHORT_PILOT_S = 7.0
 ATTEMPTS = 6
 LEAST_MOVING, LEAST_MOVING_ANYHOW = 0.4, 0.15
 """Share of a run in which each joint has to be away from reversals; the latter where a motion may hold still."""
+OF_FLOOR, OF_TORQUE = 0.35, 0.006
+"""How much rigid body and friction may leave of a good rig's small effects: of the noise floor, of the
+torque's rms, whichever is larger."""
 PURPOSES = ("train", "validate")
 
 
@@ -135,9 +138,20 @@ class _Draw:
         joints = len(self.mechanism.joints)
         if min(r.moving().mean(axis=0)[:joints].min() for r in recorded) < self.least_moving:
             raise FloatingPointError("the simulated machine is stuck most of the time")
+        if self.case.category == "none":
+            self._check_background(recorded)
         return Session(
             self.case, self.rig, hidden, recorded, self.conditions, self._trajectories(), background
         )
+
+    def _check_background(self, runs: list[Recorded]) -> None:
+        """Refuse a rig whose small effects add up to something that ought to be named."""
+        if self.case.plain:
+            return
+        left = left_by_the_baseline(self.rig, runs)
+        torque = np.sqrt(np.mean([np.mean(r.torque**2, axis=0) for r in runs], axis=0))
+        if np.any(left > np.maximum(OF_FLOOR * ripple_floor(runs), OF_TORQUE * torque)):
+            raise FloatingPointError("what a good rig gets a little wrong is large")
 
     def _trajectories(self) -> dict[str, Trajectory]:
         return self.motion

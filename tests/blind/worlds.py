@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from numpy.random import Generator
 
-from tests.blind import machine, planar, plant
+from tests.blind import machine, planar, plant, two_mass
 from tests.blind.people import random_person
 from tests.blind.recorded import Recorded, Rig
 
@@ -31,5 +31,6 @@ WORLDS = {
     for world in (
         World("mujoco", machine.random_rich_machine, plant.record),
         World("planar", planar.random_machine, planar.record),
+        World("two_mass", two_mass.random_machine, two_mass.record),
     )
 }
