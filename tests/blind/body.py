@@ -10,8 +10,10 @@ from pathlib import Path
 import llvmlite.binding
 import mujoco
 import numpy as np
-from numba import njit, types
+from numba import types
 from numpy.typing import NDArray
+
+from tests.blind.compiled import njit
 
 llvmlite.binding.load_library_permanently(
     str(next(Path(mujoco.__file__).parent.glob("libmujoco.so*")))
@@ -133,7 +135,7 @@ def _inertial(s: Segment) -> str:
     )
 
 
-@njit(cache=True)
+@njit()
 def evaluate(model, data, bias):
     """Bring mass matrix and bias torque (Coriolis, gravity) up to the state in qpos and qvel."""
     _kinematics(model, data)
@@ -143,7 +145,7 @@ def evaluate(model, data, bias):
     _newton_euler(model, data, 0, bias.ctypes.data)
 
 
-@njit(cache=True)
+@njit()
 def _inverse(model, data, qpos, qvel, qacc, bias, q, dq, ddq):
     torque = np.empty_like(q)
     for k in range(len(q)):

@@ -5,7 +5,8 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from tests.blind.causes import CAUSES, HUMAN_CAUSES, Spec, joints_of
+from tests.blind import further_forms  # noqa: F401 - adds to the causes
+from tests.blind.causes import FORMS, HUMAN_CAUSES, PLAIN_CAUSES, Spec, joints_of
 from tests.blind.conditions import ONE_KIND
 from tests.blind.faults import FAULTS
 from tests.blind.mechanisms import MECHANISMS, ONE_JOINT
@@ -23,15 +24,18 @@ MIX = {
 """Shares of the categories in a mixed examination."""
 MIX_OF_ONE_JOINT = {"single": 0.55, "none": 0.10, "imperfect": 0.10, "outside": 0.25}
 """The same of machines of one joint."""
+CAUSES = tuple(FORMS)
+"""All that can be hidden of the catalogue."""
 SINGLES: tuple[Spec, ...] = tuple(
     (effect, joint) for effect in CAUSES for joint in joints_of(effect)
 )
-PLAIN_SINGLES = SINGLES
+PLAIN_SINGLES: tuple[Spec, ...] = tuple(one for one in SINGLES if one[0] in PLAIN_CAUSES)
 STAGGER = 17
 """Turns by which each further world is ahead, so that a few cases of each hide different things."""
 NOT_TOGETHER = (
     {"backlash", "joint_elasticity"},  # one transmission a joint, and each hides the other
     {"cuff_compliance", "passive_joint_torque"},
+    {"encoder_offset", "encoder_eccentricity"},
 )
 
 
@@ -93,7 +97,7 @@ def of_one_joint(
         for name in ONE_JOINT
         if effect in ONE_JOINT[name].effects
     ]
-    outside = [(name, f"outside:{kind.__name__}") for kind in OF_ONE_JOINT for name in ONE_JOINT]
+    outside = [(name, f"outside:{kind}") for kind in OF_ONE_JOINT for name in ONE_JOINT]
     plain = [(name, "") for name in ONE_JOINT]
     hides = {"single": places, "outside": outside, "none": plain, "imperfect": plain}
     planned = []
@@ -138,7 +142,7 @@ def case(seed: int, category: str, turn: int, world: str = "mujoco", plain: bool
     elif category == "pair":
         hidden = _pair(rng, singles[turn * 7 % len(singles)], singles)
     elif category == "outside":
-        kind = OUTSIDE[turn % len(OUTSIDE)].__name__
+        kind = OUTSIDE[turn % len(OUTSIDE)]
         hidden = ((f"outside:{kind}", int(rng.choice([HIP, KNEE]))),)
     else:
         hidden = ()

@@ -10,10 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
+from numpy.typing import NDArray
 
 from tests.blind import dry, smooth
 from tests.blind.body import Payload, Segment
 from tests.blind.excitation import HIGHEST, LOWEST
+from tests.blind.families import OF_CATALOGUE
 from tests.blind.plan import HIP, JOINTS, KNEE, Plan, Run
 from tests.blind.transmissions import ELASTIC, PLAY, PLAY_HERTZ, WIND_UP
 from tests.blind.wandering import random_walk
@@ -21,6 +23,9 @@ from tests.blind.wandering import random_walk
 Install = Callable[[Plan, float, Run], None]
 Spec = tuple[str, int | None]
 """An effect and its joint; none for the whole leg."""
+Reach = tuple[NDArray, NDArray]
+"""Least and greatest angle of each joint that a motion comes to."""
+BOUNDS: Reach = (LOWEST, HIGHEST)
 
 
 @dataclass(frozen=True)
@@ -44,8 +49,16 @@ class Cause:
     human: bool = False
     slow: bool = False
     """Does it change over a whole run?"""
+    fast: bool = False
+    """Is it too fast for block averages, and told sample by sample?"""
     follows_temperature: bool = False
     """Is it read off the recorded temperature?"""
+    families: tuple[str, ...] = ()
+    """Kinds of law that it may be said to be (``families.py``)."""
+    repeats: bool = True
+    """Is it the same in every period of the motion?"""
+    held_back: bool = False
+    """Is it never shown to what learns from sessions?"""
     kin: tuple[str, ...] = ()
     """Causes of the contract that a person would call it by, where it is none of them."""
 
@@ -75,9 +88,19 @@ def form(
     """
 
     def register(draw: Callable) -> Callable:
-        def made(rng: Generator, joint: int | None) -> Cause:
+        within = draw.__code__.co_argcount > 2
+
+        def made(rng: Generator, joint: int | None, reach: Reach = BOUNDS) -> Cause:
+            drawn = draw(rng, joint, reach) if within else draw(rng, joint)
+            kind = OF_CATALOGUE[effect]
             return Cause(
-                effect=effect, form=draw.__name__, own=own, joint=joint, **draw(rng, joint)
+                effect=effect,
+                form=draw.__name__,
+                own=own,
+                joint=joint,
+                families=kind.families,
+                repeats=kind.repeats,
+                **drawn,
             )
 
         made.own = own
@@ -313,7 +336,7 @@ def carried_by_the_thigh(rng, joint):
     return dict(install=install, start=0.2, shape=(ratio,), parameters=lambda s: {"inertia": s})
 
 
-def _play(kind, rng, joint):
+def play(kind, rng, joint):
     stiffness, damping = log_uniform(rng, 2500.0, 6000.0), rng.uniform(2.0, 6.0)
 
     def install(plan: Plan, size: float, run: Run) -> None:
@@ -327,15 +350,15 @@ def _play(kind, rng, joint):
 
 @form("backlash")
 def two_masses_with_stiff_contact(rng, joint):
-    return _play(PLAY, rng, joint)
+    return play(PLAY, rng, joint)
 
 
 @form("backlash")
 def two_masses_with_hertzian_contact(rng, joint):
-    return _play(PLAY_HERTZ, rng, joint)
+    return play(PLAY_HERTZ, rng, joint)
 
 
-def _elastic(kind, rng, joint, *more):
+def elastic(kind, rng, joint, *more):
     def install(plan: Plan, size: float, run: Run) -> None:
         damping = 0.1 * np.sqrt(0.04 / size)
         plan.soft(joint, kind, 1.0 / size, damping, *more)
@@ -349,17 +372,17 @@ def _elastic(kind, rng, joint, *more):
 
 @form("joint_elasticity", own=True)
 def two_masses(rng, joint):
-    return _elastic(ELASTIC, rng, joint)
+    return elastic(ELASTIC, rng, joint)
 
 
 @form("joint_elasticity")
 def hardening(rng, joint):
-    return _elastic(ELASTIC, rng, joint, log_uniform(rng, 50.0, 800.0))
+    return elastic(ELASTIC, rng, joint, log_uniform(rng, 50.0, 800.0))
 
 
 @form("joint_elasticity")
 def soft_wind_up(rng, joint):
-    return _elastic(WIND_UP, rng, joint, rng.uniform(0.004, 0.02), rng.uniform(1.4, 2.2))
+    return elastic(WIND_UP, rng, joint, rng.uniform(0.004, 0.02), rng.uniform(1.4, 2.2))
 
 
 # --- Structure
@@ -443,7 +466,7 @@ def extended_body(rng, joint):
     )
 
 
-def _payload(rng, joint, ramp, *, everywhere):
+def payload(rng, joint, ramp, *, everywhere):
     distance, direction = rng.uniform(0.2, 0.35), either(rng)
     shared = rng.uniform(0.25, 0.75)
 
@@ -462,12 +485,12 @@ def _payload(rng, joint, ramp, *, everywhere):
 
 @form("payload_change", own=True)
 def sudden(rng, joint):
-    return _payload(rng, joint, 0.01, everywhere=True)
+    return payload(rng, joint, 0.01, everywhere=True)
 
 
 @form("payload_change")
 def over_half_a_second(rng, joint):
-    return _payload(rng, joint, 0.5, everywhere=False)
+    return payload(rng, joint, 0.5, everywhere=False)
 
 
 # --- Sensors
@@ -516,7 +539,7 @@ def settling(rng, joint):
     return dict(install=install, start=1.0, shape=(time,))
 
 
-def _drift(curve_of, rng, joint, parameters=lambda s: {}):
+def drift(curve_of, rng, joint, parameters=lambda s: {}):
     def install(plan: Plan, size: float, run: Run) -> None:
         curve = curve_of(run)
         plan.channel.moving_offset[joint].append(lambda t: size * curve(t))
@@ -527,7 +550,7 @@ def _drift(curve_of, rng, joint, parameters=lambda s: {}):
 @form("torque_drift", own=True)
 def steady(rng, joint):
     sign = either(rng)
-    return _drift(
+    return drift(
         lambda run: lambda t: sign * t / 70.0, rng, joint, lambda s: {"rate": sign * s / 70.0}
     )
 
@@ -535,12 +558,12 @@ def steady(rng, joint):
 @form("torque_drift")
 def exponential_approach(rng, joint):
     sign, time = either(rng), rng.uniform(15.0, 40.0)
-    return _drift(lambda run: lambda t: sign * (1.0 - np.exp(-t / time)), rng, joint)
+    return drift(lambda run: lambda t: sign * (1.0 - np.exp(-t / time)), rng, joint)
 
 
 @form("torque_drift")
 def smooth_random_walk(rng, joint):
-    return _drift(lambda run: random_walk(run.rng, run.duration_s, smoothing_s=6.0), rng, joint)
+    return drift(lambda run: random_walk(run.rng, run.duration_s, smoothing_s=6.0), rng, joint)
 
 
 @form("encoder_offset", own=True)
@@ -559,7 +582,7 @@ def with_slight_eccentricity(rng, joint):
 
     def install(plan: Plan, size: float, run: Run) -> None:
         plan.encoder_offset[joint] += sign * size
-        plan.wobble[joint, :2] = depth * size, phase
+        plan.eccentric(joint, depth * size, phase)
 
     return dict(install=install, start=0.05, largest=0.3, shape=(depth, phase))
 
@@ -588,11 +611,11 @@ def delay_and_lag(rng, joint):
 # --- The person
 
 
-def _end_range(kind, rng, joint, *sharpness):
+def _end_range(kind, rng, joint, reach, *sharpness):
     side = either(rng)
-    low, high = LOWEST[joint], HIGHEST[joint]
-    reach = rng.uniform(0.25, 0.45) * (high - low)
-    onset = high - reach if side > 0 else low + reach
+    low, high = reach[0][joint], reach[1][joint]
+    depth = rng.uniform(0.25, 0.45) * (high - low)
+    onset = high - depth if side > 0 else low + depth
     return dict(
         install=hidden_torque(kind, joint, onset, *sharpness, side, human=True), start=2.0, human=True,
         shape=(onset, *sharpness, side),
@@ -600,23 +623,23 @@ def _end_range(kind, rng, joint, *sharpness):
 
 
 @form("passive_joint_torque", own=True)
-def exponential_stiffness(rng, joint):
-    return _end_range(smooth.END_EXPONENTIAL, rng, joint, rng.uniform(4.0, 9.0))
+def exponential_stiffness(rng, joint, reach):
+    return _end_range(smooth.END_EXPONENTIAL, rng, joint, reach, rng.uniform(4.0, 9.0))
 
 
 @form("passive_joint_torque")
-def tanh_stop(rng, joint):
-    return _end_range(smooth.END_TANH, rng, joint, rng.uniform(4.0, 9.0))
+def tanh_stop(rng, joint, reach):
+    return _end_range(smooth.END_TANH, rng, joint, reach, rng.uniform(4.0, 9.0))
 
 
 @form("passive_joint_torque")
-def quadratic_stop(rng, joint):
-    return _end_range(smooth.END_POWER, rng, joint, 2.0)
+def quadratic_stop(rng, joint, reach):
+    return _end_range(smooth.END_POWER, rng, joint, reach, 2.0)
 
 
 @form("passive_joint_torque")
-def cubic_stop(rng, joint):
-    return _end_range(smooth.END_POWER, rng, joint, 3.0)
+def cubic_stop(rng, joint, reach):
+    return _end_range(smooth.END_POWER, rng, joint, reach, 3.0)
 
 
 def _rhythm(kind, rng, joint, depth):
@@ -677,7 +700,7 @@ FIRM_CUFF = (15000.0, 60.0, 0.0, 0.0, 0.0, 0.0)
 """The other cuff of a wearer whose leg is one of its own, as ``Plan.cuffs``."""
 
 
-def _limb(rng, joint, hardens, slack=0.0, creep=(0.0, 0.0)):
+def limb(rng, joint, hardens, slack=0.0, creep=(0.0, 0.0)):
     lag = rng.uniform(0.01, 0.03)
 
     def install(plan: Plan, size: float, run: Run) -> None:
@@ -699,15 +722,16 @@ def _limb(rng, joint, hardens, slack=0.0, creep=(0.0, 0.0)):
 
 @form("cuff_compliance")
 def kelvin_voigt_limb(rng, joint):
-    return _limb(rng, joint, 0.0)
+    return limb(rng, joint, 0.0)
 
 
 @form("cuff_compliance")
 def hardening_limb(rng, joint):
-    return _limb(rng, joint, log_uniform(rng, 20.0, 150.0))
+    return limb(rng, joint, log_uniform(rng, 20.0, 150.0))
 
 
-CAUSES = tuple(FORMS)
+PLAIN_CAUSES = tuple(FORMS)
+"""What the first examinations hid; ``further_forms`` adds to it."""
 SOFT = ("backlash", "joint_elasticity")
 """Causes that part the motor from its link."""
 HUMAN_CAUSES = ("passive_joint_torque", "voluntary_torque", "spasticity", "cuff_compliance")
@@ -719,11 +743,14 @@ def random_cause(
     joint: int | None,
     form_name: str | None = None,
     world: str | None = None,
+    reach: Reach = BOUNDS,
 ) -> Cause:
     """Draw one form of a cause, or the form of that name; shape and all.
 
     Without a world the forms are those of plain cases.
     """
     known = [f for f in FORMS[effect] if (f.plain if world is None else world in f.worlds)]
+    # What the first examinations did not hide has no plain forms: a machine of one joint takes any.
+    known = known or [f for f in FORMS[effect] if WORLDS[0] in f.worlds]
     forms = [f for f in known if form_name in (None, f.form)]
-    return forms[int(rng.integers(len(forms)))](rng, joint)
+    return forms[int(rng.integers(len(forms)))](rng, joint, reach)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 OfTime = Callable[[NDArray], NDArray]
+OfTorqueAndSpeed = Callable[[NDArray, NDArray], NDArray]
 
 
 @dataclass
@@ -36,12 +37,19 @@ class Channel:
     cross_lag_s: NDArray = field(default_factory=lambda: np.zeros(2))
     ripple: tuple[list[OfTime], ...] = field(default_factory=lambda: ([], []))
     """Torques that the channel adds by the motor's angle, a list for each joint."""
+    of_speed: tuple[list[OfTorqueAndSpeed], ...] = field(default_factory=lambda: ([], []))
+    """Torques that the channel adds by torque and the motor's speed, a list for each joint."""
     quantum: NDArray = field(default_factory=lambda: np.zeros(2))
     """Step of the reported torque, N·m; 0 where there is none."""
     dead_band: NDArray = field(default_factory=lambda: np.zeros(2))
     """Torque below which 0 is reported, N·m."""
     hold_s: NDArray = field(default_factory=lambda: np.zeros(2))
     """Time for which a reported torque stays the same; 0 where it never does."""
+
+    @property
+    def needs_angle(self) -> bool:
+        """Does anything in it go with the motors' angles?"""
+        return any(self.ripple) or any(self.of_speed)
 
 
 def through(channel: Channel, torque: NDArray, period_s: float, angle: NDArray | None) -> NDArray:
@@ -52,7 +60,7 @@ def through(channel: Channel, torque: NDArray, period_s: float, angle: NDArray |
     torque : (n, 2) array
         N·m, each ``period_s`` from time 0 on.
     angle : (n, 2) array or None
-        Of the motors, rad; needed where the channel has a ripple.
+        Of the motors, rad; needed where the channel ``needs_angle``.
     """
     t = np.arange(len(torque)) * period_s
     mixed = torque @ (np.eye(2) + _linear(channel)).T
@@ -74,6 +82,8 @@ def through(channel: Channel, torque: NDArray, period_s: float, angle: NDArray |
         x = x + channel.offset[j]
         for moving in channel.moving_offset[j]:
             x = x + moving(t)
+        for added in channel.of_speed[j]:
+            x = x + added(torque[:, j], np.gradient(angle[:, j], period_s))
         for ripple in channel.ripple[j]:
             x = x + ripple(angle[:, j])
         out[:, j] = _digital(channel, j, x, period_s)

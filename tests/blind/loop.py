@@ -9,9 +9,9 @@ from math import cos, pi, sin
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from tests.blind.body import PAYLOAD_INERTIA, evaluate
+from tests.blind.compiled import njit
 from tests.blind.dry import dry_levels, is_dry
 from tests.blind.smooth import smooth_torque
 from tests.blind.transmissions import RIGID, transmitted
@@ -113,7 +113,7 @@ class Log(NamedTuple):
     """(5 n, 2)."""
 
 
-@njit(cache=True)
+@njit()
 def tabulated(table, t, j):
     """Angle of joint ``j`` at time ``t``, by cubic Hermite interpolation of angles and speeds."""
     place = min(max((t + LEAD_IN_S) / TABLE_STEP_S, 0.0), len(table) - 1.001)
@@ -125,7 +125,7 @@ def tabulated(table, t, j):
     return q0 + f * (v0 + f * (3.0 * rise - 2.0 * v0 - v1 + f * (v0 + v1 - 2.0 * rise)))
 
 
-@njit(cache=True)
+@njit()
 def reference_at(x, t, out):
     """Set-point at time ``t``, a smooth start from the mean angle before time 0."""
     s = min(1.0, max(0.0, (t + LEAD_IN_S - 0.5) / BLEND_S))
@@ -142,13 +142,13 @@ def reference_at(x, t, out):
         out[j] = x.theta0[j] + share * swing
 
 
-@njit(cache=True)
+@njit()
 def _read(d, j, theta):
     once = theta + d.offset[j] + d.wobble[j, 0] * sin(theta + d.wobble[j, 1])
     return once + d.wobble[j, 2] * sin(2.0 * theta + d.wobble[j, 3])
 
 
-@njit(cache=True)
+@njit()
 def _press(jt, z, u, force, pressed):
     """Let the machine's cuffs push the wearer's leg (coordinates 2 and 3): forces across thigh and shank."""
     thigh, shank, length = jt.levers
@@ -169,7 +169,7 @@ def _press(jt, z, u, force, pressed):
     force[1] -= at_knee
 
 
-@njit(cache=True)
+@njit()
 def _solve(A, b, n, x):
     """Solve A x = b in place for up to five unknowns; A symmetric and positive definite."""
     for i in range(n):
@@ -188,7 +188,7 @@ def _solve(A, b, n, x):
             x[i, c] = total / A[i, i]
 
 
-@njit(cache=True)
+@njit()
 def _set_world(h, w, t):
     """Turn gravity and load the payload as they are at time ``t``."""
     mass, subtree, inertia, gravity = h[9:]
@@ -203,7 +203,7 @@ def _set_world(h, w, t):
         inertia[body, :] = lump * PAYLOAD_INERTIA
 
 
-@njit(cache=True)
+@njit()
 def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
     """Run the leg from rest at ``start`` (2,) and log ``samples`` samples of ``ticks`` ms into ``out``.
 
@@ -350,7 +350,7 @@ def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
                 out.link[k, 4 + i] = (u[i] - opened[i]) / sample_s
 
 
-@njit(cache=True)
+@njit()
 def _grip(V, place, up, down, speed, lam):
     """Find the friction impulses ``lam`` (2,) within their levels that leave each joint stuck or opposed."""
     for j in range(2):
@@ -367,7 +367,7 @@ def _grip(V, place, up, down, speed, lam):
             break
 
 
-@njit(cache=True)
+@njit()
 def _latch(out, k, z, u, place, d, human, ref, speed, pressed):
     """Log what is measured: positions half a step back, and the speeds ``u`` of that moment."""
     for j in range(2):

@@ -122,7 +122,13 @@ class OneJoint:
     @property
     def effects(self) -> tuple[str, ...]:
         """Causes of the contract that such a machine can have, and that are no part of its rigid body."""
-        turned = ("backlash", "mass_off_axis", "payload_change", "encoder_offset")
+        turned = (
+            "backlash",
+            "mass_off_axis",
+            "payload_change",
+            "encoder_offset",
+            "encoder_eccentricity",
+        )
         constant = ("coulomb_asymmetry", "torque_offset")
         return (*ANYWHERE, *(turned if self.gravity else ()), *(() if self.weight else constant))
 
@@ -188,6 +194,7 @@ class OneJoint:
 ANYWHERE = (
     "stribeck_friction", "viscous_asymmetry", "load_dependent_friction", "quadratic_drag", "presliding_hysteresis",
     "friction_warmup", "cogging", "joint_elasticity", "parallel_spring", "torque_drift", "time_delay",
+    "end_stop", "position_dependent_friction", "gain_drift",
 )  # fmt: skip
 """Causes that a joint can have wherever it stands."""
 ONE_JOINT: dict[str, OneJoint] = {

@@ -26,6 +26,8 @@ class Run:
     rng: Generator
     temperature: NDArray | None = None
     """Of both motors at 50 Hz, (n, 2) degrees Celsius."""
+    temperature_range: NDArray | None = None
+    """Coldest and warmest that they are in any run of the session, (2, 2)."""
 
     @property
     def has_human(self) -> bool:
@@ -62,6 +64,18 @@ class Plan:
             name = ("thigh", "shank")[joint]
             leg = replace(leg, **{name: getattr(leg, name) + lump})
         return leg
+
+    def eccentric(
+        self, joint: int, once: float, phase: float, twice: float = 0.0, phase_twice: float = 0.0
+    ) -> None:
+        """Add an error once and twice a turn to what an encoder has already."""
+        for c, new in ((0, (once, phase)), (2, (twice, phase_twice))):
+            size, angle = self.wobble[joint, c : c + 2]
+            if not size:
+                self.wobble[joint, c : c + 2] = new
+            elif new[0]:
+                both = size * np.exp(1j * angle) + new[0] * np.exp(1j * new[1])
+                self.wobble[joint, c : c + 2] = abs(both), np.angle(both)
 
     def torque(
         self, kind: int, joint: int, *p: float, human: bool = False, table: NDArray | None = None

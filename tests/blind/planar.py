@@ -10,7 +10,6 @@ from math import cos, exp, sin
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.signal import lfilter
@@ -18,6 +17,7 @@ from scipy.signal import lfilter
 from tests.blind import two_link
 from tests.blind.body import Leg, Segment
 from tests.blind.channel import through
+from tests.blind.compiled import njit
 from tests.blind.conditions import Conditions
 from tests.blind.dry import dry_levels, is_dry
 from tests.blind.legs import Reported, check, cuff_forces, links_of, needed
@@ -223,13 +223,13 @@ class Log(NamedTuple):
     motor: np.ndarray
 
 
-@njit(cache=True)
+@njit()
 def _read(d, j, theta):
     once = theta + d.offset[j] + d.wobble[j, 0] * sin(theta + d.wobble[j, 1])
     return once + d.wobble[j, 2] * sin(2.0 * theta + d.wobble[j, 3])
 
 
-@njit(cache=True)
+@njit()
 def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
     """Run the leg from rest at ``start`` (2,) and log ``samples`` samples from time 0 on into ``out``."""
     q, v, a = np.zeros(2), np.zeros(2), np.zeros(2)
@@ -374,7 +374,7 @@ def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
                 hq[j] += DT * hv[j]
 
 
-@njit(cache=True)
+@njit()
 def _latch(out, k, j, d, theta, omega, acceleration):
     """Log a motor's angle as its encoder tells it, and what speed and acceleration that is."""
     told = _read(d, j, theta)

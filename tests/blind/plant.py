@@ -137,7 +137,7 @@ def _reported(log: loop.Log, time: NDArray, plan: Plan, conditions: Conditions) 
     """Pass the torque of each millisecond through the channel and average it over the samples (n, 2)."""
     period = loop.DT * loop.STEPS_PER_TICK
     angle = None
-    if any(plan.channel.ripple):
+    if plan.channel.needs_angle:
         ticks = np.arange(len(log.torque)) * period
         angle = np.column_stack([np.interp(ticks, time, log.angle[:, j]) for j in range(2)])
     out = through(plan.channel, log.torque, period, angle)

@@ -95,7 +95,11 @@ class Recorded:
 
     def moving(self) -> NDArray:
         """Tell for each block and joint whether it is away from reversals and from the run's ends, (m, 2) bool."""
+        return self.blocks(self.moving_samples().astype(float)) == 1.0
+
+    def moving_samples(self) -> NDArray:
+        """Tell the same for each sample and joint, (n, 2) bool."""
         away = self.away_from_reversals()
         edge = round(EDGE_S / self.sample_s)
         away[:edge] = away[-edge:] = False
-        return self.blocks(away.astype(float)) == 1.0
+        return away

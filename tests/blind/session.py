@@ -15,9 +15,9 @@ import pyarrow.parquet as pq
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from tests.blind import outside, recorder
+from tests.blind import recorder
 from tests.blind.cases import Case
-from tests.blind.causes import SOFT, Cause, log_uniform, random_cause
+from tests.blind.causes import BOUNDS, SOFT, Cause, Reach, log_uniform, random_cause
 from tests.blind.conditions import PLAIN, Conditions, random_conditions
 from tests.blind.excitation import PERIOD_S
 from tests.blind.faults import IN_EVERY_RUN, fault_named
@@ -25,6 +25,7 @@ from tests.blind.floor import left_by_the_baseline, noise_floor, ripple_floor
 from tests.blind.imperfections import random_background, random_imperfections
 from tests.blind.magnitude import rms, size_for, small_size_for
 from tests.blind.mechanisms import MECHANISMS, Mechanism
+from tests.blind.outside import random_outside
 from tests.blind.plan import HIP, JOINTS, KNEE, Plan, Run
 from tests.blind.plant import record
 from tests.blind.recorded import Recorded, Rig
@@ -41,6 +42,8 @@ from tests.blind.worlds import WORLDS
 LEAST, MOST = 0.03, 0.25
 """Magnitudes of what is hidden."""
 PILOT_S = 12.0
+LONGEST_PILOT_S = 20.0
+"""How long a cause is tried for, where a period takes longer or there is none."""
 SHORT_PILOT_S = 7.0
 ATTEMPTS = 6
 LEAST_MOVING, LEAST_MOVING_ANYHOW = 0.4, 0.15
@@ -48,6 +51,11 @@ LEAST_MOVING, LEAST_MOVING_ANYHOW = 0.4, 0.15
 OF_FLOOR, OF_TORQUE = 0.35, 0.006
 """How much rigid body and friction may leave of a good rig's small effects: of the noise floor, of the
 torque's rms, whichever is larger."""
+LATER = np.arange(0.0, 20.0, 0.05)
+"""Instants at which motions are looked at."""
+RUNS = 4
+GREATEST = {"stribeck_friction": 15.0, "presliding_hysteresis": 15.0}
+"""Sizes beyond which a lab would mend the machine, N·m; plain cases know none."""
 PURPOSES = ("train", "validate")
 
 
@@ -118,7 +126,9 @@ class _Draw:
             for purpose in PURPOSES
         }
         self.softness = rng.uniform(0.0, 0.25, 2)
-        self.warmth = Warmth(rng, 2 * len(PURPOSES))
+        self.warmth = Warmth(rng, RUNS)
+        self.temperature_range = self.warmth.range(dict.fromkeys(range(RUNS), self.duration))
+        self.reach = _common_reach([m.at(LATER)[0] for m in self.motion.values()])
 
     def rng(self, *part: int) -> Generator:
         return np.random.default_rng([*self.stream, *part])
@@ -163,11 +173,11 @@ class _Draw:
         wanted = []
         for effect, joint in self.case.hidden:
             if effect.startswith("outside:"):
-                cause = outside.random_outside(
-                    rng, getattr(outside, effect.removeprefix("outside:")), joint
-                )
+                cause = random_outside(rng, effect.removeprefix("outside:"), joint, self.reach)
             else:
-                cause = random_cause(rng, effect, joint, world=self.world)
+                cause = random_cause(rng, effect, joint, world=self.world, reach=self.reach)
+            if effect in GREATEST and not self.case.plain:
+                cause = replace(cause, largest=min(cause.largest, GREATEST[effect]))
             wanted.append((cause, log_uniform(rng, LEAST, MOST)))
         return wanted
 
@@ -184,7 +194,9 @@ class _Draw:
             return self._small_size(cause, wanted)
         kinds = [kind for kind in self.case.kinds if cause.acts_in(kind)]
         # What changes over a whole run needs a whole one, but not each run.
-        duration = self.duration if cause.slow else min(PILOT_S, self.duration)
+        periods = [motion.period_s or LONGEST_PILOT_S for motion in self.motion.values()]
+        pilot_s = float(np.clip(max(periods), PILOT_S, LONGEST_PILOT_S))
+        duration = self.duration if cause.slow else min(pilot_s, self.duration)
         purposes = PURPOSES[:1] if cause.slow else PURPOSES
 
         def pilot(size: float) -> list[Recorded]:
@@ -193,7 +205,7 @@ class _Draw:
                 for kind, purpose in product(kinds, purposes)
             ]
 
-        return size_for(cause, wanted, pilot)
+        return size_for(cause, wanted, pilot, must_act=True)
 
     def _small_size(self, cause: Cause, wanted: float) -> float:
         kind = next(kind for kind in reversed(self.case.kinds) if cause.acts_in(kind))
@@ -207,7 +219,7 @@ class _Draw:
     ) -> Recorded:
         number = 2 * (kind == "with_human") + (purpose == "validate")
         warm = None if self.case.plain else self.warmth.curve(number, duration)
-        run = Run(kind, purpose, duration, self.rng(2, number), warm)
+        run = Run(kind, purpose, duration, self.rng(2, number), warm, self.temperature_range)
         plan = Plan()
         self.rig.load(plan)
         if self.case.category != "none" and run.has_human:
@@ -229,6 +241,12 @@ class _Draw:
         )
 
 
+def _common_reach(angles: list[NDArray]) -> Reach:
+    """Return least and greatest angles that all motions come to, (2,) each."""
+    low = np.max([a.min(axis=0) for a in angles], axis=0)
+    return low, np.min([a.max(axis=0) for a in angles], axis=0)
+
+
 def _sampled(curve: NDArray, time: NDArray) -> NDArray:
     at = np.arange(len(curve)) / 50.0
     return np.column_stack([np.interp(time, at, curve[:, j]) for j in range(2)])
@@ -241,8 +259,11 @@ class _PlainDraw(_Draw):
 
     def _draw(self, rng: Generator) -> None:
         self.world, self.record, self.conditions = None, record, PLAIN
+        self.temperature_range, self.reach = None, BOUNDS
         self.rig = self.mechanism.rig(rng)
         self.motion = {purpose: self.mechanism.excitation(rng) for purpose in PURPOSES}
+        if self.case.machine != "leg":
+            self.reach = _common_reach([m.at(LATER)[0] for m in self.motion.values()])
         self.duration = float(rng.choice([60.0, 70.0, 80.0]))
         self.softness = rng.uniform(0.0, 0.25, 2)
 
@@ -386,6 +407,9 @@ def _hidden(session: Session, cause: Cause, size: float, wanted: float) -> dict[
         # What the form is drawn and installed with, so the simulated leg's; parameters are the recording's.
         "size": size,
         "shape": [float(x) for x in cause.shape],
+        "families": list(cause.families),
+        "repeats": cause.repeats,
+        "held_back": cause.held_back,
         "parameters": session.rig.units.converted(cause.effect, cause.parameters(size)),
         "kin": list(cause.kin),
         "wanted_magnitude": wanted,

@@ -1,5 +1,7 @@
 """Temperatures of the motors: they warm while a leg moves and cool between runs."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
@@ -29,3 +31,8 @@ class Warmth:
         begin = self.share[:, self.order[run]]
         share = 1.0 - (1.0 - begin) * np.exp(-t[:, None] / self.time)
         return self.room + (self.final - self.room) * share
+
+    def range(self, durations_s: Mapping[int, float]) -> NDArray:
+        """Return coldest and warmest of both motors, (2, 2), over runs of these lengths."""
+        curves = np.concatenate([self.curve(run, length) for run, length in durations_s.items()])
+        return np.array([curves.min(axis=0), curves.max(axis=0)])

@@ -3,8 +3,9 @@
 from math import cos, exp
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from tests.blind.compiled import njit
 
 RIGID, ELASTIC, WIND_UP, PLAY, PLAY_HERTZ = 0, 1, 2, 3, 4
 PLAY_GREASED, PLAY_ROUNDED, SOFTENING = 5, 6, 7
@@ -13,7 +14,7 @@ GREASE = 0.02
 CUFF_CONSTANTS = 6
 
 
-@njit(cache=True)
+@njit()
 def transmitted(kind, s, x, rate):
     """Torque of a transmission wound up by ``x``; ``s``: stiffness, damping, and the form's own."""
     if kind == ELASTIC:
@@ -45,7 +46,7 @@ def transmitted(kind, s, x, rate):
     return side * max(0.0, push)
 
 
-@njit(cache=True)
+@njit()
 def _soft_plus(x):
     return x if x > 30.0 else np.log1p(exp(x)) if x > -30.0 else 0.0
 
@@ -61,7 +62,7 @@ def per_metre(cuffs: NDArray, levers: NDArray) -> NDArray:
     return told
 
 
-@njit(cache=True)
+@njit()
 def press(cuffs, levers, q, v, hq, hv, memory, dt, force, own, pressed):
     """Let the machine's cuffs push the wearer's leg, and note the forces across thigh and shank.
 

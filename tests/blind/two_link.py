@@ -14,10 +14,10 @@ in q. Legs that move as one have the sums of their coefficients.
 from math import cos, sin
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from tests.blind.body import PAYLOAD_INERTIA, Leg
+from tests.blind.compiled import njit
 
 A, B, C, D, M1, N1, M2, N2 = range(8)
 
@@ -39,7 +39,7 @@ def coefficients(leg: Leg) -> NDArray:
     )
 
 
-@njit(cache=True)
+@njit()
 def add_lump(c, joint, mass, distance, length, out):
     """Write coefficients ``c`` with a lump of mass down a segment's axis (0 thigh, 1 shank) into ``out``."""
     out[:] = c
@@ -55,7 +55,7 @@ def add_lump(c, joint, mass, distance, length, out):
         out[M2] += mass * distance
 
 
-@njit(cache=True)
+@njit()
 def mass_and_bias(c, gravity, tilt, q1, q2, v1, v2, M, bias):
     """Write mass matrix (2, 2) and Coriolis, centrifugal and gravity torque (2,) for a base tilted by ``tilt``."""
     h = c[C] * cos(q2) - c[D] * sin(q2)
@@ -71,7 +71,7 @@ def mass_and_bias(c, gravity, tilt, q1, q2, v1, v2, M, bias):
     bias[1] = -slope * v1 * v1 + shank
 
 
-@njit(cache=True)
+@njit()
 def inverse(c, gravity, tilt, q, dq, ddq):
     """Return the torque (n, 2) that moves a leg along a motion; ``tilt`` (n,) of the base."""
     torque = np.empty_like(q)
@@ -83,7 +83,7 @@ def inverse(c, gravity, tilt, q, dq, ddq):
     return torque
 
 
-@njit(cache=True)
+@njit()
 def accelerations(M, force, out):
     """Solve M out = force for two unknowns."""
     det = M[0, 0] * M[1, 1] - M[0, 1] * M[1, 0]

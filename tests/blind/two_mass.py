@@ -11,7 +11,6 @@ from math import cos, sin, sqrt, tanh
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.signal import lfilter
@@ -19,6 +18,7 @@ from scipy.signal import lfilter
 from tests.blind import two_link
 from tests.blind.body import Leg, Segment
 from tests.blind.channel import through
+from tests.blind.compiled import njit
 from tests.blind.conditions import Conditions
 from tests.blind.dry import dry_levels, is_dry
 from tests.blind.legs import Reported, check, cuff_forces, links_of, needed
@@ -235,13 +235,13 @@ class Log(NamedTuple):
     motor: np.ndarray
 
 
-@njit(cache=True)
+@njit()
 def _read(d, j, theta):
     once = theta + d.offset[j] + d.wobble[j, 0] * sin(theta + d.wobble[j, 1])
     return once + d.wobble[j, 2] * sin(2.0 * theta + d.wobble[j, 3])
 
 
-@njit(cache=True)
+@njit()
 def _command(d, ref, old_ref, older_ref, seen, speed, tick, M, bias, wanted):
     """Write the torques (2,) that the drives ask for."""
     pull = np.zeros(2)
@@ -265,7 +265,7 @@ def _command(d, ref, old_ref, older_ref, seen, speed, tick, M, bias, wanted):
         wanted[j] = min(d.limit[j], max(-d.limit[j], wanted[j]))
 
 
-@njit(cache=True)
+@njit()
 def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
     """Run both masses of both joints from rest and log ``samples`` samples from time 0 on."""
     q, v, a = start.copy(), np.zeros(2), np.zeros(2)
@@ -378,7 +378,7 @@ def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
                 hq[j] += DT * hv[j]
 
 
-@njit(cache=True)
+@njit()
 def _told(d, j, theta):
     """Return by what factor an encoder tells a speed, and how that changes with the angle."""
     if d.wobble[j, 0] == 0.0 and d.wobble[j, 2] == 0.0:
@@ -388,7 +388,7 @@ def _told(d, j, theta):
     return slope, -d.wobble[j, 0] * sin(once) - 4.0 * d.wobble[j, 2] * sin(twice)
 
 
-@njit(cache=True)
+@njit()
 def _latch(out, k, j, d, theta, omega):
     """Log a motor's angle and speed as its encoder tells them."""
     told = _read(d, j, theta)
@@ -437,7 +437,6 @@ def move(
     rig: Rig, motion: Trajectory, plan: Plan, run: Run, samples: int, conditions: Conditions
 ) -> Log:
     """Run the compiled loop."""
-    m = rig.machine
     log = empty_log(samples, conditions.ticks)
     none = np.zeros((2, 1))
     table = motion.table(samples * conditions.sample_s)
