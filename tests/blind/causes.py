@@ -57,6 +57,7 @@ class Cause:
     """Kinds of law that it may be said to be (``families.py``)."""
     repeats: bool = True
     """Is it the same in every period of the motion?"""
+    at_both_joints: bool = False
     held_back: bool = False
     """Is it never shown to what learns from sessions?"""
     kin: tuple[str, ...] = ()

@@ -25,16 +25,20 @@ class Unlisted(NamedTuple):
     families: tuple[str, ...]
     repeats: bool
     held_back: bool
+    at_both_joints: bool
 
 
 KINDS: dict[str, Unlisted] = {}
 
 
-def unlisted(*families: str, repeats: bool = True, held_back: bool = False) -> Callable:
+def unlisted(
+    *families: str, repeats: bool = True, held_back: bool = False, at_both_joints: bool = False
+) -> Callable:
     """Register a kind; the function's name is the kind's."""
 
     def register(draw: Callable) -> Callable:
-        KINDS[draw.__name__] = Unlisted(draw.__name__, draw, families, repeats, held_back)
+        name = draw.__name__
+        KINDS[name] = Unlisted(name, draw, families, repeats, held_back, at_both_joints)
         return draw
 
     return register
@@ -86,7 +90,7 @@ def ringing(rng, joint):
     return dict(install=install, start=3.0, shape=shape)
 
 
-@unlisted("angle")
+@unlisted("angle", at_both_joints=True)
 def band_across_both_joints(rng, joint, reach=BOUNDS):
     """An elastic band from the pelvis to the shank, slack in one part of the range."""
     arms = rng.uniform(0.6, 1.0), rng.uniform(-1.0, -0.6)
@@ -254,5 +258,6 @@ def random_outside(rng, name: str, joint: int, reach: Reach = BOUNDS) -> Cause:
         families=kind.families,
         repeats=kind.repeats,
         held_back=kind.held_back,
+        at_both_joints=kind.at_both_joints,
         **drawn,
     )

@@ -32,9 +32,11 @@ OF_SINGLES: tuple[tuple[Table, str], ...] = (
 )  # fmt: skip
 """What the examination with most single effects tells best, and what is said above each table."""
 OF_EACH: tuple[tuple[Table, str], ...] = (
+    (tables.by_world, ""),
     (tables.pairs, ""),
     (tables.alarms, ""),
-    (tables.outside, "Right is `unknown_cause`, or the cause of the catalogue that a person would call it by."),
+    (tables.outside, "Right is that something is missing, and no cause of the catalogue likely but one that a person would call it by."),
+    (tables.families, "Right is a finding of an acceptable family, at the joint, with a probability of a half or more."),
     (tables.faults, "Right is file, joint and kind."),
     (tables.kinds_of_miss, "What was hidden, and what was answered, with the number of cases."),
     (tables.residuals, "Quantiles over sessions and joints."),

@@ -410,6 +410,7 @@ def _hidden(session: Session, cause: Cause, size: float, wanted: float) -> dict[
         "families": list(cause.families),
         "repeats": cause.repeats,
         "held_back": cause.held_back,
+        "at_both_joints": cause.at_both_joints,
         "parameters": session.rig.units.converted(cause.effect, cause.parameters(size)),
         "kin": list(cause.kin),
         "wanted_magnitude": wanted,

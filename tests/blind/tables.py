@@ -8,7 +8,7 @@ import numpy as np
 
 from tests.blind.scoring import Named, Score
 from tests.blind.statistics import Rate, reliability
-from tests.blind.targets import effects, measures, of, rmse_over_floor
+from tests.blind.targets import effects, measures, of, rmse_over_floor, world_measures
 
 BINS = ((0.0, 0.03), (0.03, 0.06), (0.06, 0.12), (0.12, 1.0))
 VISIBILITY = ((0.0, 0.1), (0.1, 0.2), (0.2, 0.5), (0.5, 1.0), (1.0, float("inf")))
@@ -90,6 +90,15 @@ def by_machine(scores: Sequence[Score]) -> Page:
     return _rates("By machine", of(scores, "single"), lambda s: s.machine)
 
 
+def by_world(scores: Sequence[Score]) -> Page:
+    """Show each world's rates, and how far its probabilities are to be believed."""
+    worlds = sorted({s.world for s in scores})
+    head = ("", *worlds)
+    columns = [world_measures([s for s in scores if s.world == world]) for world in worlds]
+    rows = [(column[0].name, *(m.shown for m in column)) for column in zip(*columns, strict=True)]
+    return Page("By world", head, rows if len(worlds) > 1 else [])
+
+
 def by_kinds(scores: Sequence[Score]) -> Page:
     """Count singles by the kinds of run in the session."""
     return _rates("By kinds of run", of(scores, "single"), lambda s: ", ".join(s.kinds))
@@ -116,7 +125,21 @@ def alarms(scores: Sequence[Score]) -> Page:
 
 def outside(scores: Sequence[Score]) -> Page:
     """Count what is not in the catalogue, by kind."""
-    return _rates("Outside the catalogue", of(scores, "outside"), lambda s: s.forms[0])
+    return _rates("Outside the catalogue", of(scores, "outside"), _kind_of)
+
+
+def families(scores: Sequence[Score]) -> Page:
+    """Count right families of laws, of what nobody listed by kind, of the catalogue by effect."""
+    told = [s for s in of(scores, "single", "outside") if s.family_right is not None]
+    rows = []
+    for name in sorted({_kind_of(s) for s in told}):
+        chosen = [s.family_right for s in told if _kind_of(s) == name]
+        rows.append((name, str(Rate.of(chosen))))
+    return Page("Families of laws", ("hidden", "right"), rows)
+
+
+def _kind_of(s: Score) -> str:
+    return s.truth[0][0].removeprefix("outside:") + " (held back)" * s.held_back
 
 
 def faults(scores: Sequence[Score]) -> Page:

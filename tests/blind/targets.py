@@ -52,6 +52,7 @@ def measures(scores: Sequence[Score]) -> list[Measure]:
     physical = [s for s in scores if s.category != "fault"]
     return [
         _rate("single: right cause and joint first", right(singles), low=0.96),
+        _worst_world(scores, low=0.90),
         _rate("the same above 12 %", right(s for s in singles if s.magnitude >= LARGE), low=0.99),
         _lowest("the same, the effect that is found least", singles, low=0.75),
         _rate(
@@ -67,7 +68,7 @@ def measures(scores: Sequence[Score]) -> list[Measure]:
             (not s.right for s in of(scores, "imperfect")),
             high=0.05,
         ),
-        _rate("outside the catalogue: unknown_cause", right(outside), low=0.80),
+        _rate("outside the catalogue: called unlisted", right(outside), low=0.80),
         _rate(
             "outside the catalogue: nothing_missing",
             (s.status == SILENT for s in outside),
@@ -92,6 +93,47 @@ def measures(scores: Sequence[Score]) -> list[Measure]:
         ),
         _middle("seconds a diagnosis, median", [s.seconds for s in scores], high=10.0),
     ]
+
+
+def world_measures(scores: Sequence[Score]) -> list[Measure]:
+    """Return what is shown of each world."""
+    forecasts = [f for s in scores for f in s.probabilities]
+    return [
+        _rate("single: right first", right(of(scores, "single"))),
+        _rate("pair: both named", right(of(scores, "pair"))),
+        _rate("outside the catalogue", right(of(scores, "outside"))),
+        _rate("outside: right family", family(of(scores, "outside"))),
+        _rate("false alarms, nothing hidden", (not s.right for s in of(scores, "none"))),
+        _rate("false alarms, imperfections", (not s.right for s in of(scores, "imperfect"))),
+        _rate("data fault named", right(of(scores, "fault"))),
+        _number("Brier score", brier(forecasts)),
+        _number("calibration error", calibration_error(forecasts)),
+        _number("mean log probability of the truth", log_probability(scores)),
+        _rate("intervals that hold the truth", (c[2] for s in scores for c in s.covered)),
+    ]
+
+
+def family(scores: Iterable[Score]) -> list[bool]:
+    """Return which findings are of the right family, where verdicts have findings."""
+    return [s.family_right for s in scores if s.family_right is not None]
+
+
+def log_probability(scores: Iterable[Score]) -> float | None:
+    """Return the mean logarithm of what was given to the truth; None where no verdict told it."""
+    told = [s.log_probability for s in scores if s.log_probability is not None]
+    return sum(told) / len(told) if told else None
+
+
+def _worst_world(scores: Sequence[Score], low: float) -> Measure:
+    name = "single: right first, the worst world"
+    singles = of(scores, "single")
+    rates = {
+        w: Rate.of(right(s for s in singles if s.world == w)) for w in {s.world for s in singles}
+    }
+    if not rates:
+        return Measure(name, "no cases", None, low)
+    world = min(rates, key=lambda w: rates[w].value)
+    return Measure(name, f"{world}: {rates[world]}", rates[world].value, low)
 
 
 def of(scores: Iterable[Score], *categories: str) -> list[Score]:

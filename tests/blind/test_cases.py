@@ -43,6 +43,6 @@ def test_machines_of_one_joint_take_turns_and_hide_what_each_can_have():
         (name, effect) for name, machine in ONE_JOINT.items() for effect in machine.effects
     }
     assert {c.hidden[0][0] for c in cases if c.category == "outside"} == {
-        f"outside:{k.__name__}" for k in OF_ONE_JOINT
+        f"outside:{k}" for k in OF_ONE_JOINT
     }
     assert {c.machine for c in cases if c.category == "none"} == set(ONE_JOINT)

@@ -56,7 +56,7 @@ def test_the_page_sets_what_was_measured_beside_what_was_asked_for():
     )
     assert "| false alarms, nothing hidden | <= 1 % | 0.0 % of 1 (0 to 79) | yes |" in said
     assert (
-        "| outside the catalogue: unknown_cause | >= 80 % | 100.0 % of 1 (21 to 100) | yes |"
+        "| outside the catalogue: called unlisted | >= 80 % | 100.0 % of 1 (21 to 100) | yes |"
         in said
     )
     assert "| data fault named |  | no cases |  |" in said
