@@ -10,16 +10,22 @@ from pathlib import Path
 import llvmlite.binding
 import mujoco
 import numpy as np
-from numba import njit, types
+from numba import types
 from numpy.typing import NDArray
 
-llvmlite.binding.load_library_permanently(str(next(Path(mujoco.__file__).parent.glob("libmujoco.so*"))))
+from tests.blind.compiled import njit
+
+llvmlite.binding.load_library_permanently(
+    str(next(Path(mujoco.__file__).parent.glob("libmujoco.so*")))
+)
 _PASS = types.void(types.intp, types.intp)
 _kinematics = types.ExternalFunction("mj_kinematics", _PASS)
 _com_pos = types.ExternalFunction("mj_comPos", _PASS)
 _inertia = types.ExternalFunction("mj_crb", _PASS)
 _com_vel = types.ExternalFunction("mj_comVel", _PASS)
-_newton_euler = types.ExternalFunction("mj_rne", types.void(types.intp, types.intp, types.int32, types.intp))
+_newton_euler = types.ExternalFunction(
+    "mj_rne", types.void(types.intp, types.intp, types.int32, types.intp)
+)
 
 PAYLOAD_INERTIA = 1e-3
 """kg·m² per kg of a payload, about its own centre."""
@@ -39,7 +45,10 @@ class Segment:
         mass = self.mass + other.mass
         along = (self.mass * self.along + other.mass * other.along) / mass
         forward = (self.mass * self.forward + other.mass * other.forward) / mass
-        inertia = sum(s.inertia + s.mass * ((s.along - along) ** 2 + (s.forward - forward) ** 2) for s in (self, other))
+        inertia = sum(
+            s.inertia + s.mass * ((s.along - along) ** 2 + (s.forward - forward) ** 2)
+            for s in (self, other)
+        )
         return Segment(mass, along, inertia, forward)
 
 
@@ -126,7 +135,7 @@ def _inertial(s: Segment) -> str:
     )
 
 
-@njit(cache=True)
+@njit()
 def evaluate(model, data, bias):
     """Bring mass matrix and bias torque (Coriolis, gravity) up to the state in qpos and qvel."""
     _kinematics(model, data)
@@ -136,7 +145,7 @@ def evaluate(model, data, bias):
     _newton_euler(model, data, 0, bias.ctypes.data)
 
 
-@njit(cache=True)
+@njit()
 def _inverse(model, data, qpos, qvel, qacc, bias, q, dq, ddq):
     torque = np.empty_like(q)
     for k in range(len(q)):

@@ -18,6 +18,8 @@ def smallest_visible(folder: Path) -> dict[tuple[str, str | None], float] | None
         return None
     rows = json.loads(path.read_text())["causes"]
     return {
-        (row["effect"], row["joint"]): inf if row["smallest_rms_nm"] is None else float(row["smallest_rms_nm"])
+        (row["effect"], row["joint"]): inf
+        if row["smallest_rms_nm"] is None
+        else float(row["smallest_rms_nm"])
         for row in rows
     }

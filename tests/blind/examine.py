@@ -19,11 +19,16 @@ from tests.blind.detection import smallest_visible
 from tests.blind.scoring import Score, score
 
 SIMULATOR = (
-    "body", "cases", "causes", "dry", "excitation", "faults", "floor", "imperfections", "loop", "machine", "magnitude",
-    "mechanisms", "outside", "people", "plan", "plant", "session", "smooth", "units", "wandering",
+    "body", "cases", "causes", "channel", "conditions", "cuffs", "dry", "excitation", "families", "faults", "floor", "further_forms", "further_torques", "imperfections", "legs",
+    "loop", "machine", "magnitude", "mechanisms", "outside", "people", "plan", "planar", "plant", "recorded",
+    "recorder", "session", "smooth", "temperature", "trajectories", "transmissions", "two_link", "two_mass", "units", "wandering",
+    "worlds",
 )  # fmt: skip
 """What decides how a session looks: when one of these files changes, sessions are simulated anew."""
-ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")}
+ONE_THREAD = {
+    name: "1"
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+}
 TIME_LIMIT_S = 600.0
 EXOID = (Path(sys.executable).with_name("exoid"),)
 
@@ -60,7 +65,9 @@ def neutral_name(case: Case) -> str:
     return hashlib.sha256(f"{fingerprint()} {case}".encode()).hexdigest()[:12]
 
 
-def examine(cases: Sequence[Case], root: Path, workers: int = 2, again: bool = False) -> Iterator[Score]:
+def examine(
+    cases: Sequence[Case], root: Path, workers: int = 2, again: bool = False
+) -> Iterator[Score]:
     """Simulate what is not there yet, diagnose, and yield scores as they come.
 
     Parameters
@@ -88,7 +95,9 @@ def examine_one(case: Case, folders: Folders, again: bool) -> Score:
     if again or not kept.exists():
         shutil.rmtree(folders.answer(name), ignore_errors=True)
         folders.answer(name).mkdir(parents=True)
-        kept.write_text(json.dumps(diagnose(folders.recordings(name), folders.answer(name)), indent=1))
+        kept.write_text(
+            json.dumps(diagnose(folders.recordings(name), folders.answer(name)), indent=1)
+        )
     answer = json.loads(kept.read_text())
     truth = json.loads(folders.truth(name).read_text())
     return score(truth, answer, smallest_visible(folders.answer(name)))

@@ -32,9 +32,11 @@ OF_SINGLES: tuple[tuple[Table, str], ...] = (
 )  # fmt: skip
 """What the examination with most single effects tells best, and what is said above each table."""
 OF_EACH: tuple[tuple[Table, str], ...] = (
+    (tables.by_world, ""),
     (tables.pairs, ""),
     (tables.alarms, ""),
-    (tables.outside, "Right is `unknown_cause`, or the cause of the catalogue that a person would call it by."),
+    (tables.outside, "Right is that something is missing, and no cause of the catalogue likely but one that a person would call it by."),
+    (tables.families, "Right is a finding of an acceptable family, at the joint, with a probability of a half or more."),
     (tables.faults, "Right is file, joint and kind."),
     (tables.kinds_of_miss, "What was hidden, and what was answered, with the number of cases."),
     (tables.residuals, "Quantiles over sessions and joints."),
@@ -62,13 +64,23 @@ def page(examinations: Sequence[Examination], picture: str = "") -> str:
     """Return the page as Markdown; ``picture`` is where its figure lies beside it."""
     richest = max(examinations, key=lambda e: len(of(e.scores, "single")))
     legs = any(s.machine == "leg" for e in examinations for s in e.scores)
-    parts = [INTRODUCTION, "" if legs else OF_ONE_JOINT, _what_was_run(examinations), _targets(examinations)]
+    parts = [
+        INTRODUCTION,
+        "" if legs else OF_ONE_JOINT,
+        _what_was_run(examinations),
+        _targets(examinations),
+    ]
     parts += [_section(table, remark, examinations, [richest]) for table, remark in OF_SINGLES]
-    parts += [_section(table, remark.format(picture=picture), examinations, examinations) for table, remark in OF_EACH]
+    parts += [
+        _section(table, remark.format(picture=picture), examinations, examinations)
+        for table, remark in OF_EACH
+    ]
     return "\n".join(part for part in parts if part)
 
 
-def _section(table: Table, remark: str, every: Sequence[Examination], chosen: Sequence[Examination]) -> str:
+def _section(
+    table: Table, remark: str, every: Sequence[Examination], chosen: Sequence[Examination]
+) -> str:
     """Return a table of each chosen examination under one heading; nothing where none has rows."""
     made = [(number, table(e.scores)) for number, e in enumerate(every, 1) if e in chosen]
     made = [(number, page) for number, page in made if page.rows]
@@ -84,7 +96,14 @@ def _what_was_run(examinations: Sequence[Examination]) -> str:
     rows = []
     for number, examination in enumerate(examinations, 1):
         seeds = [s.seed for s in examination.scores]
-        rows.append((str(number), f"`{examination.command}`", str(len(seeds)), f"{min(seeds)} to {max(seeds)}"))
+        rows.append(
+            (
+                str(number),
+                f"`{examination.command}`",
+                str(len(seeds)),
+                f"{min(seeds)} to {max(seeds)}",
+            )
+        )
     made = Page("What was run", ("", "command", "cases", "seeds"), rows)
     return f"{titled(made)}\n{_provenance({use for e in examinations for use in uses(s.seed for s in e.scores)})}\n"
 
@@ -115,7 +134,9 @@ def _targets(examinations: Sequence[Examination]) -> str:
 
 
 def main(
-    records: Annotated[list[Path], typer.Argument(exists=True, help="report.json of one or more, and the page.")],
+    records: Annotated[
+        list[Path], typer.Argument(exists=True, help="report.json of one or more, and the page.")
+    ],
     out: Annotated[Path, typer.Argument(help="The page to be written.")],
 ) -> None:
     """Write the page and its picture."""

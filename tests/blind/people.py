@@ -34,9 +34,9 @@ class Person:
         )
 
 
-def random_person(rng: Generator) -> Person:
-    """Draw a person of 50 to 100 kg whose height suits the mass (body mass index 19 to 30)."""
-    mass = rng.uniform(50.0, 100.0)
+def random_person(rng: Generator, lightest_kg: float = 50.0, heaviest_kg: float = 100.0) -> Person:
+    """Draw a person whose height suits the mass (body mass index 19 to 30)."""
+    mass = rng.uniform(lightest_kg, heaviest_kg)
     height = (mass / rng.uniform(19.0, 30.0)) ** 0.5
     return Person(mass, min(1.98, max(1.50, height)))
 

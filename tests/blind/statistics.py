@@ -77,4 +77,6 @@ def calibration_error(forecasts: Sequence[tuple[float, bool]], bins: int = 10) -
     if not forecasts:
         return None
     curve = reliability(forecasts, bins)
-    return sum(b.happened.cases * abs(b.mean - b.happened.hits / b.happened.cases) for b in curve) / len(forecasts)
+    return sum(
+        b.happened.cases * abs(b.mean - b.happened.hits / b.happened.cases) for b in curve
+    ) / len(forecasts)

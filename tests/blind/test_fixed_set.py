@@ -20,7 +20,10 @@ from tests.blind.fixed_set import Outcome, complaints, outcomes, read
 from tests.blind.plan import HIP, KNEE
 from tests.blind.seeds import uses
 
-FOUND = [Outcome(seed, "backlash@knee", "explained", "backlash@knee", True) for seed in range(900_000, 900_005)]
+FOUND = [
+    Outcome(seed, "backlash@knee", "explained", "backlash@knee", True)
+    for seed in range(900_000, 900_005)
+]
 MISSED = Outcome(900_005, "cogging@hip", "nothing_missing", None, False)
 SILENT = Outcome(900_006, "none", "nothing_missing", None, True)
 RECORDED = [*FOUND, MISSED, SILENT]
@@ -78,7 +81,9 @@ def test_a_case_that_has_become_right_wants_to_be_recorded(lost):
 
 def test_a_new_false_alarm_is_never_roundings():
     found = changed(6, status="explained", first="cogging@hip", right=False)
-    assert complaints(RECORDED, found) == ["900006 none: nothing_missing (right) -> cogging@hip (wrong): a false alarm"]
+    assert complaints(RECORDED, found) == [
+        "900006 none: nothing_missing (right) -> cogging@hip (wrong): a false alarm"
+    ]
     assert not complaints(found, found)
 
 

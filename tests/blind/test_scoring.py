@@ -21,7 +21,13 @@ def truth_of(category, *hidden, fault=None, kin=()):
         for effect, joint in hidden
     ]  # fmt: skip
     case = {"seed": 1, "category": category, "kinds": ["exo_alone", "with_human"], "machine": "leg"}
-    return {"case": case, "hidden": effects, "fault": fault, "noise_floor_nm": SECRET, "left_by_baseline_nm": SECRET}
+    return {
+        "case": case,
+        "hidden": effects,
+        "fault": fault,
+        "noise_floor_nm": SECRET,
+        "left_by_baseline_nm": SECRET,
+    }
 
 
 def cause(effect, joint, *ties, probability=0.9, parameters=()):
@@ -55,7 +61,9 @@ PLAY = ("backlash", "knee")
         (answer_of(status="nothing_missing"), False),
     ],
 )
-def test_what_is_outside_the_catalogue_is_unknown_or_called_what_a_person_would_call_it(answer, right):
+def test_what_is_outside_the_catalogue_is_unknown_or_called_what_a_person_would_call_it(
+    answer, right
+):
     truth = truth_of("outside", ("outside:dead_zone_damper", "knee"), kin=("quadratic_drag",))
     assert score(truth, answer).right is right
 
@@ -94,7 +102,9 @@ def test_silence_is_right_only_below_what_can_be_seen():
 def test_of_a_pair_both_have_to_be_named():
     truth = truth_of("pair", PLAY, ("cogging", "hip"))
     assert score(truth, answer_of(cause("cogging", "hip"), cause(*PLAY))).right
-    assert score(truth, answer_of(cause("cogging", "hip"), cause("joint_elasticity", "knee", PLAY))).right
+    assert score(
+        truth, answer_of(cause("cogging", "hip"), cause("joint_elasticity", "knee", PLAY))
+    ).right
     assert not score(truth, answer_of(cause("cogging", "hip"))).right
 
 
@@ -174,7 +184,9 @@ def test_the_diagnosis_gets_the_recordings_and_nothing_else(tmp_path):
     (tmp_path / "answers").mkdir()
     for name in ("run_2.parquet", "run_1.parquet"):
         (tmp_path / "sessions" / "s" / name).touch()
-    answer = diagnose(tmp_path / "sessions" / "s", tmp_path / "answers", (sys.executable, "-c", FAKE))
+    answer = diagnose(
+        tmp_path / "sessions" / "s", tmp_path / "answers", (sys.executable, "-c", FAKE)
+    )
     files = ["run_1.parquet", "run_2.parquet"]
     assert answer["verdict"] == {
         "argv": ["diagnose", *files, "--out", str(tmp_path / "answers"), "--no-figures"], "there": files,

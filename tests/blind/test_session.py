@@ -44,7 +44,9 @@ def test_exoid_fits_a_faultless_session_to_its_noise(faultless):
     scored = left[left["scored"] & (left["purpose"] == "validate")]
     floor = noise_floor(session.rig, session.of("validate"))
     for joint, noise in zip(("hip", "knee"), floor, strict=True):
-        assert np.sqrt(np.mean(scored[f"{joint}_residual_nm"] ** 2)) == pytest.approx(noise, rel=0.05)
+        assert np.sqrt(np.mean(scored[f"{joint}_residual_nm"] ** 2)) == pytest.approx(
+            noise, rel=0.05
+        )
 
 
 def test_exoid_finds_the_friction_and_inertia_of_a_faultless_session(faultless):
@@ -59,8 +61,18 @@ def test_exoid_finds_the_friction_and_inertia_of_a_faultless_session(faultless):
 def test_recordings_keep_the_contract(faultless):
     session, paths = faultless
     tables = [RECORDING.read(path) for path in paths]
-    assert sorted(t.metadata["run"] for t in tables) == ["exo_alone", "exo_alone", "with_human", "with_human"]
-    assert sorted(t.metadata["purpose"] for t in tables) == ["train", "train", "validate", "validate"]
+    assert sorted(t.metadata["run"] for t in tables) == [
+        "exo_alone",
+        "exo_alone",
+        "with_human",
+        "with_human",
+    ]
+    assert sorted(t.metadata["purpose"] for t in tables) == [
+        "train",
+        "train",
+        "validate",
+        "validate",
+    ]
     assert all(len(t.frame) == len(session.runs[0].time) for t in tables)
 
 
@@ -81,7 +93,9 @@ def test_magnitude_is_what_was_wanted(effect, joint):
 
 
 def test_equal_seeds_give_equal_sessions_and_others_others():
-    first, again, other = (simulate(Case(seed, "fault", fault="gap")) for seed in (SEED, SEED, SEED + 1))
+    first, again, other = (
+        simulate(Case(seed, "fault", fault="gap")) for seed in (SEED, SEED, SEED + 1)
+    )
     for a, b in zip(first.runs, again.runs, strict=True):
         assert_array_equal(a.torque, b.torque)
         assert_array_equal(a.angle, b.angle)
@@ -98,7 +112,13 @@ def test_recordings_say_nothing_of_the_truth(tmp_path):
     session = simulate(single("backlash", KNEE))
     write(session, tmp_path / "recordings", tmp_path / "truth.json")
     truth = json.loads((tmp_path / "truth.json").read_text())
-    secrets = {*CAUSES, *(f.form for forms in FORMS.values() for f in forms), "seed", str(SEED), "hidden"}
+    secrets = {
+        *CAUSES,
+        *(f.form for forms in FORMS.values() for f in forms),
+        "seed",
+        str(SEED),
+        "hidden",
+    }
     assert truth["hidden"][0]["effect"] in secrets
     for path in (tmp_path / "recordings").iterdir():
         assert path.name in {f"run_{i}.parquet" for i in (1, 2, 3, 4)}
@@ -128,7 +148,9 @@ def test_causes_have_forms_beside_the_catalogues():
 def test_what_is_outside_the_catalogue_has_the_magnitude_that_was_wanted(kind):
     session = simulate(Case(SEED, "outside", ((f"outside:{kind.__name__}", KNEE),)))
     ((cause, size, wanted),) = session.hidden
-    assert magnitude(cause, session.runs) == pytest.approx(wanted, rel=0.25) or size == cause.largest
+    assert (
+        magnitude(cause, session.runs) == pytest.approx(wanted, rel=0.25) or size == cause.largest
+    )
 
 
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.__name__)
@@ -137,6 +159,8 @@ def test_a_fault_changes_the_files_that_the_truth_names(fault, faultless, tmp_pa
     faulty = type(session)(Case(SEED, "fault", fault=fault.__name__), session.rig, [], session.runs)
     write(faulty, tmp_path / "recordings", tmp_path / "truth.json")
     truth = json.loads((tmp_path / "truth.json").read_text())["fault"]
-    changed = {p.name for p in sound if p.read_bytes() != (tmp_path / "recordings" / p.name).read_bytes()}
+    changed = {
+        p.name for p in sound if p.read_bytes() != (tmp_path / "recordings" / p.name).read_bytes()
+    }
     assert changed == set(truth["files"])
     assert truth["fault"] in WORDS
