@@ -11,7 +11,7 @@ from exoid_cli.console import console
 from exoid_cli.place import ConfigOption, place_of, settings_in_force
 
 if TYPE_CHECKING:
-    from pipelines.diagnosis.detect import Detectable
+    from pipelines.diagnosis.detectability.detectability import Detectable
 
 
 def detect(
@@ -44,7 +44,7 @@ def detect(
       exoid detect recordings/*.parquet --power 0.95
     """
     from pipelines.contracts.atomic import open_folder, write_text
-    from pipelines.diagnosis.detect import as_json
+    from pipelines.diagnosis.detectability.detectability import as_json
 
     files = files or [place_of(config, lacking="no excitation is given").step("design").target]
     experiment = settings_in_force(config)
@@ -57,7 +57,7 @@ def detect(
             found = _recorded(files, experiment, power, report)
     told = {"files": [str(file) for file in files], "power": power, **as_json(found)}
     if output:
-        from pipelines.diagnosis.detect_figure import draw
+        from pipelines.diagnosis.detectability.figure import draw
 
         write_text(output / "detectability.json", json.dumps(told, ensure_ascii=False, indent=1) + "\n")
         draw(found, output / "detectability", f"What {', '.join(file.name for file in files)} would reveal")
@@ -81,11 +81,12 @@ def _is_trajectory(files: Sequence[Path]) -> bool:
 
 
 def _planned(files: Sequence[Path], experiment: Any, rig: Path | None, runs: str, power: float, report: Any) -> list:
-    from pipelines.diagnosis.detect import detectability
-    from pipelines.diagnosis.known import known_effects
-    from pipelines.diagnosis.observations import baseline_of, observe
-    from pipelines.diagnosis.planned import planned_motions, planned_noise
-    from pipelines.diagnosis.session import refuse_unfit
+    from pipelines.diagnosis.detectability.detectability import detectability
+    from pipelines.diagnosis.detectability.planned_runs import planned_motions, planned_noise
+    from pipelines.diagnosis.evidence.baseline import baseline_of
+    from pipelines.diagnosis.evidence.eligibility import refuse_unfit
+    from pipelines.diagnosis.evidence.known_effects import known_effects
+    from pipelines.diagnosis.evidence.observed_run import observe
     from pipelines.errors import InputError, about
     from pipelines.mechanics.trajectory import read_trajectory
     from pipelines.settings.rig import load_rig
@@ -115,7 +116,7 @@ def _default_plant(experiment: Any) -> Any:
 
 
 def _recorded(files: Sequence[Path], experiment: Any, power: float, report: Any) -> list:
-    from pipelines.diagnosis.detect import detectability_of_recorded
+    from pipelines.diagnosis.detectability.detectability import detectability_of_recorded
     from pipelines.mechanics.read import geometry_from, read_motions, refuse_another_mechanism
 
     motions = read_motions(files, experiment.filter, geometry_from(experiment))

@@ -50,9 +50,9 @@ def diagnose(
     from pipelines.contracts import CANDIDATES, PARAMETERS, RESIDUALS, describe
     from pipelines.contracts.atomic import all_or_none, open_folder, write_text
     from pipelines.contracts.provenance import recording_behind
-    from pipelines.diagnosis.verdict.candidate_table import candidates
-    from pipelines.diagnosis.detect import as_json, detectability
+    from pipelines.diagnosis.detectability.detectability import as_json, detectability
     from pipelines.diagnosis.diagnose import diagnose as find
+    from pipelines.diagnosis.verdict.candidate_table import candidates
     from pipelines.diagnosis.verdict.figures import FIGURES, draw
     from pipelines.diagnosis.verdict.verdict import verdict
     from pipelines.mechanics.read import geometry_from, read_motions, refuse_another_mechanism

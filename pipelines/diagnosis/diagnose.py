@@ -9,24 +9,24 @@
 
 from collections.abc import Callable, Sequence
 
-from pipelines.diagnosis import tables
+from pipelines.diagnosis.candidates.library import Library, Prepared, build_library, prepare, silent
 from pipelines.diagnosis.diagnosis import Diagnosis, Selected
+from pipelines.diagnosis.evidence.auxiliary_evidence import felt_in, heard_in
+from pipelines.diagnosis.evidence.baseline import like_trained, with_load
+from pipelines.diagnosis.evidence.model_error import imperfection
+from pipelines.diagnosis.evidence.noise_floor import noise_floor
 from pipelines.diagnosis.evidence.residual_shares import ResidualShares, residual_shares
-from pipelines.diagnosis.floor import noise_floor
-from pipelines.diagnosis.imperfection import imperfection
-from pipelines.diagnosis.joint_refinement import Refinement
-from pipelines.diagnosis.library import Library, Prepared, build_library, prepare, silent
-from pipelines.diagnosis.observations import like_trained, with_load
-from pipelines.diagnosis.perceived import felt_in, heard_in
-from pipelines.diagnosis.reversals import built_up
+from pipelines.diagnosis.evidence.training_data import TrainingData, training_data
+from pipelines.diagnosis.fit import parameter_rows
+from pipelines.diagnosis.fit.joint_refinement import Refinement
+from pipelines.diagnosis.fit.presliding_test import built_up
+from pipelines.diagnosis.fit.simulation_error import simulation_error
+from pipelines.diagnosis.fit.uncertainty import uncertainty
+from pipelines.diagnosis.fit.validation import Validated, log_likelihood_ratio, without_each
 from pipelines.diagnosis.selection.answer import Answer, answer_of
 from pipelines.diagnosis.selection.evidence import Evidence
 from pipelines.diagnosis.selection.findings import findings
 from pipelines.diagnosis.selection.posterior import posterior
-from pipelines.diagnosis.simulation_error import simulation_error
-from pipelines.diagnosis.training_data import TrainingData, training_data
-from pipelines.diagnosis.uncertainty import uncertainty
-from pipelines.diagnosis.validation import Validated, log_likelihood_ratio, without_each
 from pipelines.mechanics.motion import Motion
 
 LIBRARY_SHARE, FIT_SHARE = 0.6, 0.75
@@ -34,9 +34,7 @@ LIBRARY_SHARE, FIT_SHARE = 0.6, 0.75
 Report = Callable[[float, str], None]
 
 
-def diagnose(
-    motions: Sequence[Motion], report: Report = silent, known: Sequence[str] = ()
-) -> Diagnosis:
+def diagnose(motions: Sequence[Motion], report: Report = silent, known: Sequence[str] = ()) -> Diagnosis:
     """Find what the rigid body with Coulomb and viscous friction gets wrong, and why.
 
     Selection, shapes and shared parameters use ``train`` runs only. The ``validate`` runs measure
@@ -100,24 +98,20 @@ def _validated(data: TrainingData, prepared: Prepared, selected: Selected) -> Di
     """Fit what is named and measure it on the validation runs."""
     baseline, weights = data.baseline, prepared.weights
     refine = Refinement(prepared.runs, baseline, weights)
-    validate = tuple(
-        with_load(like_trained(run, baseline), baseline, prepared.values) for run in data.validate
-    )
+    validate = tuple(with_load(like_trained(run, baseline), baseline, prepared.values) for run in data.validate)
     before = Validated.of(refine(()), validate, baseline)
     after, without = _fitted(selected, refine, prepared, before)
-    ratios = {
-        label: log_likelihood_ratio(less, after, prepared.noise) for label, less in without.items()
-    }
+    ratios = {label: log_likelihood_ratio(less, after, prepared.noise) for label, less in without.items()}
     if (judged := selected.judged(ratios)).answer.named != selected.answer.named:
         selected = judged
         after, without = _fitted(selected, refine, prepared, before)
     known = uncertainty(after.fit, prepared.runs, baseline, imperfection(prepared.runs))
-    parameters, covariance = tables.parameters(after.fit, baseline, known)
+    parameters, covariance = parameter_rows.parameters(after.fit, baseline, known)
     residuals = {"baseline": before.residuals, "extended": after.residuals}
     reversals = [] if data.spoilt else built_up(after.fit, baseline, prepared.runs, validate)
     return Diagnosis(
         data, selected, before, after, without, noise_floor(validate, after.residuals), known,
-        parameters, covariance, tables.residual_table(validate, residuals), tuple(reversals),
+        parameters, covariance, parameter_rows.residual_table(validate, residuals), tuple(reversals),
         {
             "baseline": simulation_error(before.fit, validate, baseline),
             "extended": simulation_error(after.fit, validate, baseline),

@@ -9,22 +9,22 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.candidates import Candidate
+from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.candidates.library import Library
+from pipelines.diagnosis.evidence.baseline import Baseline
+from pipelines.diagnosis.evidence.noise_floor import Floor
+from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.evidence.residual_shares import ResidualShares
-from pipelines.diagnosis.faults import Fault
-from pipelines.diagnosis.fitted_model import values_of_each_run
-from pipelines.diagnosis.floor import Floor
-from pipelines.diagnosis.gain import Gain, errors_of
-from pipelines.diagnosis.library import Library
-from pipelines.diagnosis.observations import Baseline, Run
-from pipelines.diagnosis.reversals import BuildUp
+from pipelines.diagnosis.evidence.training_data import TrainingData
+from pipelines.diagnosis.fit.fitted_model import values_of_each_run
+from pipelines.diagnosis.fit.presliding_test import BuildUp
+from pipelines.diagnosis.fit.uncertainty import Uncertainty
+from pipelines.diagnosis.fit.validation import Validated, gains_of
+from pipelines.diagnosis.fit.validation_error import Gain, errors_of
 from pipelines.diagnosis.selection.answer import Answer, Named
 from pipelines.diagnosis.selection.evidence import Evidence
 from pipelines.diagnosis.selection.findings import Finding, findings
 from pipelines.diagnosis.selection.posterior import Posterior
-from pipelines.diagnosis.training_data import TrainingData
-from pipelines.diagnosis.uncertainty import Uncertainty
-from pipelines.diagnosis.validation import Validated, gains_of
 from pipelines.effects import Effect
 from pipelines.effects.force_sensor_zero import ForceSensorZero
 from pipelines.effects.rigid_body import RigidBody
@@ -55,9 +55,7 @@ class Selected:
         """The named causes at their most probable shapes."""
         if self.library is None:
             return ()
-        return tuple(
-            self.library.causes[one.element.place].candidate for one in self.answer.named
-        )
+        return tuple(self.library.causes[one.element.place].candidate for one in self.answer.named)
 
     def judged(self, ratios: Mapping[str, float]) -> "Selected":
         """Return the same after the validation runs, log likelihood ratios of causes by label."""
@@ -148,9 +146,7 @@ class Diagnosis:
         """Whether the extended model leaves more than noise at some joint."""
         if self.data.spoilt or self.status == "nothing_missing":
             return False
-        return self.status != "explained" or bool(
-            np.any(self.after.errors.rms > AT_FLOOR * self.floor_rms)
-        )
+        return self.status != "explained" or bool(np.any(self.after.errors.rms > AT_FLOOR * self.floor_rms))
 
     @cached_property
     def effects(self) -> dict[str, Effect]:
@@ -168,9 +164,7 @@ class Diagnosis:
     @cached_property
     def each_run(self) -> dict[str, list[dict[str, Any]]]:
         """What each run has for itself of the named causes, by label."""
-        return values_of_each_run(
-            self.after.fit, self.baseline, self.uncertainty, self.train, self.validate
-        )
+        return values_of_each_run(self.after.fit, self.baseline, self.uncertainty, self.train, self.validate)
 
     @cached_property
     def gains(self) -> dict[str, Gain]:

@@ -391,7 +391,8 @@ class Effect(ABC):
             return
         for stretch in motion.segments():
             columns_along_with_memory(
-                address(self.reaction), address(self.derivative), values, joint, *(a[stretch] for a in arrays), geometry,
+                address(self.reaction), address(self.derivative), values, joint,
+                *(a[stretch] for a in arrays), geometry,
                 np.zeros((11, joints)), np.zeros((3, self.states)), out[stretch],
             )  # fmt: skip
 

@@ -18,13 +18,15 @@ from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
-
 from pipelines.diagnosis.bank import Bank, fill
-from pipelines.diagnosis.candidates import BASELINE, columns_under, gram_of_runs, signatures
-from pipelines.diagnosis.diagnose import diagnose
-from pipelines.diagnosis.floor import MOST_INDEPENDENT
-from pipelines.diagnosis.observations import baseline_of, observe
 from pipelines.diagnosis.search import MOST, Scored, Scorer, search
+
+from pipelines.diagnosis.candidates.candidate import BASELINE
+from pipelines.diagnosis.candidates.columns import columns_under, gram_of_runs, signatures
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.evidence.baseline import baseline_of
+from pipelines.diagnosis.evidence.noise_floor import MOST_INDEPENDENT
+from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.effects import EFFECTS
 from pipelines.mechanics.motion import Motion
 from tests.bench.report import Row, show

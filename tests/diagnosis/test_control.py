@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pipelines.diagnosis.control import CASE, control
 
 from pipelines.contracts import HIP_AND_KNEE
-from pipelines.diagnosis.control import CASE, control
+from pipelines.diagnosis.data_faults import Fault
 from pipelines.diagnosis.diagnose import diagnose
-from pipelines.diagnosis.faults import Fault
 from pipelines.dynamics.plant import make_plant
 from pipelines.dynamics.tracking import track
 from pipelines.effects.friction import Friction

@@ -5,12 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.diagnosis.candidates import Candidate, columns_under, proposals, signatures
+from pipelines.diagnosis.candidates.candidate import Candidate, proposals
+from pipelines.diagnosis.candidates.columns import columns_under, signatures
+from pipelines.diagnosis.candidates.library import prepare
+from pipelines.diagnosis.candidates.shape_grid import values_in
+from pipelines.diagnosis.evidence.baseline import baseline_of
 from pipelines.diagnosis.evidence.block_rate import at_block_rate, needs_full_rate
 from pipelines.diagnosis.evidence.decision_band import LENGTH_S, DecisionBand
-from pipelines.diagnosis.library import prepare
-from pipelines.diagnosis.observations import baseline_of, observe
-from pipelines.diagnosis.shape_grid import values_in
+from pipelines.diagnosis.evidence.observed_run import observe
 from tests.diagnosis.sessions import session
 
 
@@ -39,9 +41,7 @@ def test_an_average_is_the_mean_of_its_usable_blocks(prepared):
 def test_no_average_reaches_across_a_gap(prepared):
     run = prepared.runs[0]
     kept = (run.time < 10.0) | (run.time > 12.03)
-    cut = replace(
-        run, time=run.time[kept], usable=run.usable[kept], measured=run.measured[kept]
-    )
+    cut = replace(run, time=run.time[kept], usable=run.usable[kept], measured=run.measured[kept])
     band = DecisionBand.of(cut)
     assert np.ptp(cut.time[band.blocks], axis=1).max() < LENGTH_S
 

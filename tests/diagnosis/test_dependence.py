@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pipelines.diagnosis.dependence import dependences, describe, excesses
-from pipelines.diagnosis.floor import Floor
-from pipelines.diagnosis.observations import observe
-from pipelines.diagnosis.planned import planned_motions
-from pipelines.diagnosis.smooth_term import smooth_term
+from pipelines.diagnosis.dependence.explained_share import dependences, describe, excesses
+from pipelines.diagnosis.dependence.smooth_term import smooth_term
+from pipelines.diagnosis.detectability.planned_runs import planned_motions
+from pipelines.diagnosis.evidence.noise_floor import Floor
+from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.machine import THE_LEG
 from pipelines.settings.design import NoiseSettings

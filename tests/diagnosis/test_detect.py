@@ -4,15 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pipelines.diagnosis.choice import MATERIAL, NEEDED
 from scipy.signal import lfilter
 
-from pipelines.diagnosis.candidates import Candidate, columns_under, torque_columns
-from pipelines.diagnosis.choice import MATERIAL, NEEDED
-from pipelines.diagnosis.detect import POWER, Look, _alike, detectability, needed_noncentrality
-from pipelines.diagnosis.floor import Floor
-from pipelines.diagnosis.imperfection import IMPERFECTION
-from pipelines.diagnosis.observations import baseline_of, observe
-from pipelines.diagnosis.planned import planned_motions, planned_noise
+from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.candidates.columns import columns_under, torque_columns
+from pipelines.diagnosis.detectability.detectability import POWER, Look, _alike, detectability, needed_noncentrality
+from pipelines.diagnosis.detectability.planned_runs import planned_motions, planned_noise
+from pipelines.diagnosis.evidence.baseline import baseline_of
+from pipelines.diagnosis.evidence.model_error import IMPERFECTION
+from pipelines.diagnosis.evidence.noise_floor import Floor
+from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.trajectory import read_trajectory
 from pipelines.settings.datasets import datasets

@@ -7,15 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from pipelines.diagnosis.candidates import Candidate
-from pipelines.diagnosis.diagnose import diagnose
-from pipelines.diagnosis.evaluate import settled
 from pipelines.diagnosis.figures.budget import words_of
-from pipelines.diagnosis.fit import fit
-from pipelines.diagnosis.fitted_model import values_of_each_run
-from pipelines.diagnosis.observations import baseline_of, observe
-from pipelines.diagnosis.uncertainty import Uncertainty
+
+from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.evidence.baseline import baseline_of
+from pipelines.diagnosis.evidence.observed_run import observe
+from pipelines.diagnosis.fit.fitted_model import values_of_each_run
+from pipelines.diagnosis.fit.held_out import settled
+from pipelines.diagnosis.fit.joint_fit import fit
+from pipelines.diagnosis.fit.uncertainty import Uncertainty
 from pipelines.diagnosis.verdict import verdict
 from pipelines.effects import TorqueDrift, VoluntaryTorque
 from tests.diagnosis.sessions import session

@@ -4,21 +4,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pipelines.diagnosis.examined import Examined, Extended
+from pipelines.diagnosis.status import WANDERING, Standing
 from scipy.optimize import brentq
 from scipy.signal import butter, lfilter
 
 from pipelines.diagnosis import impacts
-from pipelines.diagnosis.candidates import Candidate, columns_under, lowest
-from pipelines.diagnosis.examined import Examined, Extended
-from pipelines.diagnosis.fit import _scale, fit, refined
-from pipelines.diagnosis.floor import slow_scatter
-from pipelines.diagnosis.gain import Errors
-from pipelines.diagnosis.impacts import evidence_of_play
-from pipelines.diagnosis.observations import FOLDS, baseline_of, observe, with_load
-from pipelines.diagnosis.slow import SlowError, slow_error
-from pipelines.diagnosis.status import WANDERING, Standing
-from pipelines.diagnosis.tone import strongest_tone
-from pipelines.diagnosis.volition import evidence_of_will
+from pipelines.diagnosis.candidates.candidate import Candidate, lowest
+from pipelines.diagnosis.candidates.columns import columns_under
+from pipelines.diagnosis.dependence.spectral_lines import strongest_tone
+from pipelines.diagnosis.evidence.baseline import baseline_of, with_load
+from pipelines.diagnosis.evidence.cuff_coherence import evidence_of_will
+from pipelines.diagnosis.evidence.impact_bursts import evidence_of_play
+from pipelines.diagnosis.evidence.noise_floor import slow_scatter
+from pipelines.diagnosis.evidence.observed_run import FOLDS, observe
+from pipelines.diagnosis.evidence.slow_error import SlowError, slow_error
+from pipelines.diagnosis.fit.joint_fit import _scale, fit, refined
+from pipelines.diagnosis.fit.validation_error import Errors
 from pipelines.effects import Backlash, Cogging, EncoderOffset, Parameter, TorqueDrift, ViscousAsymmetry
 from tests.diagnosis.sessions import session
 

@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 from pipelines.contracts.table import Table
-from pipelines.diagnosis.faults import excluding, find_faults
-from pipelines.diagnosis.faults.body import averages
+from pipelines.diagnosis.data_faults import excluding, find_faults
+from pipelines.diagnosis.data_faults.nonnegative_leg import averages
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.mechanisms.leg import LEG

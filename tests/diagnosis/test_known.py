@@ -1,8 +1,8 @@
 """What drawings show of a machine is part of the model that everything is held against, and is searched for no more."""
 
 import pytest
-
 from pipelines.diagnosis.candidate_table import candidates
+
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.verdict import verdict
 from pipelines.errors import InputError

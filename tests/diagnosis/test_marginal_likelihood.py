@@ -41,9 +41,7 @@ def test_a_law_has_the_evidence_of_its_gaussian_model():
     (size,) = weigh.sizes((2,))
     amplitude = min(CRITERIA.amplitudes, key=lambda a: abs(np.log(a / size)))
     plain = background_covariance(X)
-    with_law = plain + amplitude**2 * (
-        0.7 * np.outer(X[:, 3], X[:, 3]) + 0.3 * np.outer(X[:, 4], X[:, 4])
-    )
+    with_law = plain + amplitude**2 * (0.7 * np.outer(X[:, 3], X[:, 3]) + 0.3 * np.outer(X[:, 4], X[:, 4]))
     ratio = multivariate_normal.logpdf(y, cov=with_law) - multivariate_normal.logpdf(y, cov=plain)
     assert weigh((2,)) == pytest.approx(ratio - np.log(3.0) + CRITERIA.law, abs=1e-8)
 
@@ -72,9 +70,7 @@ def test_a_forbidden_sign_counts_as_half_of_the_prior_that_is_not_there(strength
     one_way = replace(cause, amplitudes=[[1.0]])
     both = replace(evidence, elements=(cause, *evidence.elements[1:]))
     signed = replace(evidence, elements=(one_way, *evidence.elements[1:]))
-    difference = (
-        MarginalLikelihood(signed, CRITERIA)((0,)) - MarginalLikelihood(both, CRITERIA)((0,))
-    )
+    difference = MarginalLikelihood(signed, CRITERIA)((0,)) - MarginalLikelihood(both, CRITERIA)((0,))
     # By sampling the same posterior.
     (size,) = MarginalLikelihood(both, CRITERIA).sizes((0,))
     amplitude = min(CRITERIA.amplitudes, key=lambda a: abs(np.log(a / size)))

@@ -4,10 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pipelines.diagnosis.evidence.noise_model import _first_order, noise_model
-from pipelines.diagnosis.evidence.residual_shares import residual_shares
-from pipelines.diagnosis.observations import observe
-from tests.diagnosis.sessions import session
+from pipelines.diagnosis.evidence.noise_model import _first_order
 
 RATE_HZ = 40.0
 
@@ -28,10 +25,7 @@ def density(rms: float, tau: float) -> float:
 @pytest.mark.parametrize("tau", [0.0, 0.02, 0.06])
 def test_the_density_at_low_frequencies_is_that_of_the_noise(tau):
     rng = np.random.default_rng(3)
-    found = [
-        _first_order([coloured(rng, 2400, 0.5, tau) for _ in range(2)], RATE_HZ, (1.5, 6.0))[0]
-        for _ in range(20)
-    ]
+    found = [_first_order([coloured(rng, 2400, 0.5, tau) for _ in range(2)], RATE_HZ, (1.5, 6.0))[0] for _ in range(20)]
     assert np.mean(found) == pytest.approx(density(0.5, tau), rel=0.15)
     assert np.std(found) < 0.35 * np.mean(found)
 

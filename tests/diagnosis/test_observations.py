@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.diagnosis.fit import fit, residuals_on
-from pipelines.diagnosis.observations import baseline_of, like_trained, observe
+from pipelines.diagnosis.evidence.baseline import baseline_of, like_trained
+from pipelines.diagnosis.evidence.observed_run import observe
+from pipelines.diagnosis.fit.joint_fit import fit, residuals_on
 from pipelines.estimation.regression import TURN_S, away_from_turns
 from pipelines.mechanics.slow_motion import below
 from pipelines.model import Model

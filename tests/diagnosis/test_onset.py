@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pipelines.diagnosis.candidates import Candidate
+from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.diagnose import diagnose
-from pipelines.diagnosis.evaluate import settled
-from pipelines.diagnosis.fit import refined
-from pipelines.diagnosis.observations import baseline_of, observe
-from pipelines.diagnosis.onset import ALWAYS, NEVER, Onset
-from pipelines.diagnosis.uncertainty import uncertainty
+from pipelines.diagnosis.evidence.baseline import baseline_of
+from pipelines.diagnosis.evidence.observed_run import observe
+from pipelines.diagnosis.fit.change_point import ALWAYS, NEVER, Onset
+from pipelines.diagnosis.fit.held_out import settled
+from pipelines.diagnosis.fit.joint_fit import refined
+from pipelines.diagnosis.fit.uncertainty import uncertainty
 from pipelines.diagnosis.verdict import verdict
 from pipelines.effects import PayloadChange
 from pipelines.mechanics.kinematics import motion_table

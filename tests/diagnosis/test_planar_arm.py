@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.diagnosis.candidates import proposals
+from pipelines.diagnosis.candidates.candidate import proposals
 from pipelines.diagnosis.diagnose import diagnose
-from pipelines.diagnosis.observations import Baseline
+from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.verdict import verdict
 from pipelines.dynamics.replay import replay
 from pipelines.effects import EFFECTS

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-
-from pipelines.diagnosis.candidates import Candidate
-from pipelines.diagnosis.diagnose import diagnose
-from pipelines.diagnosis.fit import fit
-from pipelines.diagnosis.fitted_model import model_of_run
-from pipelines.diagnosis.reversals import built_up, dahl
 from pipelines.diagnosis.second_look import slower
+
+from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.fit.fitted_model import model_of_run
+from pipelines.diagnosis.fit.joint_fit import fit
+from pipelines.diagnosis.fit.presliding_test import built_up, dahl
 from pipelines.diagnosis.verdict import verdict
 from pipelines.effects import Backlash
 from pipelines.mechanics.geometry import Geometry

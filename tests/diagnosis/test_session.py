@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.diagnosis.detect import detectability_of_recorded
+from pipelines.diagnosis.data_faults import excluding, find_faults
+from pipelines.diagnosis.detectability.detectability import detectability_of_recorded
 from pipelines.diagnosis.diagnose import diagnose
-from pipelines.diagnosis.faults import excluding, find_faults
 from pipelines.errors import InputError
 from tests.diagnosis.sessions import session
 

@@ -6,8 +6,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from pipelines.diagnosis.data_faults import find_faults
 from pipelines.diagnosis.diagnose import diagnose
-from pipelines.diagnosis.faults import find_faults
 from pipelines.diagnosis.verdict import verdict
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table

@@ -10,7 +10,7 @@ import pytest
 from pipelines.contracts.joints import Joint
 from pipelines.contracts.table import Table
 from pipelines.diagnosis.diagnose import diagnose
-from pipelines.diagnosis.gain import scored
+from pipelines.diagnosis.fit.validation_error import scored
 from pipelines.diagnosis.verdict import _evidence, _finding, _in_words, _times, _untold_length, verdict
 from pipelines.effects import ParallelSpring
 from pipelines.mechanics.geometry import Geometry

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipelines.diagnosis.observations import observe
-from pipelines.diagnosis.thinned import thinned
+from pipelines.diagnosis.evidence.downsampling import thinned
+from pipelines.diagnosis.evidence.observed_run import observe
 from tests.diagnosis.sessions import session
 
 RATE_HZ = 1000.0

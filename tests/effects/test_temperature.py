@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-
 from pipelines.diagnosis.bank import fill
-from pipelines.diagnosis.gram import solve
-from pipelines.diagnosis.observations import baseline_of, observe
+
+from pipelines.diagnosis.candidates.gram import solve
+from pipelines.diagnosis.evidence.baseline import baseline_of
+from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.effects.friction import Friction
 from pipelines.effects.friction_temperature import FrictionTemperature
 from pipelines.effects.gain_drift import GainDrift

@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from pipelines.diagnosis.bank import fill
 from scipy.optimize import minimize_scalar
 
 from pipelines.contracts import Joint
-from pipelines.diagnosis.bank import fill
-from pipelines.diagnosis.gram import solve
-from pipelines.diagnosis.observations import baseline_of, observe
+from pipelines.diagnosis.candidates.gram import solve
+from pipelines.diagnosis.evidence.baseline import baseline_of
+from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.effects.friction import Friction
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.effects.torque_cross_talk import TorqueCrossTalk

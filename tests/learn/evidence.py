@@ -18,9 +18,7 @@ from tests.blind.examine import Folders, neutral_name, prepare
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
-def write_evidence(
-    cases: Sequence[Case], root: Path, workers: int, keep: bool = False
-) -> Iterator[str]:
+def write_evidence(cases: Sequence[Case], root: Path, workers: int, keep: bool = False) -> Iterator[str]:
     """Simulate cases and keep their evidence; yield names as they are done.
 
     What is there already is left as it is, so that a campaign goes on where it was stopped.

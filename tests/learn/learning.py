@@ -77,9 +77,7 @@ def _weights(sessions: Sequence[Session]) -> NDArray:
     return np.array([1.0 / (len(counts) * counts[world]) for world in worlds])
 
 
-def _ascended(
-    scores: Scores, weights: NDArray, criteria: Criteria
-) -> tuple[Criteria, float]:
+def _ascended(scores: Scores, weights: NDArray, criteria: Criteria) -> tuple[Criteria, float]:
     scale = np.where([value < 0.0 for value in plain_values(criteria)], ODDS, 1.0)
 
     def score(vector: NDArray) -> float:

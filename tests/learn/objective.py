@@ -65,6 +65,7 @@ def reduced(row: dict[str, Any], criteria: Criteria) -> Session:
 
 def _kept(found: Posterior, right: Right) -> list[Set]:
     """Return the most probable sets, and the most probable right ones."""
+
     def labels(chosen: Set) -> frozenset[str]:
         return frozenset(found.elements[i].label for i in chosen)
 
@@ -72,9 +73,7 @@ def _kept(found: Posterior, right: Right) -> list[Set]:
     return list(dict.fromkeys((*found.sets[:SETS], *true, ())))
 
 
-def _compact(
-    evidence: Evidence, sets: Sequence[Set], right: Right
-) -> tuple[Evidence, tuple[Set, ...], NDArray]:
+def _compact(evidence: Evidence, sets: Sequence[Set], right: Right) -> tuple[Evidence, tuple[Set, ...], NDArray]:
     """Keep the elements and columns that sets need, and the background's."""
     elements = sorted({i for chosen in sets for i in chosen})
     columns = {place for _, place, _ in evidence.background}

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from pipelines.diagnosis.smooth_laws import FAMILIES
+from pipelines.diagnosis.candidates.smooth_laws import FAMILIES
 
 STRUCTURAL = (
     {"torque_offset", "coulomb_asymmetry"},

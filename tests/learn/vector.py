@@ -52,9 +52,7 @@ def from_vector(vector: NDArray, like: Criteria) -> Criteria:
     for field in fields(Criteria):
         value = getattr(like, field.name)
         if isinstance(value, tuple):
-            changed[field.name] = tuple(
-                _back(next(at), v) if _free(field.name, k) else v for k, v in enumerate(value)
-            )
+            changed[field.name] = tuple(_back(next(at), v) if _free(field.name, k) else v for k, v in enumerate(value))
         else:
             changed[field.name] = _back(next(at), value)
     return Criteria(**changed)

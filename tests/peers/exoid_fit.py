@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.diagnose import diagnose as find
-from pipelines.diagnosis.fitted_model import model_of_run
+from pipelines.diagnosis.fit.fitted_model import model_of_run
 from pipelines.diagnosis.verdict import verdict
 from pipelines.estimation.regression import away_from_reversals, block_average
 from pipelines.identification import identify as fit

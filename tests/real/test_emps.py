@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from pipelines.diagnosis.faults import find_faults
+from pipelines.diagnosis.data_faults import find_faults
 from pipelines.mechanics.scale import on_one_scale
 from tests.real.machines import LOGS, diagnosed, motions, of_purpose, recordings, symmetric
 from tests.real.published import EMPS, EMPS_ERRORS

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pipelines.diagnosis.faults import find_faults
+from pipelines.diagnosis.data_faults import find_faults
 from pipelines.mechanics.scale import on_one_scale
 from tests.real.machines import LOGS, diagnosed, motions, recordings
 

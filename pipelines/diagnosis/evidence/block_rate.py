@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipelines.diagnosis.observations import Run
+from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.effects import Effect
 from pipelines.signals.blocks import BlockAverage
 

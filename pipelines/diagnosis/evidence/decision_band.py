@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from pipelines.diagnosis.observations import Run
+from pipelines.diagnosis.evidence.observed_run import Run
 
 LENGTH_S = 0.1
 """Length of one average, s."""
@@ -39,16 +39,13 @@ class DecisionBand:
         k = max(1, round(LENGTH_S / width))
         breaks = np.flatnonzero(np.diff(run.time) > 1.5 * width) + 1
         ends = [*breaks, len(run.time)]
-        starts = [
-            np.arange(a, b - k + 1, k) for a, b in zip([0, *breaks], ends, strict=True)
-        ]
+        starts = [np.arange(a, b - k + 1, k) for a, b in zip([0, *breaks], ends, strict=True)]
         blocks = np.concatenate(starts)[:, np.newaxis] + np.arange(k)
         usable = run.usable[blocks]
         count = usable.sum(axis=1)
         weight = np.where(count >= LEAST_SHARE * k, count / k, 0.0)
         operators = tuple(
-            _averaging(blocks, usable[:, :, o], count[:, o], len(run.time))
-            for o in range(run.usable.shape[1])
+            _averaging(blocks, usable[:, :, o], count[:, o], len(run.time)) for o in range(run.usable.shape[1])
         )
         return cls(run, run.time[blocks].mean(axis=1), blocks, weight, operators)
 

@@ -15,7 +15,7 @@ from scipy import sparse
 
 from pipelines.diagnosis.evidence.decision_band import LENGTH_S, DecisionBand
 from pipelines.diagnosis.evidence.noise_model import NoiseModel
-from pipelines.diagnosis.observations import Run
+from pipelines.diagnosis.evidence.observed_run import Run
 
 RANK = 1e-9
 """Relative length below which a baseline column adds nothing to those before it."""

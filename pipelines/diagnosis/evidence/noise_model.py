@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.floor import scatter
-from pipelines.diagnosis.observations import Run
-from pipelines.diagnosis.tone import above_the_motion_hz
+from pipelines.diagnosis.dependence.spectral_lines import above_the_motion_hz
+from pipelines.diagnosis.evidence.noise_floor import scatter
+from pipelines.diagnosis.evidence.observed_run import Run
 
 WANDER_HZ = 1.5
 """Below it differences between periods hold what wanders, not only noise, Hz."""
@@ -53,25 +53,19 @@ def noise_model(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NoiseModel
     if from_periods:
         series, band = differences, (WANDER_HZ, HIGHEST_HZ)
     else:
-        series = [
-            np.where(run.usable, residual, np.nan)
-            for run, residual in zip(runs, residuals, strict=True)
-        ]
+        series = [np.where(run.usable, residual, np.nan) for run, residual in zip(runs, residuals, strict=True)]
         above = max(above_the_motion_hz(run) for run in runs)
         latest, highest = WITHOUT_PERIODS_HZ
         band = (min(above, latest), highest)
     rate_hz = runs[0].motion.sample_rate_hz / runs[0].block.decimation
     fits = [
-        _first_order([one[:, o] for one in series if len(one)], rate_hz, band)
-        for o in range(residuals[0].shape[1])
+        _first_order([one[:, o] for one in series if len(one)], rate_hz, band) for o in range(residuals[0].shape[1])
     ]
     density, correlation_s = np.array(fits).T
     return NoiseModel(density, correlation_s, from_periods)
 
 
-def _first_order(
-    series: Sequence[NDArray], rate_hz: float, band: tuple[float, float]
-) -> tuple[float, float]:
+def _first_order(series: Sequence[NDArray], rate_hz: float, band: tuple[float, float]) -> tuple[float, float]:
     """Fit first-order noise to series with NaN where they are not usable; return S0 and tau.
 
     Maximum likelihood of the periodogram (Whittle, 1953, Arkiv för Matematik 2(23)).
@@ -88,9 +82,7 @@ def _first_order(
     return float(densities[best]), float(CORRELATION_S[best])
 
 
-def _periodogram(
-    x: NDArray, rate_hz: float, band: tuple[float, float]
-) -> tuple[NDArray, NDArray]:
+def _periodogram(x: NDArray, rate_hz: float, band: tuple[float, float]) -> tuple[NDArray, NDArray]:
     """Return frequencies (Hz) and two-sided densities of a series (n,) within a band."""
     known = np.isfinite(x)
     if known.sum() < SHORTEST:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.evidence.decision_band import LENGTH_S, DecisionBand
 from pipelines.diagnosis.evidence.noise_model import NoiseModel
-from pipelines.diagnosis.observations import Run
+from pipelines.diagnosis.evidence.observed_run import Run
 
 KINDS = ("exo_alone", "with_human")
 
@@ -46,9 +46,7 @@ class ResidualShares:
         }  # fmt: skip
 
 
-def residual_shares(
-    runs: Sequence[Run], residuals: Sequence[NDArray], noise: NoiseModel
-) -> list[ResidualShares]:
+def residual_shares(runs: Sequence[Run], residuals: Sequence[NDArray], noise: NoiseModel) -> list[ResidualShares]:
     """Split the residuals (m, O) of each run, for each joint."""
     bands = [DecisionBand.of(run) for run in runs]
     averaged = [band.average(r) for band, r in zip(bands, residuals, strict=True)]
@@ -56,9 +54,7 @@ def residual_shares(
     return [_of_joint(j, bands, averaged, noise) for j in range(joints)]
 
 
-def _of_joint(
-    j: int, bands: Sequence[DecisionBand], averaged: Sequence[NDArray], noise: NoiseModel
-) -> ResidualShares:
+def _of_joint(j: int, bands: Sequence[DecisionBand], averaged: Sequence[NDArray], noise: NoiseModel) -> ResidualShares:
     known = [band.weight[:, j] > 0.0 for band in bands]
     values = [a[k, j] for a, k in zip(averaged, known, strict=True)]
     everything = np.concatenate(values)
@@ -110,9 +106,7 @@ def _repeating(band: DecisionBand, values: NDArray, known: NDArray) -> NDArray:
     return values[now[use]] * values[later[use]]
 
 
-def _with_person_only(
-    bands: Sequence[DecisionBand], repeated: Sequence[NDArray], total: float
-) -> float | None:
+def _with_person_only(bands: Sequence[DecisionBand], repeated: Sequence[NDArray], total: float) -> float | None:
     """Return how much more repeats with a person than without, as a share of all."""
     powers = []
     for kind in KINDS:

@@ -66,9 +66,7 @@ def answer_of(posterior: Posterior) -> Answer:
         for chosen, p in zip(posterior.sets, posterior.probabilities, strict=True)
         if any(posterior.elements[i].is_law for i in chosen)
     )
-    return Answer(
-        tuple(sorted(named, key=lambda one: -one.probability)), posterior.nothing, unlisted
-    )
+    return Answer(tuple(sorted(named, key=lambda one: -one.probability)), posterior.nothing, unlisted)
 
 
 def _lowered(probability: float, ratio: float) -> float:
@@ -80,11 +78,7 @@ def _lowered(probability: float, ratio: float) -> float:
 def _best(posterior: Posterior) -> Set:
     """Return the most probable shapes of the most probable set of labels."""
     labels = max(posterior.by_labels, key=lambda key: posterior.by_labels[key])
-    return next(
-        chosen
-        for chosen in posterior.sets
-        if frozenset(posterior.elements[i].label for i in chosen) == labels
-    )
+    return next(chosen for chosen in posterior.sets if frozenset(posterior.elements[i].label for i in chosen) == labels)
 
 
 def _named(posterior: Posterior, best: Set, i: int) -> Named:

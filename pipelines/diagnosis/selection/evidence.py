@@ -6,13 +6,14 @@ Small enough to be kept for thousands of sessions, from which the criteria are l
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.library import Cause, Library
-from pipelines.diagnosis.smooth_laws import FAMILIES, LawColumn
+from pipelines.diagnosis.candidates.library import Cause, Library
+from pipelines.diagnosis.candidates.smooth_laws import FAMILIES, LawColumn
 from pipelines.effects import Effect
 
 TIME = "time"
@@ -140,14 +141,11 @@ class _Places:
 
 def _stack(library: Library) -> tuple[NDArray, _Places]:
     """Put all columns side by side, (N, n)."""
-    joints = library.regression.joints
-    torque = library.prepared.torque[:joints]
-    del torque
     columns = [cause.columns for cause in library.causes]
     derivatives = [cause.derivative for cause in library.causes]
     parts = [*columns, *derivatives, library.law_columns, library.curve_columns]
     ends = np.cumsum([0, *(part.shape[1] for part in parts)])
-    places = [np.arange(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    places = [np.arange(a, b) for a, b in pairwise(ends)]
     k = len(columns)
     return np.hstack(parts), _Places(places[:k], places[k : 2 * k], places[-2], places[-1])
 
@@ -156,15 +154,10 @@ def _elements(library: Library, at: _Places) -> list[Element]:
     names = library.prepared.baseline.joints
     laws = _laws_by_kind(library.laws, at.laws)
     for j in range(len(names)):
-        own = [
-            (int(p), c[2]) for p, c in zip(at.curves, library.curves, strict=True) if c[0] == j
-        ]
+        own = [(int(p), c[2]) for p, c in zip(at.curves, library.curves, strict=True) if c[0] == j]
         laws[TIME, j, "all"] = own
     two = any(wearer == "human" for _, _, wearer in laws)
-    elements = [
-        _of_cause(number, cause, at, laws, names, two)
-        for number, cause in enumerate(library.causes)
-    ]
+    elements = [_of_cause(number, cause, at, laws, names, two) for number, cause in enumerate(library.causes)]
     elements += [
         Element(
             f"law:{kind}@{names[j]}", kind, names[j], FAMILIES[kind], True,
@@ -191,9 +184,7 @@ def _normalised(variance: Sequence[float]) -> list[float]:
     return [v / total for v in variance]
 
 
-def _of_cause(
-    number: int, cause: Cause, at: _Places, laws: Laws, names: Sequence[str], two: bool
-) -> Element:
+def _of_cause(number: int, cause: Cause, at: _Places, laws: Laws, names: Sequence[str], two: bool) -> Element:
     effect = cause.candidate.effect
     places = at.causes[number].tolist()
     resembles = list(_resembled(effect, laws, names, two))

@@ -64,9 +64,7 @@ def findings(posterior: Posterior, answer: Answer) -> list[Finding]:
     return sorted(told, key=lambda finding: -finding.probability)
 
 
-def _of_cause(
-    posterior: Posterior, answer: Answer, number: int, root: tuple[str, Any, float]
-) -> Finding:
+def _of_cause(posterior: Posterior, answer: Answer, number: int, root: tuple[str, Any, float]) -> Finding:
     named = answer.named[number]
     element = named.element
     path = (root, *_path(posterior, element), ("cause", element.label, named.probability))
@@ -106,14 +104,10 @@ def _families(
             key=lambda e: posterior.marginals.get(e.label, 0.0),
         )
         path = (root, *_path(posterior, first))
-        yield Finding(
-            "family", first.repeats, joint, family, chance, _closest(posterior, belongs), path
-        )
+        yield Finding("family", first.repeats, joint, family, chance, _closest(posterior, belongs), path)
 
 
-def _closest(
-    posterior: Posterior, belongs: Callable[[Element], bool]
-) -> tuple[tuple[str, float], ...]:
+def _closest(posterior: Posterior, belongs: Callable[[Element], bool]) -> tuple[tuple[str, float], ...]:
     """Return the listed causes that come closest, the most probable first."""
     labels = {e.label for e in posterior.elements if belongs(e) and not e.is_law}
     ranked = [(label, p) for label, p in posterior.marginals.items() if label in labels]

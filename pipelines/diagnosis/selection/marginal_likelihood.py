@@ -40,9 +40,7 @@ class MarginalLikelihood:
         gram = drive * evidence.drives + cuff * evidence.cuffs
         right = drive * evidence.drives_right + cuff * evidence.cuffs_right
         self.gram, self.right = _without(gram, right, *self._background())
-        self.parts = [
-            np.array([*e.columns, *e.derivative], dtype=int) for e in evidence.elements
-        ]
+        self.parts = [np.array([*e.columns, *e.derivative], dtype=int) for e in evidence.elements]
         self.log_prior = np.array([self._log_prior(e) for e in evidence.elements])
 
     def _background(self) -> tuple[NDArray, NDArray]:
@@ -89,9 +87,7 @@ class MarginalLikelihood:
         amplitudes = np.array(self.criteria.amplitudes)
         nearest = [amplitudes[np.argmin(np.abs(np.log(amplitudes / z)))] for z in sizes]
         columns = np.concatenate([self.parts[i] for i in chosen])
-        variance = np.concatenate(
-            [self._variance(e, sd**2) for e, sd in zip(elements, nearest, strict=True)]
-        )
+        variance = np.concatenate([self._variance(e, sd**2) for e, sd in zip(elements, nearest, strict=True)])
         differ, spread = _together(elements, sizes)
         misfits = self.criteria.misfits if len(differ) else (0.0,)
         weighed = [
@@ -119,14 +115,10 @@ class MarginalLikelihood:
         system = self.gram[np.ix_(columns, columns)] + np.diag(1.0 / variance)
         values = np.linalg.solve(system, self.right[columns])
         ends = np.cumsum([0, *(len(self.parts[i]) for i in chosen)])
-        own = [
-            values[a : a + len(e.columns)] for a, e in zip(ends[:-1], elements, strict=True)
-        ]
+        own = [values[a : a + len(e.columns)] for a, e in zip(ends[:-1], elements, strict=True)]
         return np.maximum([_share(e, v) for e, v in zip(elements, own, strict=True)], LEAST_SIZE)
 
-    def _log_evidence(
-        self, columns: NDArray, variance: NDArray, elements: Sequence[Element]
-    ) -> float:
+    def _log_evidence(self, columns: NDArray, variance: NDArray, elements: Sequence[Element]) -> float:
         """Return the log Bayes factor of columns with prior variances, signs included."""
         sd = np.sqrt(variance)
         system = self.gram[np.ix_(columns, columns)] * np.outer(sd, sd)
@@ -200,9 +192,7 @@ class MarginalLikelihood:
         return np.array([self((i,)) for i in range(len(self.evidence.elements))])
 
 
-def _without(
-    gram: NDArray, right: NDArray, background: NDArray, sd: NDArray
-) -> tuple[NDArray, NDArray]:
+def _without(gram: NDArray, right: NDArray, background: NDArray, sd: NDArray) -> tuple[NDArray, NDArray]:
     """Marginalise background columns with prior sds out of the products."""
     system = gram[np.ix_(background, background)] * np.outer(sd, sd)
     system[np.diag_indices_from(system)] += 1.0
@@ -226,9 +216,7 @@ def _together(elements: Sequence[Element], sizes: NDArray) -> tuple[NDArray, NDA
     return np.array(list(spread), dtype=int), np.array(list(spread.values()))
 
 
-def _log_sign(
-    amplitudes: NDArray, lower: NDArray, u: NDArray, sd: NDArray, at: int
-) -> float:
+def _log_sign(amplitudes: NDArray, lower: NDArray, u: NDArray, sd: NDArray, at: int) -> float:
     """Return what knowing that amplitudes (p, k) are not negative adds to the log evidence.
 
     The prior is symmetric, so the factor is twice the posterior probability of the sign.

@@ -4,7 +4,6 @@ Every single element and every pair is weighed; triples extend the best pairs. W
 marginals: of nothing missing, of each cause, of something unlisted, of each family at each joint.
 """
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 

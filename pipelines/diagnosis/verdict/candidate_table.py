@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.gain import gain
-from pipelines.diagnosis.validation import Validated
+from pipelines.diagnosis.fit.validation import Validated
+from pipelines.diagnosis.fit.validation_error import gain
 from pipelines.effects import EFFECTS, Effect
 from pipelines.mechanics.machine import Machine
 
@@ -105,9 +105,7 @@ def _judged(d: Diagnosis, labels: frozenset[str], probability: float) -> tuple[s
 def _taken_up(effect: type[Effect], machine: Machine) -> dict[str, str]:
     """Return the joints at which other parameters take an effect up whole, and which."""
     everywhere = machine.mechanism.absorbs.get(effect.name)
-    by_joint = {
-        joint: everywhere or effect.absorbed.get(machine.place(joint)) for joint in machine.names
-    }
+    by_joint = {joint: everywhere or effect.absorbed.get(machine.place(joint)) for joint in machine.names}
     return {joint: into for joint, into in by_joint.items() if into}
 
 
@@ -116,23 +114,15 @@ def _not_fitted(d: Diagnosis) -> tuple[str, ...]:
 
 
 def _left_out(d: Diagnosis, label: str) -> dict[str, Any]:
-    return _without_numbers(
-        d, label, "rejected", "it was left out: on these runs its torque is zero or not finite"
-    )
+    return _without_numbers(d, label, "rejected", "it was left out: on these runs its torque is zero or not finite")
 
 
 def _absorbed(d: Diagnosis, name: str, joint: str, into: str) -> dict[str, Any]:
-    return _without_numbers(
-        d, f"{name}@{joint}", "absorbed", f"it is part of {into} and cannot be seen apart from it"
-    )
+    return _without_numbers(d, f"{name}@{joint}", "absorbed", f"it is part of {into} and cannot be seen apart from it")
 
 
 def _without_numbers(d: Diagnosis, label: str, verdict: str, reason: str) -> dict[str, Any]:
-    blank = {
-        j.column(f"rmse_{when}"): None
-        for j in d.baseline.machine.joints
-        for when in ("before", "after")
-    }
+    blank = {j.column(f"rmse_{when}"): None for j in d.baseline.machine.joints for when in ("before", "after")}
     return {
         "causes": [label], "parameters": [], "train_score": None, "gain_nm": None,
         "gain_low_nm": None, "gain_high_nm": None, "probability": None, **blank,

@@ -2,7 +2,7 @@
 
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.perceived import PERCEIVED
+from pipelines.diagnosis.evidence.auxiliary_evidence import PERCEIVED
 from pipelines.diagnosis.selection.answer import Named
 from pipelines.effects import Effect
 from pipelines.label import amount, effect_labelled, in_words, number
@@ -41,10 +41,7 @@ def _differs(d: Diagnosis, label: str, effect: Effect) -> str:
     """List the values that runs have of a cause which differs from run to run."""
     (parameter,) = (p for p in effect.parameters if p.per_run)
     values = [f"{r['values'][parameter.name]:+.3g} in {r['file']}" for r in d.each_run[label]]
-    return (
-        f"each run has its own {parameter.name}, as of {effect.may_differ}: {', '.join(values)} "
-        f"({parameter.unit})"
-    )
+    return f"each run has its own {parameter.name}, as of {effect.may_differ}: {', '.join(values)} ({parameter.unit})"
 
 
 def doubt_of_gain(d: Diagnosis, label: str) -> tuple[str, str] | None:
@@ -66,9 +63,7 @@ def _next(d: Diagnosis, named: Named) -> str | None:
     named_or_tied = {label for one in d.named for label in (one.element.label, *dict(one.ties))}
     listed = {e.label for e in d.selected.posterior.elements if not e.is_law}
     others = [
-        (label, p)
-        for label, p in d.selected.posterior.marginals.items()
-        if label in listed - named_or_tied and p > 0.0
+        (label, p) for label, p in d.selected.posterior.marginals.items() if label in listed - named_or_tied and p > 0.0
     ]
     if not others:
         return None

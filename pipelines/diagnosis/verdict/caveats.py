@@ -2,7 +2,7 @@
 
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.reversals import NEAR_S, BuildUp
+from pipelines.diagnosis.fit.presliding_test import NEAR_S, BuildUp
 from pipelines.effects import PreslidingHysteresis
 from pipelines.estimation.angle_noise import CUTOFF_HZ, IN_WORDS
 from pipelines.label import amount
@@ -21,8 +21,7 @@ def caveats(d: Diagnosis) -> list[str]:
         "counts and time stamps"
     )
     known = [
-        f"{effect.label} is assumed present (`known`). Its size is fitted; its presence was not "
-        "tested"
+        f"{effect.label} is assumed present (`known`). Its size is fitted; its presence was not tested"
         for effect in d.baseline.known
     ]
     doubtful = [] if d.data.spoilt else [*_high_floor(d), *d.upside_down]
@@ -55,8 +54,7 @@ def _unrealizable(d: Diagnosis) -> list[str]:
     if not d.causes or not d.lacks_mass:
         return []
     return [
-        "the extended model's inertia is not physically realizable; treat the named causes with "
-        f"caution: {reason}"
+        f"the extended model's inertia is not physically realizable; treat the named causes with caution: {reason}"
         for reason in d.unrealizable
     ]
 
@@ -79,8 +77,7 @@ def _reversal(d: Diagnosis, one: BuildUp) -> str:
     machine = d.baseline.machine
     joint = machine.joint(one.joint)
     at_once, otherwise, over = (
-        amount(machine, one.joint, value)
-        for value in (one.at_once, one.otherwise, one.over_travel)
+        amount(machine, one.joint, value) for value in (one.at_once, one.otherwise, one.over_travel)
     )
     return (
         f"within {NEAR_S:g} s of its reversals {the(one.joint)}'s friction changes sign over about "

@@ -11,7 +11,7 @@ import numpy as np
 
 from pipelines.contracts.joints import joints_of
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.fitted_model import fitted_model
+from pipelines.diagnosis.fit.fitted_model import fitted_model
 from pipelines.dynamics.plant import make_plant
 from pipelines.dynamics.tracking import track
 from pipelines.errors import ExoidError, InputError

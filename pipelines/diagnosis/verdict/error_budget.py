@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.evaluate import evaluate
-from pipelines.diagnosis.fit import fit
-from pipelines.diagnosis.gain import errors_of, scored
-from pipelines.diagnosis.observations import Run
+from pipelines.diagnosis.evidence.observed_run import Run
+from pipelines.diagnosis.fit.held_out import evaluate
+from pipelines.diagnosis.fit.joint_fit import fit
+from pipelines.diagnosis.fit.validation_error import errors_of, scored
 
 FLOOR, REPEATS, WANDERS, LEFT = "noise_floor", "repeatable_unexplained", "not_repeatable", "unexplained"
 """Shares beside the causes'; ``LEFT`` stands for the two before it where no period tells them apart."""

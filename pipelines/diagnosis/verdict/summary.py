@@ -3,11 +3,11 @@
 from typing import Any
 
 from pipelines.contracts.joints import the
+from pipelines.diagnosis.data_faults import Fault
 from pipelines.diagnosis.diagnosis import AT_FLOOR, EXPLAINED, Diagnosis
-from pipelines.diagnosis.faults import Fault
 from pipelines.diagnosis.selection.findings import Finding
-from pipelines.diagnosis.verdict.caveats import floor_that_hides
 from pipelines.diagnosis.verdict.cause_evidence import doubt_of_gain
+from pipelines.diagnosis.verdict.caveats import floor_that_hides
 from pipelines.diagnosis.verdict.unexplained import Unexplained
 from pipelines.label import amount, cause_label, effect_labelled, effect_told, in_words
 
@@ -58,9 +58,7 @@ def _in_short(fault: Fault, d: Diagnosis) -> str:
     return f"{fault.file}, {fault.channel}: {fault.what}{more}"
 
 
-def finding_in_words(
-    d: Diagnosis, causes: list[dict[str, Any]], left: Unexplained | None
-) -> str:
+def finding_in_words(d: Diagnosis, causes: list[dict[str, Any]], left: Unexplained | None) -> str:
     """Return what was found, without remarks on floor and faults."""
     described = f" {left.description}" if left and left.description else ""
     if d.status == "nothing_missing":
@@ -135,8 +133,7 @@ def _named(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
     """Name the causes, and say what naming them gains."""
     doubts = [doubt_of_gain(d, cause_label(cause)) for cause in causes]
     named = "; and ".join(
-        _in_words(cause) + (f", {doubt[0]}" if doubt else "")
-        for cause, doubt in zip(causes, doubts, strict=True)
+        _in_words(cause) + (f", {doubt[0]}" if doubt else "") for cause, doubt in zip(causes, doubts, strict=True)
     )
     before, after = d.before.errors.rms, d.after.errors.rms
     most = int(((before**2 - after**2) / d.floor_rms**2).argmax())

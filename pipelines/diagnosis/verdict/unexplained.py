@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.diagnosis.dependence import Dependence, describe, excesses
+from pipelines.diagnosis.dependence.explained_share import Dependence, describe, excesses
+from pipelines.diagnosis.dependence.smooth_term import smooth_term
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.fit import residuals_on
-from pipelines.diagnosis.gain import errors_of
-from pipelines.diagnosis.smooth_term import smooth_term
+from pipelines.diagnosis.fit.joint_fit import residuals_on
+from pipelines.diagnosis.fit.validation_error import errors_of
 
 MENTIONED = 5
 

@@ -5,12 +5,12 @@ from typing import Any
 
 import pandas as pd
 
-from pipelines.diagnosis.dependence import Dependence, dependences
+from pipelines.diagnosis.dependence.explained_share import Dependence, dependences
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.reversals import BuildUp
+from pipelines.diagnosis.fit.presliding_test import BuildUp
 from pipelines.diagnosis.selection.answer import Named
-from pipelines.diagnosis.verdict.caveats import caveats
 from pipelines.diagnosis.verdict.cause_evidence import cause_evidence
+from pipelines.diagnosis.verdict.caveats import caveats
 from pipelines.diagnosis.verdict.control_benefit import control
 from pipelines.diagnosis.verdict.error_budget import error_budget
 from pipelines.diagnosis.verdict.summary import finding_in_words, floor_from, summary
@@ -35,10 +35,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "summary": summary(d, causes, left),
         "finding": None if d.data.spoilt else finding_in_words(d, causes, left),
         "findings": [one.as_json() for one in d.selected.findings],
-        "router": {
-            joint.name: shares.as_json()
-            for joint, shares in zip(joints, d.selected.router, strict=True)
-        },
+        "router": {joint.name: shares.as_json() for joint, shares in zip(joints, d.selected.router, strict=True)},
         "posterior": _posterior(d),
         "acquisition_at_fault": bool(d.data.spoilt),
         "caveats": caveats(d),
@@ -55,9 +52,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "units": {j.name: {"torque": j.unit("torque"), "angle": j.unit("angle")} for j in joints},
         "known": [_known(d, effect) for effect in d.baseline.known],
         "causes": causes,
-        "data_faults": [
-            {"file": f.file, "channel": f.channel, "what": f.what} for f in d.data.faults
-        ],
+        "data_faults": [{"file": f.file, "channel": f.channel, "what": f.what} for f in d.data.faults],
         "residual": left.as_json() if left else None,
         "runs": sorted({run.motion.run for run in d.validate}),
         "noise_floor_from": floor_from(d),
@@ -117,9 +112,7 @@ def _values(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _depends_on(
-    before: Sequence[Dependence], after: Sequence[Dependence]
-) -> dict[str, list[dict[str, Any]]]:
+def _depends_on(before: Sequence[Dependence], after: Sequence[Dependence]) -> dict[str, list[dict[str, Any]]]:
     """Return what each joint's residual depends on, under the baseline and the extended model."""
     left = {(one.joint, one.variable): one.share for one in after}
     return {

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.fitted_model import model_of_run
-from pipelines.diagnosis.gain import scored
-from pipelines.diagnosis.validation import Validated
+from pipelines.diagnosis.fit.fitted_model import model_of_run
+from pipelines.diagnosis.fit.validation import Validated
+from pipelines.diagnosis.fit.validation_error import scored
 from pipelines.dynamics.replay import WINDOW_S, replay
 from pipelines.errors import ExoidError
 

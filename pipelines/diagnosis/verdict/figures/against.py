@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from pipelines.contracts.joints import the
-from pipelines.diagnosis.dependence import VARIABLES, Variable, knows, pooled, tone
+from pipelines.diagnosis.dependence.explained_share import VARIABLES, Variable, knows, pooled, tone
 from pipelines.diagnosis.diagnosis import Diagnosis
+from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.verdict.figures.palette import AFTER, BEFORE
-from pipelines.diagnosis.observations import Run
 from pipelines.mechanics.units import unit_at
 from pipelines.plots import NOISE
 from pipelines.signals.binned_mean import binned_mean

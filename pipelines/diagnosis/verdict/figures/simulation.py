@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from pipelines.contracts.joints import either
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.validation import Validated
+from pipelines.diagnosis.fit.validation import Validated
 from pipelines.diagnosis.verdict.figures.palette import AFTER, BEFORE, MEASURED
 from pipelines.diagnosis.verdict.worst_stretch import Stretch, simulated_error, worst_stretch
 from pipelines.label import number

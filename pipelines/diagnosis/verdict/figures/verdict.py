@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pipelines.diagnosis.dependence import VARIABLES, knows, tone, variable_share
+from pipelines.diagnosis.dependence.explained_share import VARIABLES, knows, tone, variable_share
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.verdict.figures.against import against, draw, reach
 from pipelines.diagnosis.verdict.figures.budget import colours_of, highest, lowest, rms, stack, words_of

@@ -1,0 +1,122 @@
+"""Candidates: an effect at a joint with a shape, and what it would add to each measured torque.
+
+Every candidate becomes columns beside the baseline's. Torque effects give their own columns. Effects
+that change kinematics or readings are not linear: the baseline is rebuilt as they would have it and
+refitted there, and its difference from the untouched baseline under the same parameters is the column.
+Linearised at biased parameters, elasticity would pass for an encoder offset.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipelines.diagnosis.evidence.baseline import Baseline
+from pipelines.diagnosis.evidence.observed_run import Run
+from pipelines.effects import EFFECTS, Effect, Parameter
+from pipelines.model import BASELINE, Term, TermColumns
+
+WORN = ("mass_off_axis", "payload_change")
+"""Effects of the structure that the person may carry instead: then in their runs only, and felt by the cuffs."""
+TURNS = ("1/turn", "rad/m")
+"""Units of what is counted along a joint's way."""
+WAVES = 1.5
+"""Of a ripple within the angles that are swept: with fewer it is not seen to repeat, and beside a spring it could
+imitate any function of the angle."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect and its shape in each run."""
+
+    effect: Effect
+    shapes: tuple[tuple[float, ...], ...]
+    """One for each run; they differ in parameters that each run has for itself."""
+    directions: tuple[tuple[float, ...], ...] = ()
+    """Shapes that have a column each, where the effect is in proportion to them; empty where it has one shape."""
+
+    @property
+    def label(self) -> str:
+        """``effect@joint``."""
+        return self.effect.label
+
+    def term(self, run: int) -> Term:
+        """Return the candidate as a term of a run's model, its amplitudes nought."""
+        return Term.of(self.effect, self.shapes[run])
+
+    def moved(self, i: int, step: float, runs: Sequence[int] | None = None) -> "Candidate":
+        """Return the candidate with shape parameter ``i`` larger by a step, in some runs or in all."""
+        return self.with_own(i, [now[i] + step * (runs is None or r in runs) for r, now in enumerate(self.shapes)])
+
+    def with_own(self, i: int, values: Sequence[float]) -> "Candidate":
+        """Return the candidate with a value of shape parameter ``i`` for each run."""
+        shapes = zip(self.shapes, values, strict=True)
+        return replace(self, shapes=tuple((*shape[:i], float(value), *shape[i + 1 :]) for shape, value in shapes))
+
+    def reshaped(self, i: int, value: float, runs: Sequence[int] | None = None) -> "Candidate":
+        """Return the candidate with another value of shape parameter ``i``, in some runs or in all."""
+        return self.with_own(i, [value if runs is None or r in runs else now[i] for r, now in enumerate(self.shapes)])
+
+    @property
+    def bends(self) -> bool:
+        """Whether the effect changes kinematics or readings rather than adding torque of its own."""
+        return bends_motion(self.effect)
+
+    def columns_in(self, kinds: Sequence[str], start: int = 0) -> TermColumns:
+        """Return the places of the columns that ``signatures`` gives for runs of some kinds."""
+        width = max(1, len(self.directions))
+        per_run = [self.effect.per_run] * width if self.bends else None
+        return TermColumns.of(self.effect, kinds, per_run, start)
+
+    def is_free(self, i: int) -> bool:
+        """Tell whether shape parameter ``i`` is fitted, and not held at its usual value or at one of its forms."""
+        parameter = self.effect.shape[i]
+        spanned = any(shape[i] != 0.0 for shape in self.directions)
+        return not parameter.forms and (parameter.default is None or spanned)
+
+    @property
+    def own_bend(self) -> int | None:
+        """Which shape parameter bends each run in a way of its own, None where none does."""
+        own = (i for i, p in enumerate(self.effect.shape) if p.per_run and self.bends)
+        return next(own, None)
+
+    @property
+    def onset(self) -> int | None:
+        """Which shape parameter is the instant at which the effect begins in each run, None where it has none."""
+        own = (i for i, p in enumerate(self.effect.shape) if p.per_run and not self.bends)
+        return next(own, None)
+
+
+def bends_motion(effect: Effect) -> bool:
+    """Tell whether an effect changes kinematics or readings rather than adding torque of its own."""
+    shaped = any(p.default is None for p in effect.shape)
+    return type(effect).corrected is not Effect.corrected or (effect.torque_reading is not None and shaped)
+
+
+def lowest(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> float:
+    """Return the value below which runs cannot tell a shape parameter of an effect."""
+    if parameter.unit not in TURNS or effect.joint is None:
+        return -np.inf
+    j = runs[0].motion.joints.index(effect.joint)
+    swept = max(float(np.ptp(run.state[0][:, j])) for run in runs)
+    return WAVES * 2.0 * np.pi / swept
+
+
+def proposals(baseline: Baseline, kinds: Sequence[str]) -> Iterator[Effect]:
+    """Yield every effect at every place of a machine where it can be, in the kinds of each run at hand.
+
+    What is in the baseline already is none.
+    """
+    machine, known = baseline.machine, {effect.label for effect in baseline.known}
+    for effect in EFFECTS:
+        if effect.name in BASELINE or not set(effect.acts_in) & set(kinds):
+            continue
+        for joint in effect.possible(machine):
+            plain = effect(joint=joint, on=machine)
+            if plain.label in known:
+                continue
+            yield plain
+            if effect.may_differ and len(kinds) > 1:
+                yield effect(joint=joint, on=machine, each_run=True)
+            if effect.name in WORN and "with_human" in kinds:
+                yield effect(joint=joint, run="with_human", on=machine)

@@ -1,0 +1,88 @@
+"""What candidates add to each measured torque, as columns beside the baseline's.
+
+Torque effects give their own columns. Effects that change kinematics or readings are not linear: the
+baseline is rebuilt as they would have it and refitted there. Its difference from the untouched
+baseline under the same parameters is the column. Linearised at biased parameters, elasticity would
+pass for an encoder offset.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.candidates.gram import Gram, gram_of, solve
+from pipelines.diagnosis.evidence.baseline import Baseline
+from pipelines.diagnosis.evidence.observed_run import FOLDS, Run
+from pipelines.model import Model, Term
+
+
+def columns_under(terms: Sequence[Term], run: Run, baseline: Baseline) -> tuple[NDArray, NDArray]:
+    """Return the columns of the baseline and of some terms in one run, and what was measured.
+
+    Terms bend the motion that everything is computed at, add their own torque, and stand between torque and reading.
+    The force sensors sit on the links: their forces make another torque where those stand at another angle.
+
+    Returns
+    -------
+    (m, O, size + linear parameters) columns and (m, O) measured torques, N·m.
+    """
+    model = Model((*baseline.terms, *terms))
+    motions = model.motions(run.motion)
+    columns = model.regressor(run.motion, cuffs=True, motions=motions)
+    return run.average(columns), run.measured_at(motions.link)
+
+
+def gram_of_runs(runs: Sequence[Run], columns: Sequence[NDArray], measured: Sequence[NDArray] | None = None) -> Gram:
+    """Multiply out all runs; ``measured`` (m, O) each where it is not the runs' own."""
+    measured = measured or [run.measured for run in runs]
+    grams = [gram_of(c, y, r.usable, r.fold, FOLDS) for r, c, y in zip(runs, columns, measured, strict=True)]
+    total = grams[0]
+    for gram in grams[1:]:
+        total = total + gram
+    return total
+
+
+def signatures(
+    candidate: Candidate, runs: Sequence[Run], baseline: Baseline, untouched: Sequence[NDArray], weights: NDArray
+) -> list[NDArray]:
+    """Return the candidate's columns in each run, (m, O, k).
+
+    Parameters
+    ----------
+    untouched : the baseline's columns in each run
+    weights : (O,) inverse variances, for the refit of effects that bend the motion
+    """
+    if not candidate.bends:
+        return [torque_columns(candidate, r, run) for r, run in enumerate(runs)]
+    if candidate.directions:
+        parts = [
+            signatures(Candidate(candidate.effect, (shape,) * len(runs)), runs, baseline, untouched, weights)
+            for shape in candidate.directions
+        ]
+        return [np.concatenate(columns, axis=2) for columns in zip(*parts, strict=True)]
+    under = [
+        columns_under([candidate.term(r)], run, baseline) if candidate.effect.explains(run.motion)
+        else (untouched[r], run.measured)
+        for r, run in enumerate(runs)
+    ]  # fmt: skip
+    values = solve(gram_of_runs(runs, *zip(*under, strict=True)), weights)
+    return [
+        bent_column(columns, measured, values, plain, run)
+        for (columns, measured), plain, run in zip(under, untouched, runs, strict=True)
+    ]
+
+
+def bent_column(columns: NDArray, measured: NDArray, values: NDArray, untouched: NDArray, run: Run) -> NDArray:
+    """Return what the bent baseline's ``columns`` and ``measured`` torque add to the untouched ones, (m, O, 1) N·m."""
+    plain = untouched @ values[: untouched.shape[2]]
+    return (columns @ values - plain - (measured - run.measured))[:, :, np.newaxis]
+
+
+def torque_columns(candidate: Candidate, number: int, run: Run) -> NDArray:
+    """Return a torque effect's columns in one run, (m, O, k): in the drives, and in the cuffs where a person has it."""
+    # As Model.regressor has it of one term that transforms nothing, which is called thousands of times.
+    columns = candidate.effect.columns(run.motion, candidate.shapes[number])
+    cuffs = candidate.effect.cuff_columns(run.motion, columns)
+    return run.average(np.concatenate([columns, cuffs], axis=1))

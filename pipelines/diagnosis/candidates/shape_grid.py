@@ -1,0 +1,163 @@
+"""The coarse search over a cause's shapes: a grid, screened at block rate in the decision band."""
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.candidates.candidate import TURNS, Candidate, bends_motion, lowest
+from pipelines.diagnosis.candidates.shape_refinement import TONE_STEP_HZ, Fitted
+from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
+from pipelines.diagnosis.evidence.observed_run import Run
+from pipelines.diagnosis.fit.change_point import ALWAYS, NEVER
+from pipelines.effects import Effect, Parameter
+
+VALUES = 8
+"""Values of a shape parameter in a grid."""
+BENDING = 2
+"""Values of one whose effect is nearly in proportion to it."""
+HARDENING = ("1/rad²", "1/m²")
+"""Units of a form that only bends a spring: left to the refinement."""
+ONSETS = 40
+"""Instants tried for what begins at a time of its own in each run."""
+OSCILLATING = {"Hz", *TURNS}
+"""Units of parameters along which an effect has many maxima."""
+APART = 2
+"""Grid steps by which two maxima along an oscillating parameter differ at least."""
+WORTH = 0.1
+"""Share of the best run's gain from which an onset in another run is one."""
+
+Fit = Callable[[Candidate], Fitted | None]
+
+
+def screened(effect: Effect, fit: Fit, runs: Sequence[Run], regression: DecisionRegression) -> list[Fitted]:
+    """Return the fits of an effect's grid, those that explain most first."""
+    if chosen := effect.directions([run.motion for run in runs]):
+        starts = [_along(effect, directions, len(runs)) for directions in chosen]
+    elif any(p.per_run for p in effect.shape) and not bends_motion(effect):
+        starts = [_with_onsets(effect, fit, runs, regression)]
+    else:
+        starts = [Candidate(effect, (shape,) * len(runs)) for shape in _grid(effect, runs, regression)]
+    fits = [fitted for start in starts if (fitted := fit(start)) is not None]
+    return sorted(fits, key=lambda fitted: -fitted.gain)
+
+
+def _along(effect: Effect, directions: Sequence[tuple[float, ...]], runs: int) -> Candidate:
+    """Return a candidate with a column for each direction that its effect is in proportion to."""
+    return Candidate(effect, (directions[0],) * runs, tuple(directions))
+
+
+def others_of(fits: Sequence[Fitted], best: Fitted, most: int) -> list[Fitted]:
+    """Return the best fits of other forms, or at other maxima, than the best one's."""
+    effect = best.candidate.effect
+    kept = [fits[0]]
+    for fitted in fits[1:]:
+        if len(kept) > most:
+            break
+        if all(_differ(effect, fitted.candidate, k.candidate) for k in kept):
+            kept.append(fitted)
+    return kept[1:]
+
+
+def _differ(effect: Effect, one: Candidate, other: Candidate) -> bool:
+    """Tell whether two shapes differ by more than a refinement follows."""
+    for parameter, a, b in zip(effect.shape, one.shapes[0], other.shapes[0], strict=True):
+        low, high = parameter.typical
+        if parameter.forms:
+            apart = a != b
+        elif parameter.unit in OSCILLATING:
+            step = TONE_STEP_HZ if parameter.unit == "Hz" else parameter.grain
+            apart = abs(a - b) > APART * step
+        else:
+            apart = abs(a - b) > 0.4 * (high - low)
+        if apart:
+            return True
+    return False
+
+
+def _grid(effect: Effect, runs: Sequence[Run], regression: DecisionRegression) -> Iterator[tuple[float, ...]]:
+    """Yield the shapes to try."""
+    if [p.unit for p in effect.shape] == ["Hz"]:
+        yield from ((f,) for f in _rhythms(effect, runs, regression))
+        return
+    few = BENDING if bends_motion(effect) and not effect.swings else VALUES
+    yield from itertools.product(*(_tried(effect, p, few, runs) for p in effect.shape))
+
+
+def _tried(effect: Effect, parameter: Parameter, few: int, runs: Sequence[Run]) -> NDArray:
+    if effect.swings and parameter.unit in HARDENING:
+        return np.array([parameter.default])
+    values = values_in(effect, parameter, few, runs)
+    return values[values >= lowest(effect, parameter, runs)]
+
+
+def values_in(effect: Effect, parameter: Parameter, count: int, runs: Sequence[Run]) -> NDArray:
+    """Return the values of an effect's shape parameter that are tried on some runs."""
+    if not parameter.swept or effect.joint is None:
+        return values_of(parameter, count)
+    j = runs[0].motion.joint_index(effect.joint)
+    angles = np.concatenate([run.state[0][:, j] for run in runs])
+    return np.linspace(np.min(angles), np.max(angles), count + 2)[1:-1]
+
+
+def values_of(parameter: Parameter, count: int) -> NDArray:
+    """Return the values of a shape parameter that are tried, (count,) or fewer, in its unit."""
+    if parameter.forms:
+        return np.array(parameter.forms)
+    if parameter.default is not None:
+        return np.array([parameter.default])
+    low, high = parameter.typical
+    if parameter.unit in TURNS:
+        return np.arange(low, high, parameter.grain)
+    wide = low > 0.0 and high / low > 4.0
+    space = np.geomspace if wide else np.linspace
+    # Away from the ends, where an effect that bends the motion does nothing or tears it apart.
+    values = space(low, high, count + 2)[1:-1]
+    return values if wide else values[np.abs(values - parameter.neutral) > 0.02 * (high - low)]
+
+
+def _rhythms(effect: Effect, runs: Sequence[Run], regression: DecisionRegression) -> list[float]:
+    """Return the frequencies at which a rhythm explains most, the highest peaks first."""
+    low, high = effect.shape[0].typical
+    tried = np.arange(low, high, TONE_STEP_HZ)
+    power = np.zeros(len(tried))
+    j = effect.column(runs[0].motion)
+    for time, values in regression.series(j):
+        if not len(time):
+            continue
+        angle = 2.0 * np.pi * np.outer(tried, time)
+        level = values - values.mean()
+        power += np.abs(np.exp(1j * angle) @ level) ** 2 / len(time)
+    inside = (power[1:-1] >= power[:-2]) & (power[1:-1] >= power[2:])
+    peaks = 1 + np.flatnonzero(inside)
+    return tried[peaks[np.argsort(-power[peaks])[:VALUES]]].tolist()
+
+
+def _with_onsets(effect: Effect, fit: Fit, runs: Sequence[Run], regression: DecisionRegression) -> Candidate:
+    """Return the candidate with the instant in each run at which it explains most.
+
+    Never in a run in which it explains next to nothing. What has begun acts as if it had always
+    been there: the column of an instant is that of all the run, zero before it.
+    """
+    defaults = [p.default or 0.0 for p in effect.shape]
+    at = next(i for i, p in enumerate(effect.shape) if p.per_run)
+
+    def shape(onset: float) -> tuple[float, ...]:
+        return tuple(onset if i == at else d for i, d in enumerate(defaults))
+
+    onsets, gains = [NEVER] * len(runs), np.zeros(len(runs))
+    for r, run in enumerate(runs):
+        alone = tuple(shape(ALWAYS if k == r else NEVER) for k in range(len(runs)))
+        throughout = fit(Candidate(effect, alone)) if effect.explains(run.motion) else None
+        if throughout is None:
+            continue
+        tried = np.linspace(run.time[0], run.time[-1], ONSETS + 2)[1:-1]
+        begun = (regression.time[:, np.newaxis] >= tried) & (regression.run == r)[:, np.newaxis]
+        columns = regression.project(throughout.columns[:, :1] * begun)
+        square = np.maximum(np.sum(columns**2, axis=0), np.finfo(float).tiny)
+        gain = (columns.T @ regression.measured) ** 2 / square
+        onsets[r], gains[r] = float(tried[np.argmax(gain)]), gain.max()
+    worth = WORTH * gains.max()
+    chosen = [t if g > worth else NEVER for t, g in zip(onsets, gains, strict=True)]
+    return Candidate(effect, tuple(shape(onset) for onset in chosen))

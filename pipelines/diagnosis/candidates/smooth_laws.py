@@ -1,0 +1,181 @@
+"""Smooth laws that nobody listed: torque as a free function of the angle, the speed, the load ...
+
+They compete with the catalogue's causes as rivals, stand behind each cause for how its true form may
+differ from ours, and at a small size are the background that even a good rig shows. Every column is
+dimensionless and of order one, so that its coefficient is a share of the joint's rms torque.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial.legendre import legvander
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.evidence.observed_run import Run
+
+FAMILIES = {
+    "angle": "angle", "other_angle": "angle", "both_angles": "angle",
+    "friction_by_angle": "angle", "friction_by_other_angle": "angle",
+    "speed": "speed", "other_speed": "speed",
+    "load": "load", "other_load": "load",
+    "inertia_by_angle": "transmission",
+    "gain_over_time": "time", "friction_over_time": "time", "time": "time", "hum": "time",
+}  # fmt: skip
+"""The family that each law belongs to."""
+IN_WORDS = {
+    "angle": "a law of {joint}'s angle",
+    "other_angle": "a law of the other joint's angle at {joint}",
+    "both_angles": "a law of both joints' angles at {joint}",
+    "speed": "a law of {joint}'s speed",
+    "other_speed": "a law of the other joint's speed at {joint}",
+    "friction_by_angle": "friction of {joint} that depends on its angle",
+    "friction_by_other_angle": "friction of {joint} that depends on the other joint's angle",
+    "load": "a law of {joint}'s load",
+    "other_load": "a law of the other joint's load at {joint}",
+    "inertia_by_angle": "an inertia of {joint} that depends on its angle",
+    "gain_over_time": "a torque gain of {joint} that changes with time",
+    "friction_over_time": "friction of {joint} that changes with time",
+    "time": "a torque of {joint} that wanders in time and does not repeat",
+    "hum": "a tone at {joint} that does not follow the motion",
+}
+IN_CUFFS = ("angle", "both_angles", "speed", "inertia_by_angle", "load", "other_load")
+"""Laws by which cuff forces may be a little wrong on their own."""
+WANDER_HZ = 0.5
+"""Highest frequency of the curves of time that each run has for itself, Hz."""
+MOST_CURVES = 80
+"""Curves of time of one run at most."""
+WANDER_CORNER_HZ = 0.1
+"""Above it a wandering torque has less and less power, as a random walk has, Hz."""
+
+
+@dataclass(frozen=True)
+class LawColumn:
+    """One column of a smooth law."""
+
+    kind: str
+    joint: int
+    wearer: str
+    """``all`` runs' drives; the ``human``'s share, in drives and cuffs; the ``cuffs`` alone."""
+    variance: float
+    """Prior variance of the coefficient relative to the law's other columns."""
+
+
+@dataclass(frozen=True)
+class Spans:
+    """What makes a session's motion dimensionless, (J,) each."""
+
+    middle: NDArray
+    half_range: NDArray
+    speed: NDArray
+    acceleration: NDArray
+    torque: NDArray
+    duration_s: float
+
+    @classmethod
+    def of(cls, runs: Sequence[Run], torque: NDArray) -> "Spans":
+        """Read them off the training runs; ``torque`` (J,) N·m is the joints' rms torque."""
+        low = np.min([run.state[0].min(axis=0) for run in runs], axis=0)
+        high = np.max([run.state[0].max(axis=0) for run in runs], axis=0)
+        speed, acceleration = (
+            np.sqrt(np.mean(np.concatenate([run.state[k] for run in runs]) ** 2, axis=0)) for k in (1, 2)
+        )
+        tiny = np.finfo(float).tiny
+        return cls(
+            0.5 * (low + high), np.maximum(0.5 * (high - low), tiny), np.maximum(speed, tiny),
+            np.maximum(acceleration, tiny), np.maximum(torque, tiny),
+            max(float(run.time[-1] - run.time[0]) for run in runs),
+        )  # fmt: skip
+
+
+def smooth_laws(run: Run, spans: Spans, load: NDArray) -> tuple[list[LawColumn], NDArray]:
+    """Return the laws of a run's drives and their columns, (m, J, k).
+
+    Parameters
+    ----------
+    load : (m, J) array
+        The torque that the baseline predicts, N·m.
+    """
+    joints = run.state[0].shape[1]
+    laws: list[LawColumn] = []
+    parts = []
+    for j in range(joints):
+        for kind, degree, column in _laws_of(run, spans, load, j):
+            laws.append(LawColumn(kind, j, "all", 1.0 / (1.0 + degree)))
+            parts.append((j, column))
+    columns = np.zeros((len(run.time), joints, len(parts)))
+    for k, (j, column) in enumerate(parts):
+        columns[:, j, k] = column
+    return laws, columns
+
+
+def _laws_of(run: Run, spans: Spans, load: NDArray, j: int) -> Iterator[tuple[str, int, NDArray]]:
+    """Yield kind, degree and column (m,) of each law at one joint."""
+    q = np.clip((run.state[0] - spans.middle) / spans.half_range, -1.5, 1.5)
+    v, a = run.state[1] / spans.speed, run.state[2] / spans.acceleration
+    sign, tau = np.sign(run.state[1]), load / spans.torque
+    here, way, force = v[:, j], sign[:, j], tau[:, j]
+    yield from _polynomials("angle", q[:, j], range(10))
+    yield from _speed_laws(here, way)
+    yield from _scaled("friction_by_angle", q[:, j], range(1, 5), way)
+    yield from _scaled("friction_by_angle", q[:, j], range(1, 4), here)
+    yield from _scaled("inertia_by_angle", q[:, j], range(3), a[:, j])
+    root = np.sqrt(np.abs(force))
+    for column in (np.abs(force) * way, root * way, np.abs(force), force * np.abs(force)):
+        yield "load", 1, column
+    phase = np.pi * (run.time - run.time[0]) / spans.duration_s
+    for k in range(4):
+        yield "gain_over_time", k, force * np.cos(k * phase)
+    for k in range(1, 4):
+        yield "friction_over_time", k, way * np.cos(k * phase)
+        yield "friction_over_time", k, here * np.cos(k * phase)
+    for o in range(q.shape[1]):
+        if o == j:
+            continue
+        yield from _polynomials("other_angle", q[:, o], range(1, 6))
+        yield from _polynomials("both_angles", 0.5 * (q[:, j] + q[:, o]), range(1, 6))
+        yield "both_angles", 2, q[:, j] * q[:, o]
+        yield "both_angles", 3, q[:, j] ** 2 * q[:, o]
+        yield "both_angles", 3, q[:, j] * q[:, o] ** 2
+        other, other_way = v[:, o], sign[:, o]
+        for column in (other_way, other, np.abs(other), other * np.abs(other), here * other):
+            yield "other_speed", 1, column
+        yield "other_load", 1, tau[:, o]
+        yield "other_load", 1, np.abs(tau[:, o]) * way
+        yield from _scaled("friction_by_other_angle", q[:, o], range(1, 4), way)
+        yield from _scaled("friction_by_other_angle", q[:, o], range(1, 3), here)
+        yield "inertia_by_angle", 2, a[:, o]
+
+
+def _polynomials(kind: str, x: NDArray, degrees: range) -> Iterator[tuple[str, int, NDArray]]:
+    yield from _scaled(kind, x, degrees, np.ones_like(x))
+
+
+def _scaled(kind: str, x: NDArray, degrees: range, factor: NDArray) -> Iterator[tuple[str, int, NDArray]]:
+    """Yield Legendre polynomials of ``x`` times a factor."""
+    values = legvander(x, degrees[-1])
+    for degree in degrees:
+        yield kind, degree, values[:, degree] * factor
+
+
+def _speed_laws(v: NDArray, way: NDArray) -> Iterator[tuple[str, int, NDArray]]:
+    """Yield laws of a speed (m,) in units of its rms, even and odd, smooth and peaked at zero."""
+    size = np.abs(v)
+    even = (size, v**2, size**3)
+    odd = (way * v**2, v**3, way * np.sqrt(size))
+    peaks = (way * np.exp(-size / 0.2), way * np.exp(-((size / 0.6) ** 2)))
+    for column in (*even, *odd, *peaks):
+        yield "speed", 1, column
+
+
+def curves_of_time(run: Run) -> tuple[NDArray, NDArray]:
+    """Return cosines over a run, (m, k), and the prior variance of each coefficient, (k,).
+
+    Together they are a torque that wanders in time with a share of one.
+    """
+    elapsed = run.time - run.time[0]
+    duration = float(elapsed[-1]) + 1e-6
+    k = np.arange(min(MOST_CURVES, int(2.0 * WANDER_HZ * duration)) + 1)
+    curves = np.cos(np.pi * np.outer(elapsed / duration, k))
+    variance = 1.0 / (1.0 + (k / (2.0 * duration * WANDER_CORNER_HZ)) ** 2)
+    return curves, 2.0 * variance / variance.sum()

@@ -1,0 +1,93 @@
+"""Data faults: what went wrong between a sound leg and its file, found before any physics is blamed.
+
+Time first, then single channels, then how channels are wired, then their units; each looks only at samples that
+those before it left. Slow or small changes that physics can make (a drift, a gain of a few tens of percent, an
+offset) are no faults.
+"""
+
+from collections.abc import Container, Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipelines.diagnosis.data_faults.channels import channel_faults
+from pipelines.diagnosis.data_faults.fault import Fault
+from pipelines.diagnosis.data_faults.nonnegative_leg import averages
+from pipelines.diagnosis.data_faults.sampling_instants import sampling_faults
+from pipelines.diagnosis.data_faults.sign import sign_faults
+from pipelines.diagnosis.data_faults.timing import timing_faults
+from pipelines.diagnosis.data_faults.units import angle_unit_faults, torque_unit_faults
+from pipelines.diagnosis.data_faults.wiring import angle_faults, cuff_faults, wiring_faults
+from pipelines.mechanics.motion import Motion
+
+LEAST_S, LEAST_SHARE = 5.0, 0.5
+"""Of an exoskeleton's run that faults must leave, or it is not worth its place; of a short one, this share of it."""
+
+__all__ = ["Fault", "excluding", "find_faults"]
+
+
+def find_faults(motions: Sequence[Motion]) -> list[Fault]:
+    """Return the faults of acquisition in a session's runs, in the order of the runs.
+
+    Parameters
+    ----------
+    motions : sequence of Motion
+        All runs of one leg, made from recordings, so that the measured angles are there.
+    """
+    found = [fault for motion in motions for fault in (*timing_faults(motion), *channel_faults(motion))]
+    found = _hopeless(motions, found)
+    rightly_wired = []
+    for motion in excluding(motions, found):
+        if not motion.valid.any():
+            continue
+        found += sampling_faults(motion)
+        wrong = [*angle_faults(motion), *angle_unit_faults(motion)]
+        wrong = wrong or [*sign_faults(motion)]
+        run = averages(motion)
+        if run is not None and not wrong:
+            wrong = [*wiring_faults(run), *cuff_faults(run)]
+            rightly_wired += [] if wrong else [run]
+        found += wrong
+    found += torque_unit_faults(rightly_wired)
+    files = [motion.file for motion in motions]
+    return sorted(found, key=lambda fault: files.index(fault.file))
+
+
+def _hopeless(motions: Sequence[Motion], faults: Sequence[Fault]) -> list[Fault]:
+    """Return the faults, those of runs of which too little is left without them as such that masking does not help.
+
+    Where other runs of its kind suffice such a run is left out instead, whole: it spoils nothing but itself.
+    """
+    sound = excluding(motions, faults)
+    hopeless = {m.file: m for whole, m in zip(motions, sound, strict=True) if _too_little(whole, m)}
+    told: list[Fault] = []
+    for fault in faults:
+        run = hopeless.get(fault.file)
+        if run is None:
+            told.append(fault)
+        elif fault.samples is None or not _others_suffice(run, motions, hopeless):
+            told.append(replace(fault, samples=None))
+        else:
+            told.append(replace(fault, what=f"{fault.what}; this run is left out", samples=np.ones(len(run), bool)))
+    return told
+
+
+def _too_little(whole: Motion, sound: Motion) -> bool:
+    least = min(sound.machine.lasting(LEAST_S) * sound.sample_rate_hz, LEAST_SHARE * whole.valid.sum())
+    return bool(sound.valid.sum() < least)
+
+
+def _others_suffice(run: Motion, motions: Sequence[Motion], hopeless: Container[str]) -> bool:
+    """Tell whether half of what was recorded of a run's kind and for its purpose is in runs that are usable."""
+    alike = [m for m in motions if (m.run, m.purpose) == (run.run, run.purpose)]
+    usable = sum(len(m) for m in alike if m.file not in hopeless)
+    return usable >= LEAST_SHARE * sum(map(len, alike))
+
+
+def excluding(motions: Sequence[Motion], faults: Iterable[Fault]) -> list[Motion]:
+    """Return the motions with the faults' samples marked as not valid."""
+    bad: dict[str, np.ndarray] = {}
+    for fault in faults:
+        if fault.samples is not None:
+            bad[fault.file] = bad.get(fault.file, False) | fault.samples
+    return [replace(m, valid=m.valid & ~bad[m.file]) if m.file in bad else m for m in motions]

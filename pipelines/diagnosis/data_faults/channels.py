@@ -1,0 +1,188 @@
+"""Channels that stop telling the truth for a while: repeated, stuck, saturated, dead."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.contracts.joints import the
+from pipelines.diagnosis.data_faults.fault import (
+    WHOLE_ROW,
+    Fault,
+    column,
+    constant_stretches,
+    mask_of,
+    stretches,
+    when,
+)
+from pipelines.mechanics.kinematics import EDGE_PERIODS
+from pipelines.mechanics.motion import CUFFS, Motion
+from pipelines.signals.blocks import dilate
+
+STALE = 3
+"""Rows that repeat the last one while the joint moves, before it is more than an accident."""
+COUNTS = 2.0
+"""Encoder counts a sample: a joint as fast as that cannot show the same count twice."""
+STUCK_ANGLE_S = 0.25
+JUMP = 3.0
+"""Times the largest step of the moving joint: no joint catches up like that."""
+HELD_S, HELD_RAD = 1.0, 0.1
+"""A joint that friction holds for longer than this, while its set-point goes as far, is not held by friction. At a
+prismatic joint the way is in proportion to the joint's."""
+ALONE_S, ALONE = 2.0, 3.0
+"""Without a set-point: this long, and so many times the longest other standstill."""
+STUCK_TORQUE_S = 0.15
+STUCK_FORCE_S = 1.0
+FLAT_TOP, SATURATED = 3, 10
+"""Samples in a row at the extreme, and samples in such rows: noise never returns to the same number."""
+
+
+def channel_faults(motion: Motion) -> Iterator[Fault]:
+    """Yield what is wrong with single channels of one run."""
+    yield from _repeated(motion)
+    for joint in range(motion.torque.shape[1]):
+        yield from _stuck_angle(motion, joint)
+        yield from _torque(motion, joint)
+    if motion.felt is not None and motion.run == "with_human":
+        yield from _forces(motion, motion.felt)
+
+
+def _repeated(motion: Motion) -> Iterator[Fault]:
+    """Report drives that hand out old values: angle and torque are the last sample's while the joint moves."""
+    if motion.measured_angle is None:
+        return
+    same: NDArray = np.zeros(motion.torque.shape, dtype=bool)
+    same[1:] = (np.diff(motion.measured_angle, axis=0) == 0) & (np.diff(motion.torque, axis=0) == 0)
+    for j, torque in enumerate(motion.torque.T):
+        # A torque that stands for longer is stuck, whatever the angle does.
+        same[:, j] &= ~mask_of(constant_stretches(torque, round(STUCK_TORQUE_S * motion.sample_rate_hz)), len(torque))
+    step = np.abs(motion.dq) / motion.sample_rate_hz
+    sure = same & (step > COUNTS * np.array([_count_of(angle) for angle in motion.measured_angle.T]))
+    stale = [j for j in range(len(motion.joints)) if sure[:, j].sum() >= STALE]
+    if not stale:
+        return
+    together = len(stale) > 1 and bool((same[:, stale].all(axis=1) == same[:, stale].any(axis=1)).mean() > 0.999)
+    for j in stale[:1] if together else stale:
+        samples = same[:, j]
+        share, found = samples.mean(), stretches(samples)
+        who = "every device" if together else f"{the(motion.joints[j])}'s drive"
+        yield Fault(
+            motion.file,
+            WHOLE_ROW if together else column(motion, j, "angle"),
+            f"{samples.sum()} repeated samples ({100 * share:.2g} %), {when(motion, found)}: {who} gave stale values, "
+            "the last sample's again, though the joint moved; wait for new data before reading",
+            samples,
+        )
+
+
+def _count_of(angle: NDArray) -> float:
+    """Return the smallest step of an encoder, rad; of one that never moved, beyond all.
+
+    The smallest difference would do but for rounding: equal counts differ by 1e-16 in radians.
+    """
+    steps = np.abs(np.diff(angle))
+    steps = steps[steps > 1e-9]
+    return float(steps.min()) if len(steps) else np.inf
+
+
+def _stuck_angle(motion: Motion, joint: int) -> Iterator[Fault]:
+    """Report an angle that stands while the leg goes on; friction holds a joint too, but lets it go where it stood."""
+    if motion.measured_angle is None:
+        return
+    angle = motion.measured_angle[:, joint]
+    still = constant_stretches(angle, round(STUCK_ANGLE_S * motion.sample_rate_hz))
+    lasting = still[:, 1] - still[:, 0]
+    found = still[[_impossible(motion, joint, angle, s, np.delete(lasting, i)) for i, s in enumerate(still)]]
+    if len(found):
+        samples = mask_of(found, len(angle))
+        # The filter carries the standstill on into its neighbourhood.
+        reach = int(np.ceil(EDGE_PERIODS * motion.sample_rate_hz / motion.cutoff_hz))
+        yield Fault(
+            motion.file,
+            column(motion, joint, "angle"),
+            f"{the(motion.joints[joint])}'s angle is stuck: constant for "
+            f"{samples.sum() / motion.sample_rate_hz:.2f} s, {when(motion, found)}, while the rest moved on; "
+            "check the encoder's cable and the drive's status",
+            dilate(samples, reach),
+        )
+
+
+def _impossible(motion: Motion, joint: int, angle: NDArray, stretch: NDArray, others: NDArray) -> bool:
+    start, stop = stretch
+    # Steps across a gap are larger, but not faster.
+    steps = np.abs(np.diff(angle)) / np.maximum(np.diff(motion.time) * motion.sample_rate_hz, 1.0)
+    outside = np.delete(steps, np.arange(max(start - 1, 0), min(stop, len(steps))))
+    usual = np.quantile(outside, 0.999) if len(outside) else 0.0
+    edges = steps[[k for k in (start - 1, stop - 1) if 0 <= k < len(steps)]]
+    if usual > 0 and (edges > JUMP * usual).any():
+        return True
+    seconds = (stop - start) / motion.sample_rate_hz
+    if motion.reference is not None and np.isfinite(motion.reference[start:stop, joint]).all():
+        return seconds > HELD_S and np.ptp(motion.reference[start:stop, joint]) > _held(motion, joint)
+    rest = [j for j in range(motion.q.shape[1]) if j != joint]
+    moved = max((np.ptp(motion.q[start:stop, j]) / _held(motion, j) for j in rest), default=0.0)
+    longest = others.max(initial=0) / motion.sample_rate_hz
+    return 0 < start and seconds > max(ALONE_S, ALONE * longest) and moved > 1.0
+
+
+def _held(motion: Motion, joint: int) -> float:
+    """Return how far a set-point, or another joint, must go for a standstill to be impossible."""
+    return HELD_RAD * motion.machine.scale(motion.joints[joint]).travel
+
+
+def _torque(motion: Motion, joint: int) -> Iterator[Fault]:
+    """Report torque that stands still: at its extreme it is saturated, elsewhere stuck."""
+    torque = motion.torque[:, joint]
+    name, channel = motion.joints[joint], column(motion, joint, "torque")
+    flat = constant_stretches(torque, FLAT_TOP)
+    at_top = (torque[flat[:, 0]] == torque.max()) | (torque[flat[:, 0]] == torque.min())
+    lasts = flat[:, 1] - flat[:, 0] >= STUCK_TORQUE_S * motion.sample_rate_hz
+    moving = np.array([np.abs(motion.dq[a:b, joint]).max() > 0.1 * np.ptp(motion.q[:, joint]) for a, b in flat], bool)
+    tops, stuck = flat[at_top], flat[~at_top & lasts & moving]
+    samples = mask_of(tops, len(torque))
+    if len(tops) > 1 and samples.sum() >= SATURATED:
+        unit = motion.machine.joints[joint].unit("torque")
+        limits = " and ".join(f"{value:.4g} {unit}" for value in sorted({torque[a] for a, _ in tops}))
+        yield Fault(
+            motion.file,
+            channel,
+            f"{the(name)}'s torque is saturated: clipped at {limits} in {samples.sum()} samples "
+            f"({100 * samples.mean():.2g} %), {when(motion, tops)}; "
+            "raise the sensor's range or the drive's limit, or move more gently",
+            samples,
+        )
+    elif len(tops) and (lasts & moving & at_top).any():
+        stuck = flat[lasts & moving]
+    if len(stuck):
+        samples = mask_of(stuck, len(torque))
+        yield Fault(
+            motion.file,
+            channel,
+            f"{the(name)}'s torque is stuck: constant for {samples.sum() / motion.sample_rate_hz:.2f} s, "
+            f"{when(motion, stuck)}, while the joint moved; check the current sensor and the drive's status",
+            samples,
+        )
+
+
+def _forces(motion: Motion, forces: NDArray) -> Iterator[Fault]:
+    """Report cuff force channels that are dead all along, or stand still for a second while others go on."""
+    least = round(STUCK_FORCE_S * motion.sample_rate_hz)
+    alive = [np.ptp(forces[np.isfinite(x), c, i]) > 0 if np.isfinite(x := forces[:, c, i]).any() else False
+             for c in range(len(CUFFS)) for i in range(3)]  # fmt: skip
+    if not any(alive):
+        return
+    for c, cuff in enumerate(CUFFS):
+        for i, axis in enumerate("xyz"):
+            still = constant_stretches(forces[:, c, i], least)
+            if not len(still):
+                continue
+            samples = mask_of(still, len(motion))
+            dead = samples.all()
+            yield Fault(
+                motion.file,
+                f"{cuff}_force_{axis}_n",
+                f"the {cuff.replace('_', ' ')} cuff's {axis} force is {'dead' if dead else 'stuck'}: constant "
+                f"{'all along' if dead else when(motion, still)} while other sensors changed; "
+                "check the sensor's supply and cable, or leave its column out",
+                None if dead else samples,
+            )

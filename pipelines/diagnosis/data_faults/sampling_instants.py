@@ -1,0 +1,58 @@
+"""Instants: samples taken at other times than their even stamps say.
+
+An instant that is off by d shifts every angle by its speed times d: the third differences of two joints then
+correlate as their speeds do, which no vibration, count or friction of one joint does.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.data_faults.fault import Fault
+from pipelines.mechanics.motion import Motion
+
+UNEVEN = 0.05
+"""Of a sample period, rms, of instants that stray. Sticking joints and impacts reach 0.01."""
+EVEN = 0.04
+"""Of a sample period: a stamp that strays more is another fault, and says so itself."""
+SURE = 5.0
+"""Standard errors."""
+WINDOW = 4
+"""Samples that make a third difference."""
+SPREAD = 20.0
+"""Variance of the third difference of independent numbers: 1 + 9 + 9 + 1."""
+BLOCK = 20
+"""Neighbouring differences share samples; sums over so many are nearly independent."""
+LEAST = 1000
+"""Differences that a verdict needs."""
+
+
+def sampling_faults(motion: Motion) -> Iterator[Fault]:
+    """Yield what two joints' angles say together of the instants at which they were taken."""
+    if motion.measured_angle is None or motion.q.shape[1] < 2 or len(motion) < WINDOW:
+        return
+    trusted = _undisturbed(motion)
+    if trusted.sum() < LEAST:
+        return
+    rough = np.diff(motion.measured_angle[:, :2], 3, axis=0)[trusted]
+    speeds = np.prod(motion.dq[2:-1, :2][trusted], axis=1)
+    alike = np.prod(rough, axis=1) * speeds
+    sums = alike[: len(alike) // BLOCK * BLOCK].reshape(-1, BLOCK).sum(axis=1)
+    variance = max(float(alike.sum()), 0.0) / (SPREAD * max(float(speeds @ speeds), 1e-12))
+    jitter = np.sqrt(variance) * motion.sample_rate_hz
+    if jitter > UNEVEN and sums.sum() > SURE * np.sqrt(len(sums)) * sums.std():
+        yield Fault(
+            motion.file,
+            "time_s",
+            f"clock jitter: the stamps are even, but all angles jump together as if taken {100 * jitter:.2g} % of a "
+            f"sample period rms ({1e3 * jitter / motion.sample_rate_hz:.2g} ms) off, all along; "
+            "store the instants of the samples, not the planned ones",
+        )
+
+
+def _undisturbed(motion: Motion) -> NDArray:
+    """Tell which third differences lie on even stamps and samples not known to be bad, (n - 3,) bool."""
+    even = np.abs(np.diff(motion.time) * motion.sample_rate_hz - 1.0) < EVEN
+    good = motion.valid[1:] & motion.valid[:-1] & even
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(good, WINDOW - 1).all(axis=1))

@@ -1,0 +1,72 @@
+"""The sign of a joint alone: a torque that only a body of negative inertia, whose friction drives it, would ask for.
+
+A stiff spring or a late torque can make an inertia look negative, and hardly anything but a wrong sign makes friction
+give energy beside it; so both must be plain. Which of torque and angle has the wrong sign no equation tells.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.contracts.joints import the
+from pipelines.diagnosis.candidates.columns import columns_under
+from pipelines.diagnosis.data_faults.fault import Fault, column
+from pipelines.diagnosis.evidence.baseline import Baseline, baseline_of
+from pipelines.diagnosis.evidence.observed_run import Run, observe
+from pipelines.estimation.long_run import long_run_covariance
+from pipelines.estimation.regression import by_segment
+from pipelines.mechanics.mechanisms.single import PENDULUM
+from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.origin import settings_of
+
+LEAST_BLOCKS = 50
+"""Of fewer no interval is known."""
+
+
+def sign_faults(motion: Motion) -> Iterator[Fault]:
+    """Yield a torque of a machine of one joint whose sign is reversed; with a person in it, who may drive it, none."""
+    if motion.machine.mechanism.name != PENDULUM.name or motion.run == "with_human":
+        return
+    run = observe(motion)
+    if run.usable[:, 0].sum() < LEAST_BLOCKS:
+        return
+    found, half = _inertia_and_loss(run, baseline_of([run]))
+    if not (found + half < 0.0).all():
+        return
+    (joint,), inertia = motion.machine.joints, motion.machine.mechanism.parameters[0]
+    channel = column(motion, 0, "torque")
+    (body, loss), (low, lost_low), (high, lost_high) = found, found - half, found + half
+    yield Fault(
+        motion.file,
+        channel,
+        f"the sign of {channel} is reversed, all along: as recorded {the(joint.name)} has an inertia of {body:.4g} "
+        f"{inertia.unit} ({low:.4g} … {high:.4g}) and friction that loses {loss:.2g} W ({lost_low:.2g} … "
+        f"{lost_high:.2g}), and the other way round both are a machine's (so they would be with "
+        f"{column(motion, 0, 'angle')} reversed instead: a mirror image); turn it round in {settings_of(motion)}, if "
+        "every run has it, and in this recording",
+    )
+
+
+def _inertia_and_loss(run: Run, model: Baseline) -> tuple[NDArray, NDArray]:
+    """Return inertia (kg·m² or kg) and mean loss in friction (W) of one joint's fit, and half of their intervals, (2,).
+
+    What else may hold the joint, with a constant torque or as a spring does, is fitted beside and counts for neither.
+    """
+    motion, usable = run.motion, run.usable[:, :1]
+    beside = np.stack([np.ones_like(motion.q), motion.q], axis=2)
+    columns = np.concatenate([columns_under((), run, model)[0][:, 0], run.average(beside)[:, 0]], axis=1) * usable
+    told = np.zeros((2, columns.shape[1]))
+    told[0, 0] = 1.0
+    friction = model.layout.terms[1].slice
+    told[1, friction] = (run.state[1] * columns[:, friction]).sum(axis=0) / usable.sum()
+    scale = np.maximum(np.sqrt((columns**2).sum(axis=0)), 1e-12)
+    columns, told = columns / scale, told / scale
+    torque = run.measured[:, :1] * usable
+    inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-10, hermitian=True)
+    values = inverse @ (columns.T @ torque[:, 0])
+    scores = (torque - (columns @ values)[:, np.newaxis]) * columns
+    segment = motion.segment[run.starts]
+    covariance, critical, _ = long_run_covariance(lambda: by_segment(segment, scores), len(values))
+    spread = told @ inverse @ covariance @ inverse @ told.T
+    return told @ values, critical * np.sqrt(np.diag(spread))

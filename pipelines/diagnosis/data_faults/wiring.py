@@ -1,0 +1,154 @@
+"""Wiring: channels of hip and knee exchanged, and signs that are reversed.
+
+The angles are held against their set-points, where these were recorded, and then all against what a leg can do
+(``body.py``): a wiring is said to be wrong when another explains both joints far better.
+"""
+
+from collections.abc import Iterator
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.contracts.joints import the
+from pipelines.diagnosis.data_faults.fault import WHOLE_ROW, Fault, column
+from pipelines.diagnosis.data_faults.nonnegative_leg import (
+    AS_RECORDED,
+    EXCHANGED,
+    KNEE_REVERSED,
+    Averages,
+    Reading,
+    cuff_misfit,
+    fit,
+)
+from pipelines.mechanics.motion import CUFFS, Motion
+from pipelines.mechanics.origin import settings_of
+
+FAR_BETTER = 0.5
+"""By which the power left unexplained must fall for each channel said to be wrong: the more channels, the less
+likely. Missing physics of a quarter of the torque changes it by a few tenths."""
+A_LIMB = 0.05
+"""Share of the cuffs' power: with less of it left unexplained they feel a limb, whatever would explain more."""
+FOLLOWS = 0.9
+"""Correlation of an angle with its set-point."""
+SIGN, SWAP = "reversed", "exchanged"
+
+Wiring = tuple[Reading, tuple[int, int], tuple[float, float], tuple[tuple[int, str], ...], str]
+"""How angles are read; which torques are hip's and knee's; their signs; what is wrong then, and in which way."""
+HIP, KNEE = 0, 1
+STRAIGHT, CROSSED = (HIP, KNEE), (KNEE, HIP)
+BOTH_TORQUES = ((HIP, "torque"), (KNEE, "torque"))
+BOTH_ANGLES = ((HIP, "angle"), (KNEE, "angle"))
+WIRINGS: tuple[Wiring, ...] = (
+    (AS_RECORDED, STRAIGHT, (1.0, 1.0), (), ""),
+    (AS_RECORDED, STRAIGHT, (-1.0, 1.0), ((HIP, "torque"),), SIGN),
+    (AS_RECORDED, STRAIGHT, (1.0, -1.0), ((KNEE, "torque"),), SIGN),
+    (AS_RECORDED, STRAIGHT, (-1.0, -1.0), BOTH_TORQUES, SIGN),
+    (AS_RECORDED, CROSSED, (1.0, 1.0), BOTH_TORQUES, SWAP),
+    (EXCHANGED, STRAIGHT, (1.0, 1.0), BOTH_ANGLES, SWAP),
+    (EXCHANGED, CROSSED, (1.0, 1.0), BOTH_ANGLES + BOTH_TORQUES, SWAP),
+    # The equations are odd: a reversed hip is a reversed knee with all torques reversed, a hip reversed in both
+    # channels cannot be told from such a knee, nor both angles from both torques.
+    (KNEE_REVERSED, STRAIGHT, (1.0, 1.0), ((KNEE, "angle"),), SIGN),
+    (KNEE_REVERSED, STRAIGHT, (-1.0, -1.0), ((HIP, "angle"),), SIGN),
+    (KNEE_REVERSED, STRAIGHT, (1.0, -1.0), ((KNEE, "angle"), (KNEE, "torque")), SIGN),
+)
+MIRROR_IMAGES: dict[tuple[tuple[int, str], ...], str] = {
+    BOTH_TORQUES: "both angles",
+    ((KNEE, "angle"), (KNEE, "torque")): "the hip's angle and torque",
+}
+
+
+def angle_faults(motion: Motion) -> Iterator[Fault]:
+    """Yield angles that do not follow their own set-points: exchanged or reversed."""
+    if motion.reference is None or not np.isfinite(motion.reference[motion.valid]).all():
+        return
+    q, reference = motion.q[motion.valid], motion.reference[motion.valid]
+    joints = q.shape[1]
+    if (np.ptp(q, axis=0) == 0).any() or (np.ptp(reference, axis=0) == 0).any():
+        return
+    alike = np.corrcoef(q, reference, rowvar=False)[:joints, joints:]
+    for j in range(joints):
+        own, best = alike[j, j], int(np.argmax(alike[j]))
+        if own < -FOLLOWS:
+            yield _reversed(motion, ((j, "angle"),), f"it moves against its set-point (correlation {own:.2f})")
+        elif best != j and alike[j, best] > FOLLOWS and own < FOLLOWS / 2 and alike[best, j] > FOLLOWS and j < best:
+            yield _exchanged(
+                motion,
+                ((j, "angle"), (best, "angle")),
+                f"each follows the other's set-point (correlations {alike[j, best]:.2f} and {alike[best, j]:.2f})",
+            )
+
+
+def wiring_faults(run: Averages) -> Iterator[Fault]:
+    """Yield channels that only make a leg when exchanged or reversed."""
+    left: dict[tuple[Reading, int, int, float], float] = {}
+    for reading, joint in product((AS_RECORDED, KNEE_REVERSED, EXCHANGED), (HIP, KNEE)):
+        columns = run.joint_columns(joint, reading)
+        for channel, sign in product((HIP, KNEE), (1.0, -1.0)):
+            left[reading, joint, channel, sign] = fit(columns, sign * run.torque[:, channel])[0]
+
+    def misfit(wiring: Wiring) -> float:
+        reading, channels, signs, *_ = wiring
+        return sum(left[reading, j, channels[j], signs[j]] for j in (HIP, KNEE)) / 2
+
+    as_recorded, best = WIRINGS[0], min(WIRINGS, key=lambda wiring: misfit(wiring) / FAR_BETTER ** len(wiring[3]))
+    if best is as_recorded:
+        return
+    why = (
+        f"rigid body and friction leave {_percent(misfit(best))} of the torques' power unexplained that way, "
+        f"{_percent(misfit(as_recorded))} as recorded"
+    )
+    if best[4] == SIGN and (mirror := MIRROR_IMAGES.get(best[3])):
+        mirror = mirror.replace("the hip", the(run.motion.joints[HIP]))
+        why += f" (so they would with {mirror} reversed instead: a mirror image)"
+    say = _reversed if best[4] == SIGN else _exchanged
+    yield say(run.motion, best[3], why)
+
+
+def cuff_faults(run: Averages) -> Iterator[Fault]:
+    """Yield force sensors that only carry a limb when thigh and shank are exchanged, or one is reversed."""
+    if run.cuffs is None or run.motion.run != "with_human" or not np.isfinite(run.cuffs).all():
+        return
+    readings: dict[str, NDArray] = {
+        "thigh and shank are exchanged": run.cuffs[:, ::-1],
+        "the sign of all is reversed": -run.cuffs,
+        "the sign of the thigh's is reversed": run.cuffs * [[-1.0], [1.0]],
+        "the sign of the shank's is reversed": run.cuffs * [[1.0], [-1.0]],
+    }
+    as_recorded = cuff_misfit(run, run.cuffs)
+    misfits = {what: cuff_misfit(run, cuffs) for what, cuffs in readings.items()}
+    best = min(misfits, key=misfits.__getitem__)
+    if as_recorded > A_LIMB and misfits[best] < FAR_BETTER**2 * as_recorded:
+        chosen = [cuff for cuff in CUFFS if "all" in best or "exchanged" in best or cuff.split("_")[0] in best]
+        yield Fault(
+            run.motion.file,
+            f"{chosen[0]}_force_y_n",
+            f"cuff forces are those of no limb, unless {best} (swapped or reversed sensors, {len(chosen)} of them): "
+            f"then {_percent(misfits[best])} of their torque's power is left unexplained, not {_percent(as_recorded)}; "
+            "check the sensors' addresses and axes",
+        )
+
+
+def _names(motion: Motion, channels: tuple[tuple[int, str], ...]) -> tuple[str, str]:
+    columns = [column(motion, *channel) for channel in channels]
+    return columns[0] if len(columns) == 1 else WHOLE_ROW, " and ".join(columns)
+
+
+def _reversed(motion: Motion, channels: tuple[tuple[int, str], ...], why: str) -> Fault:
+    channel, names = _names(motion, channels)
+    mend = f"in {settings_of(motion)}, if every run has it, and in this recording"
+    return Fault(
+        motion.file, channel, f"the sign of {names} is reversed, all along: {why}; turn it round {mend}"
+    )  # fmt: skip
+
+
+def _exchanged(motion: Motion, channels: tuple[tuple[int, str], ...], why: str) -> Fault:
+    channel, names = _names(motion, channels)
+    return Fault(
+        motion.file, channel, f"{names} are swapped, all along: {why}; exchange the joints in {settings_of(motion)}"
+    )  # fmt: skip
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %"

@@ -1,0 +1,1 @@
+"""What a residual depends on, for what no listed cause explains."""

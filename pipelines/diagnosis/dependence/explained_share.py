@@ -1,0 +1,362 @@
+"""What the residual depends on, for causes that nobody knows yet.
+
+Each variable that the runs know (angle, speed, load, time, phase, ...) is given a smooth curve, fitted on all
+folds but one and judged on that one. Folds are whole periods, so that noise, coloured noise included, earns
+nothing. The share of the residual's variance that a curve foretells ranks the variables.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.contracts.joints import either, the
+from pipelines.diagnosis.dependence.smooth_curve import Curve, fold_products, held_out_error
+from pipelines.diagnosis.dependence.spectral_lines import above_the_motion_hz
+from pipelines.diagnosis.evidence.noise_floor import Floor
+from pipelines.diagnosis.evidence.observed_run import FOLDS, Run
+from pipelines.mechanics.machine import Machine
+
+LONGEST_S = 2.0
+"""Time since a reversal after which it no longer counts."""
+PARTS = 12
+"""Of the excitation's period, dealt out to folds."""
+PADDING = 4
+"""Of the spectrum in which a tone is sought."""
+LOWEST_HZ = 0.2
+"""Below, a tone and a drift are the same."""
+MOST = 0.5
+"""Share that a tone in step with the motion must hold: a law of the motion has many lines there."""
+IMITATES = 0.5
+"""Weight of the phase in the ranking: it can imitate whatever repeats, so others go first."""
+LITTLE = 0.05
+"""Share below which nothing is said to depend on a variable."""
+MUCH_MORE = 1.5
+"""Factor by which two variables must foretell more than one, to be said instead of it."""
+NOTICED = 0.2
+"""Of the noise floor: excess below which it is not asked where it is."""
+ONE_SIDED = 4.0
+"""Ratio of squared excess between kinds of run, or files, from which it is said to be in one only."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """Something that a residual may depend on."""
+
+    name: str
+    words: str
+    """As a sentence says it; ``{joint}``, ``{place}`` and ``{effort}`` are filled in, and ``{other}`` with its own."""
+    unit: str
+    of: Callable[[Run, int], NDArray | None]
+    """(m,) values in a run for a joint; None where the run does not know it."""
+    by_direction: bool = False
+    """Whether each direction of motion has a curve of its own."""
+    lasting: bool = True
+    """Whether another run, of another excitation, would surely show the same."""
+    knots: int = 8
+    """Inner knots of its curve; few where a fold leaves a gap as long as what a knot spans."""
+
+
+def _of_other(run: Run, order: int, j: int) -> NDArray | None:
+    """Return angle, speed or acceleration of the other of two joints."""
+    return run.state[order][:, 1 - j] if len(run.motion.joints) == 2 else None
+
+
+def _load_of_other(run: Run, j: int) -> NDArray | None:
+    return _load(run, 1 - j) if len(run.motion.joints) == 2 else None
+
+
+def _since_reversal(run: Run, j: int) -> NDArray:
+    forward = run.state[1][:, j] > 0
+    turned = np.flatnonzero(np.diff(forward, prepend=forward[0]))
+    last = np.searchsorted(turned, np.arange(len(forward)), side="right") - 1
+    since = np.where(last >= 0, run.time - run.time[turned[last]] if len(turned) else 0.0, LONGEST_S)
+    return np.minimum(since, LONGEST_S)
+
+
+def _load(run: Run, j: int) -> NDArray:
+    return run.average(run.motion.transmitted[0])[:, j]
+
+
+def _cuff(run: Run, j: int) -> NDArray | None:
+    return run.measured[:, len(run.motion.joints) + j] if run.has_cuffs else None
+
+
+def _temperature(run: Run, j: int) -> NDArray | None:
+    return None if run.motion.temperature is None else run.average(run.motion.temperature)[:, j]
+
+
+def _phase(run: Run, j: int) -> NDArray | None:
+    period = run.motion.period_s
+    return None if not period else run.time % period
+
+
+VARIABLES = (
+    Variable("angle", "{joint}'s {place}", "rad", lambda run, j: run.state[0][:, j]),
+    # What friction does has a jump where the joint reverses.
+    Variable("speed", "{joint}'s speed", "rad/s", lambda run, j: run.state[1][:, j], by_direction=True),
+    Variable("acceleration", "{joint}'s acceleration", "rad/s²", lambda run, j: run.state[2][:, j]),
+    Variable(
+        "reversals", "{joint}'s direction and the time since it reversed", "s", _since_reversal, by_direction=True
+    ),
+    Variable("load", "the {effort} that {joint} passes on", "N·m", _load, by_direction=True),
+    Variable("other_angle", "{other}'s {other_place}", "rad", lambda run, j: _of_other(run, 0, j)),
+    Variable("other_speed", "{other}'s speed", "rad/s", lambda run, j: _of_other(run, 1, j)),
+    Variable("other_load", "the {other_effort} that {other} passes on", "N·m", _load_of_other),
+    Variable("cuff_force", "the cuffs' torque about {joint}", "N·m", _cuff),
+    Variable("temperature", "the temperature of {joint}'s motor", "°C", _temperature),
+    Variable("time", "the time since the run began", "s", lambda run, j: run.time, lasting=False, knots=2),
+    Variable("phase", "the phase of the excitation and no single variable of the motion", "s", _phase, lasting=False),
+)
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """How much of a joint's residual one variable foretells."""
+
+    joint: str
+    variable: str
+    share: float
+    """Of the residual's variance, on folds that the curve was not fitted to; 0 for noise."""
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Together:
+    """Variables that only together foretell much of a joint's residual."""
+
+    joint: str
+    variables: tuple[Variable, ...]
+    share: float
+
+
+@dataclass(frozen=True)
+class Excess:
+    """What a run's residual has above the noise floor."""
+
+    joint: str
+    file: str
+    run: str
+    rms_nm: float
+    floor_nm: float
+
+    @property
+    def square(self) -> float:
+        """Square of what is not noise, (N·m)²."""
+        return max(self.rms_nm**2 - self.floor_nm**2, 0.0)
+
+
+def dependences(runs: Sequence[Run], residuals: Sequence[NDArray]) -> list[Dependence]:
+    """Rank what the residuals (m, O) of the drives depend on, most first, joint by joint."""
+    machine = runs[0].motion.machine
+    found = []
+    for j, joint in enumerate(machine.names):
+        shares = {v: variable_share(v, runs, residuals, j) for v in VARIABLES if knows(v, runs, j)}
+        made = [Dependence(joint, v.name, s, _sentence(joint, machine, v.words, s)) for v, s in shares.items()]
+        fast = [run.with_fast(r) for run, r in zip(runs, residuals, strict=True)]
+        frequency, share, in_step = _free_or_in_step(runs, fast, j)
+        kind = (
+            "above the motion's own band, in step with its period" if in_step else "that is no harmonic of the motion"
+        )
+        words = f"a tone of {frequency:.2f} Hz {kind}"
+        made.append(Dependence(joint, "tone", share, _sentence(joint, machine, words, share)))
+        found += sorted(made, key=_rank, reverse=True)
+    return found
+
+
+def _rank(dependence: Dependence) -> float:
+    return dependence.share * (IMITATES if dependence.variable == "phase" else 1.0)
+
+
+def knows(variable: Variable, runs: Iterable[Run], j: int) -> bool:
+    """Tell whether any run knows the variable."""
+    return any(variable.of(run, j) is not None for run in runs)
+
+
+def _sentence(joint: str, machine: Machine, words: str, share: float) -> str:
+    return f"{100 * share:.0f} % of what is left at {the(joint)} goes with {_words(joint, machine, words)}"
+
+
+def _words(joint: str, machine: Machine, words: str) -> str:
+    own, others = machine.joint(joint), [other for other in machine.joints if other.name != joint]
+    return words.format(
+        joint=the(joint), place=own.place, effort=own.effort, other=" and ".join(the(other.name) for other in others),
+        other_place=either(other.place for other in others), other_effort=either(other.effort for other in others),
+    )  # fmt: skip
+
+
+def by_kind(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Iterable[tuple[list[Run], list[NDArray]]]:
+    """Yield the runs of each kind with their residuals (m, O): what hides in one kind need not be in the other."""
+    for kind in dict.fromkeys(run.motion.run for run in runs):
+        chosen = [i for i, run in enumerate(runs) if run.motion.run == kind]
+        yield [runs[i] for i in chosen], [residuals[i] for i in chosen]
+
+
+def variable_share(variable: Variable, runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> float:
+    """Return the share of a joint's residual (m, O) variance that smooth curves along a variable foretell."""
+    total = error = 0.0
+    for some, left in by_kind(runs, residuals):
+        y = pooled(some, [r[:, j] for r in left], j)
+        if not len(y):
+            continue
+        y = y - y.mean()
+        total += float(y @ y)
+        if not knows(variable, some, j):
+            error += float(y @ y)
+            continue
+        curve = Curve.along([variable], some, j)
+        design = pooled(some, [curve.design(run) for run in some], j)
+        error += held_out_error([fold_products(design, y, fold) for fold in _folds(variable, some, j)])[0]
+    return max(1.0 - error / total, 0.0) if total > 0 else 0.0
+
+
+def _folds(variable: Variable, runs: Sequence[Run], j: int) -> list[NDArray]:
+    periods = pooled(runs, [run.fold for run in runs], j)
+    return [periods, pooled(runs, [parts_of_period(run) for run in runs], j)] if variable.lasting else [periods]
+
+
+def parts_of_period(run: Run) -> NDArray:
+    """Deal the parts of the excitation's period out to folds, (m,).
+
+    A law learnt in some parts of the period foretells the others; a curve that only imitates what repeats does not.
+    Without a period, stretches of a second are dealt out.
+    """
+    length = (run.motion.period_s or PARTS) / PARTS
+    return np.floor(run.time / length + 1e-9).astype(int) % PARTS % FOLDS
+
+
+def pooled(runs: Sequence[Run], values: Sequence[NDArray], j: int) -> NDArray:
+    """Return (m, ...) values of all runs where a joint's blocks are usable."""
+    return np.concatenate([v[run.usable[:, j]] for run, v in zip(runs, values, strict=True)])
+
+
+def tone(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> tuple[float, float]:
+    """Return the strongest frequency (Hz) that no period of the motion explains, and the share it foretells.
+
+    Where a harmonic of the motion's period above twice the motion's own band holds most, it is that one: a motor that
+    hums while it is recorded may do so in step. ``residuals`` are (m, O) of each run, N·m; ``j`` is the output.
+    """
+    return _free_or_in_step(runs, residuals, j)[:2]
+
+
+def _free_or_in_step(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> tuple[float, float, bool]:
+    """Return frequency and share of ``tone``, and whether it is in step with the motion's period."""
+    free = _tone_in(_unrepeated, LOWEST_HZ, runs, residuals, j)
+    if not any(run.motion.period_s for run in runs):
+        return (*free, False)
+    above = max(above_the_motion_hz(run) for run in runs)
+    in_step = _tone_in(_repeated, above, runs, residuals, j)
+    return (*in_step, True) if in_step[1] > max(MOST, free[1]) else (*free, False)
+
+
+def _tone_in(
+    part: Callable[[Run, NDArray, NDArray], NDArray], above: float, runs: Sequence[Run], residuals: Sequence[NDArray],
+    j: int,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the strongest frequency (Hz) of a part of the residuals (m, O), and the share of all that it foretells.
+
+    The frequency is shared by all runs, amplitude and phase are each run's own. Both are found on all folds but one
+    and judged on that one.
+    """
+    total = error = 0.0
+    found = []
+    for held in range(FOLDS):
+        rest = [run.usable[:, j] & (run.fold != held) for run in runs]
+        frequency = _strongest(
+            runs, [part(run, e[:, j], r) for run, e, r in zip(runs, residuals, rest, strict=True)], above
+        )
+        found.append(frequency)
+        for run, learnt, residual in zip(runs, rest, residuals, strict=True):
+            judged = run.usable[:, j] & (run.fold == held)
+            if not learnt.any():
+                continue
+            angle = 2 * np.pi * frequency * run.time
+            A = np.column_stack([np.sin(angle), np.cos(angle), np.ones(len(angle))])
+            values = np.linalg.lstsq(A[learnt], residual[learnt, j], rcond=None)[0]
+            mean = residual[learnt, j].mean()
+            total += float(np.sum((residual[judged, j] - mean) ** 2))
+            error += float(np.sum((residual[judged, j] - A[judged] @ values) ** 2))
+    return float(np.median(found)), max(1.0 - error / total, 0.0) if total > 0 else 0.0
+
+
+def _unrepeated(run: Run, residual: NDArray, learnt: NDArray) -> NDArray:
+    """Return what of a residual (m,) does not repeat with the excitation, nought where it is not ``learnt``."""
+    kept = np.where(learnt, residual, 0.0)
+    if not run.motion.period_s:
+        return kept
+    width = run.block.decimation / run.motion.sample_rate_hz
+    place = np.round(run.time % run.motion.period_s / width).astype(int)
+    mean = np.bincount(place, kept) / np.maximum(np.bincount(place, learnt), 1)
+    return np.where(learnt, kept - mean[place], 0.0)
+
+
+def _repeated(run: Run, residual: NDArray, learnt: NDArray) -> NDArray:
+    """Return what of a residual (m,) repeats with the excitation, nought where it is not ``learnt``."""
+    return np.where(learnt, residual, 0.0) - _unrepeated(run, residual, learnt)
+
+
+def _strongest(runs: Sequence[Run], residuals: Sequence[NDArray], above: float) -> float:
+    """Return the frequency of the highest peak of the summed spectra above one, Hz."""
+    width = runs[0].block.decimation / runs[0].motion.sample_rate_hz
+    places = [np.round((run.time - run.time[0]) / width).astype(int) for run in runs]
+    length = PADDING * (max(int(p[-1]) for p in places) + 1)
+    power = np.zeros(length // 2 + 1)
+    for place, residual in zip(places, residuals, strict=True):
+        series = np.zeros(length)
+        series[place] = residual
+        power += np.abs(np.fft.rfft(series)) ** 2
+    frequency = np.fft.rfftfreq(length, width)
+    return float(frequency[np.argmax(np.where(frequency > above, power, 0.0))])
+
+
+def excesses(runs: Sequence[Run], residuals: Sequence[NDArray], floor: Floor) -> list[Excess]:
+    """Return how far each run's residual (m, O) stands above the noise floor, joint by joint."""
+    return [
+        Excess(
+            joint, run.motion.file, run.motion.run,
+            float(np.sqrt(np.mean(residual[run.usable[:, j], j] ** 2))), float(floor.rms[j]),
+        )
+        for j, joint in enumerate(runs[0].motion.joints)
+        for run, residual in zip(runs, residuals, strict=True)
+        if run.usable[:, j].any()
+    ]  # fmt: skip
+
+
+def describe(
+    machine: Machine, found: Sequence[Dependence], above: Sequence[Excess], together: Sequence[Together] = ()
+) -> str:
+    """Say in a sentence or two what the joint with most above its floor depends on, and where that is.
+
+    ``together`` are pairs of variables that foretell the residual (see ``smooth_term``).
+    """
+    squares = {d.joint: np.mean([e.square for e in above if e.joint == d.joint] or [0.0]) for d in found}
+    joint = max(squares, key=lambda name: squares[name])
+    where = _where([e for e in above if e.joint == joint])
+    own = [d for d in found if d.joint == joint]
+    pair = max((t for t in together if t.joint == joint), key=lambda t: t.share, default=None)
+    if pair and pair.share > MUCH_MORE * max(_rank(own[0]), LITTLE):
+        words = " together with ".join(_words(joint, machine, variable.words) for variable in pair.variables)
+        return f"{100 * pair.share:.0f} % of what is left at {the(joint)} goes with {words}{where}."
+    if own[0].share < LITTLE:
+        return (
+            f"What is left at {the(joint)}{where}{',' * bool(where)} depends on nothing that was measured: neither "
+            f"motion, load and time nor a steady tone above {LOWEST_HZ:g} Hz that is no harmonic of the motion "
+            f"foretells {100 * LITTLE:.0f} % of it."
+        )
+    second = next((d for d in own[1:] if d.variable != "phase" and d.share > max(0.5 * own[0].share, LITTLE)), None)
+    return own[0].sentence + where + "." + (f" Nearly as much: {second.sentence}." if second else "")
+
+
+def _where(above: Sequence[Excess]) -> str:
+    """Say in which kind of run, or in which one file, the excess is."""
+    if not any(e.square > (NOTICED * e.floor_nm) ** 2 for e in above):
+        return ", and it is hardly above the noise"
+    for what, words in (("run", {"with_human": "with the human", "exo_alone": "without the human"}), ("file", {})):
+        groups: dict[str, list[float]] = {}
+        for e in above:
+            groups.setdefault(getattr(e, what), []).append(e.square)
+        means = sorted(((float(np.mean(v)), name) for name, v in groups.items()), reverse=True)
+        if len(means) > 1 and means[0][0] > ONE_SIDED * means[1][0]:
+            return f", mostly {words[means[0][1]]}" if what == "run" else f", mostly in {means[0][1]}"
+    return ", in all runs alike" if len(above) > 1 else ""

@@ -1,0 +1,111 @@
+"""What a model gains by a cause that nobody can name: a smooth surface in place of an equation.
+
+The surface is over the one or two variables that foretell most of a joint's residual on folds it was not
+fitted to, with the shrinkage that foretells best. Where nothing foretells enough, there is no surface.
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.dependence.explained_share import VARIABLES, Together, Variable, parts_of_period, pooled
+from pipelines.diagnosis.dependence.smooth_curve import Curve, fold_products, held_out_error
+from pipelines.diagnosis.evidence.observed_run import FOLDS, Run
+
+EARNED = 0.05
+"""Share of a residual's square that a surface must foretell to be there."""
+BETTER = 0.05
+"""Share by which two variables must foretell more than one."""
+ONE_SIDED = 2.0
+"""Ratio of mean squares from which a law may hold in one kind of run only."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A curve or surface of one joint's torque in some kinds of run."""
+
+    joint: str
+    runs: tuple[str, ...]
+    curve: Curve
+    values: NDArray
+    share: float
+    """Of the residual's square, foretold on folds that were not fitted."""
+
+
+@dataclass(frozen=True)
+class SmoothTerm:
+    """The surfaces that earned their place."""
+
+    surfaces: tuple[Surface, ...]
+
+    def torque(self, run: Run) -> NDArray:
+        """Return what the surfaces add to each measured torque, (m, O) N·m."""
+        torque = np.zeros_like(run.measured)
+        for surface in self.surfaces:
+            if run.motion.run in surface.runs:
+                torque[:, surface.curve.joint] += surface.curve.design(run) @ surface.values
+        return torque
+
+    @property
+    def together(self) -> list[Together]:
+        """What ``dependence.describe`` can say of surfaces over two variables."""
+        return [Together(s.joint, s.curve.variables, s.share) for s in self.surfaces if len(s.curve.variables) > 1]
+
+    def describe(self) -> str:
+        """Say what the surfaces are over."""
+        said = []
+        for surface in self.surfaces:
+            names = " and ".join(v.name.replace("_", " ") for v in surface.curve.variables)
+            where = f"{surface.joint}, {' and '.join(surface.runs)}"
+            said.append(f"{where}: {names} ({100 * surface.share:.0f} % of what is left)")
+        return "; ".join(said) or "no smooth term earned its place"
+
+
+def smooth_term(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SmoothTerm:
+    """Fit surfaces to the residuals (m, O) of training runs, joint by joint.
+
+    With both kinds of run a law must foretell one kind from the other, or be at home in the one that has most of
+    the error.
+    """
+    made = [_of_joint(runs, [r[:, j] for r in residuals], j) for j in range(len(runs[0].motion.joints))]
+    return SmoothTerm(tuple(surface for surface in made if surface is not None))
+
+
+def _of_joint(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surface | None:
+    surface = _best(runs, residuals, j)
+    if surface is not None or len({run.motion.run for run in runs}) == 1:
+        return surface
+    of_kind: dict[str, list[int]] = {}
+    for i, run in enumerate(runs):
+        of_kind.setdefault(run.motion.run, []).append(i)
+    square = {
+        kind: float(np.mean(pooled([runs[i] for i in at], [residuals[i] for i in at], j) ** 2))
+        for kind, at in of_kind.items()
+    }
+    worst = max(square, key=lambda kind: square[kind])
+    if square[worst] < ONE_SIDED * min(square.values()):
+        return None
+    return _best([runs[i] for i in of_kind[worst]], [residuals[i] for i in of_kind[worst]], j)
+
+
+def _best(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surface | None:
+    known = [v for v in VARIABLES if v.lasting and all(v.of(run, j) is not None for run in runs)]
+    one = max((_surface([v], runs, residuals, j) for v in known), key=lambda s: s.share)
+    two = max((_surface(p, runs, residuals, j) for p in itertools.combinations(known, 2)), key=lambda s: s.share)
+    best = two if two.share > one.share + BETTER else one
+    return best if best.share > EARNED else None
+
+
+def _surface(variables: Sequence[Variable], runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surface:
+    curve, kinds = Curve.along(variables, runs, j), list(dict.fromkeys(run.motion.run for run in runs))
+    y, design = pooled(runs, residuals, j), pooled(runs, [curve.design(run) for run in runs], j)
+    dealt = [[run.fold for run in runs], [parts_of_period(run) for run in runs]]
+    if len(kinds) > 1:
+        dealt.append([np.full(len(run.time), kinds.index(run.motion.run)) for run in runs])
+    products = [fold_products(design, y, pooled(runs, folds, j)) for folds in dealt]
+    error, ridge = held_out_error(products)
+    values, share = products[0].solve(range(FOLDS), ridge), 1.0 - error / float(y @ y)
+    return Surface(runs[0].motion.joints[j], tuple(kinds), curve, values, share)

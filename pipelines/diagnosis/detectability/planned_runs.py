@@ -1,0 +1,61 @@
+"""The runs that a trajectory would give on a leg without faults, and the noise they would have."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.evidence.noise_floor import Floor
+from pipelines.effects.friction import Friction
+from pipelines.mechanics.geometry import Geometry
+from pipelines.mechanics.mechanisms.leg import LEG
+from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.trajectory import Trajectory
+from pipelines.settings.design import NoiseSettings
+from pipelines.settings.plant import PlantSettings
+from pipelines.signals.blocks import BlockAverage
+
+
+def planned_motions(
+    trajectory: Trajectory, plant: PlantSettings, noise: NoiseSettings, kinds: tuple[str, ...], rate_hz: float
+) -> list[Motion]:
+    """Return one motion of each kind of run, its torque that of rigid body and friction, without cuff forces."""
+    count = round(min(noise.duration_s, trajectory.duration_s) * rate_hz)
+    time = np.arange(count) / rate_hz
+    q, dq, ddq = trajectory.at(time)
+    geometry = Geometry(thigh_length_m=plant.thigh_length_m, gravity_m_s2=plant.gravity_m_s2)
+    Y = LEG.regressor(q, dq, ddq, geometry)
+    made = []
+    for kind in kinds:
+        X = np.array(plant.exo_inertial) + (np.array(plant.human_inertial) if kind == "with_human" else 0.0)
+        made.append(_motion(time, (q, dq, ddq), Y @ X, kind, plant, geometry, trajectory, rate_hz))
+    return made
+
+
+def _motion(
+    time: NDArray, state: tuple[NDArray, NDArray, NDArray], load: NDArray, kind: str, plant: PlantSettings,
+    geometry: Geometry, trajectory: Trajectory, rate_hz: float,
+) -> Motion:  # fmt: skip
+    names = tuple(joint.name for joint in trajectory.joints)
+    motion = Motion(
+        time, *state, torque=load.copy(), load=load, segment=np.zeros(len(time), np.int64),
+        valid=np.ones(len(time), bool), run=kind, sample_rate_hz=rate_hz, period_s=trajectory.period_s, joints=names,
+        geometry=geometry, file=kind,
+        metadata={"joints": [{"name": joint.name, "kind": joint.kind} for joint in trajectory.joints]},
+    )  # fmt: skip
+    for joint, levels in zip(names, zip(plant.coulomb_nm, plant.viscous_nm_s_rad, strict=True), strict=True):
+        motion.torque[:] += Friction(joint).torque(motion, np.array(levels))
+    return motion
+
+
+def planned_noise(noise: NoiseSettings, rate_hz: float, block: BlockAverage) -> Floor:
+    """Return the noise of two drives behind the regression filter; cuffs are not planned.
+
+    Of noise with correlation exp(-t / T) a mean of D samples has the variance s² (1 + 2 sum (1 - i/D) rho^i) / D,
+    and its integral over all lags is that of the noise itself.
+    """
+    rho = np.exp(-1.0 / (rate_hz * noise.correlation_s)) if noise.correlation_s > 0 else 0.0
+    D = block.decimation
+    lags = np.arange(1, D)
+    variance = (1.0 + 2.0 * np.sum((1.0 - lags / D) * rho**lags)) / D
+    integral = (1.0 + rho) / (1.0 - rho) / D
+    rms = np.array([noise.hip_nm, noise.knee_nm]) * np.sqrt(variance)
+    return Floor(np.append(rms, [np.nan, np.nan]), np.full(4, variance / integral), from_periods=False)

@@ -1,0 +1,75 @@
+"""The model without causes: what every cause is held against.
+
+Rigid bodies of machine and person, Coulomb and viscous friction, what the machine is known to have
+besides, and the zeros of the cuffs' force sensors.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.evidence.observed_run import Run
+from pipelines.effects import Effect
+from pipelines.mechanics.machine import Machine
+from pipelines.mechanics.run import kinds_of
+from pipelines.model import Model, ParameterLayout, Term, baseline
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """The model without causes, for the kinds of run at hand."""
+
+    kinds: tuple[str, ...]
+    machine: Machine
+    cuffs: bool
+    known: tuple[Effect, ...] = ()
+    """What else the machine is known to have; each acts like friction, by linear parameters that all runs share."""
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the machine's joints."""
+        return self.machine.names
+
+    @cached_property
+    def effects(self) -> tuple[Effect, ...]:
+        """Rigid bodies, friction, what the machine is known to have, and the force sensors' zeros."""
+        return baseline(self.machine, self.kinds, self.known, cuffs=self.cuffs)
+
+    @cached_property
+    def terms(self) -> tuple[Term, ...]:
+        """The effects as terms of a model, their linear parameters zero."""
+        return Model.of(self.effects).terms
+
+    @cached_property
+    def layout(self) -> ParameterLayout:
+        """Its columns, which all runs share: the first of every fit."""
+        return ParameterLayout.of(self.effects)
+
+    @property
+    def size(self) -> int:
+        """Number of columns."""
+        return self.layout.size
+
+
+def baseline_of(runs: Sequence[Run], known: Sequence[Effect] = ()) -> Baseline:
+    """Return the baseline that the kinds of run at hand allow, with what else the machine is ``known`` to have."""
+    kinds = kinds_of(run.motion for run in runs)
+    return Baseline(kinds, runs[0].motion.machine, any(run.has_cuffs for run in runs), tuple(known))
+
+
+def like_trained(run: Run, baseline: Baseline) -> Run:
+    """Return the run without its cuffs where none was there to train on: their zeros are not known."""
+    if baseline.cuffs or not run.has_cuffs:
+        return run
+    usable = run.usable.copy()
+    usable[:, len(baseline.joints) :] = False
+    return replace(run, usable=usable)
+
+
+def with_load(run: Run, baseline: Baseline, values: NDArray) -> Run:
+    """Return the run with the loads of links and limb estimated from the baseline's rigid bodies in ``values`` (b,)."""
+    layout = baseline.layout
+    body = values[layout.bodies_in(run.motion.run)].sum(axis=0)
+    return replace(run, motion=run.motion.loaded(body, values[layout.bodies[-1]]))

@@ -1,0 +1,40 @@
+"""What even a good rig gets wrong: a share of what its torques vary by.
+
+What is off by some share of the torque varies with it. A constant that the baseline has anyway, as a lift's weight,
+is told off with it and hides nothing.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.evidence.observed_run import Run
+from pipelines.effects.torque_offset import TorqueOffset
+
+IMPERFECTION = (0.009, 0.02)
+"""Share of a drive's and of a cuff's torque that even a good model of a good machine leaves."""
+
+
+def imperfection(runs: Sequence[Run]) -> NDArray:
+    """Return what no model of a real machine gets right, (O,) N·m: errors below it are worth nothing."""
+    torque = telling_torque(runs)
+    return torque * imperfect_share(len(torque))
+
+
+def imperfect_share(outputs: int) -> NDArray:
+    """Return the share of each output's torque, (O,), that is a little off on a good rig: drives first, then cuffs."""
+    return np.repeat(IMPERFECTION, outputs // 2)
+
+
+def telling_torque(runs: Sequence[Run]) -> NDArray:
+    """Return the rms of each output's torque (O,), N·m, less a constant where the machine's bodies have any."""
+    squares, count = np.zeros(runs[0].measured.shape[1]), np.zeros(runs[0].measured.shape[1])
+    for run in runs:
+        known = np.where(run.usable, run.measured, 0.0)
+        number = run.usable.sum(axis=0)
+        squares += np.sum(known**2, axis=0)
+        if TorqueOffset.name in run.motion.machine.mechanism.absorbs:
+            squares -= np.sum(known, axis=0) ** 2 / np.maximum(number, 1)
+        count += number
+    return np.sqrt(np.maximum(squares, 0.0) / np.maximum(count, 1))

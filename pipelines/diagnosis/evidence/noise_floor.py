@@ -1,0 +1,161 @@
+"""The noise floor, from data alone: what does not repeat from one period of the excitation to the next."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from pipelines.diagnosis.evidence.observed_run import Run
+
+LONGEST_LAG_S = 1.0
+LONGEST_NOISE_S = 0.25
+"""How long noise of a sensor or a drive resembles itself; what is slower wanders."""
+IN_BURSTS = 5.0
+"""Fourth moment over the square of the second, 3 of noise, from which scatter comes in bursts: kicks are no noise."""
+MOST_INDEPENDENT = 1 / 6
+"""Of 25 ms blocks: what a model leaves of a leg is never white (DESIGN section 5)."""
+
+
+@dataclass(frozen=True)
+class Floor:
+    """Noise of each output, (O,) each."""
+
+    rms: NDArray
+    """N·m."""
+    independent_share: NDArray
+    """Independent samples per sample: noise resembles itself from block to block."""
+    from_periods: bool
+
+
+def noise_floor(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Floor:
+    """Estimate the noise from differences between adjacent periods at the same phase.
+
+    ``residuals`` (m, O) of each run; slow drift cancels in the differences of adjacent periods. Without periods the
+    noise is what is faster than the motion, and as dense below: what is missing and as fast passes for noise.
+    """
+    pairs = [scatter(run, residual) for run, residual in zip(runs, residuals, strict=True)]
+    from_periods = any(len(d) for d in pairs)
+    averaged = np.inf
+    if not from_periods:
+        lag = runs[0].motion.machine.lasting(LONGEST_LAG_S)
+        averaged = min(_blocks(run, lag) for run in runs)
+        pairs = [faster(run, residual, lag) for run, residual in zip(runs, residuals, strict=True)]
+    outputs = residuals[0].shape[1]
+    rms, share = np.full(outputs, np.nan), np.ones(outputs)
+    for o in range(outputs):
+        d = [p[:, o] for p in pairs if len(p)]
+        known = np.concatenate(d)
+        known = known[np.isfinite(known)]
+        if len(known) > 20:
+            time = _correlation_time(d)
+            # The average that was taken off held a part of the noise too.
+            rms[o] = np.sqrt(np.mean(known**2) / max(1.0 - time / averaged, 0.5))
+            share[o] = 1.0 / time
+    return Floor(rms, share, from_periods)
+
+
+def independent_share(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray:
+    """Return how many independent samples there are for each sample of a model's own residual (m, O), (O,).
+
+    What a model gets wrong resembles itself for longer than noise does.
+    """
+    series = [np.where(run.usable, residual, np.nan) for run, residual in zip(runs, residuals, strict=True)]
+    there = [any(np.isfinite(s[:, o]).sum() > 40 for s in series) for o in range(residuals[0].shape[1])]
+    return np.array([1.0 / _correlation_time([s[:, o] for s in series]) if t else 1.0 for o, t in enumerate(there)])
+
+
+def slow_scatter(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray:
+    """Return the scatter's power density below 1 Hz over what noise as fast as it has there, for each output, (O,).
+
+    About 1 for noise, white or coloured; many times that where a person or a drift does not repeat; 1 without periods.
+    """
+    pairs = [scatter(run, residual) for run, residual in zip(runs, residuals, strict=True)]
+    rate = runs[0].motion.sample_rate_hz / runs[0].block.decimation
+    return np.array([_slow_share([p[:, o] for p in pairs], rate) for o in range(residuals[0].shape[1])])
+
+
+def scatter(run: Run, residual: NDArray) -> NDArray:
+    """Return differences of adjacent periods over the root of two, (k, O); NaN where either is not usable."""
+    period = run.motion.period_s
+    if not period or not len(run.time) or run.time[-1] - run.time[0] < 2 * period:
+        return np.zeros((0, residual.shape[1]))
+    width = run.block.decimation / run.motion.sample_rate_hz
+    shift = period / width
+    whole = round(shift)
+    if abs(shift - whole) > 0.1:
+        # The period is no whole number of blocks: interpolate the later one.
+        later = np.column_stack([np.interp(run.time + period, run.time, r, right=np.nan) for r in residual.T])
+        ahead = np.clip(np.searchsorted(run.time, run.time + period), 0, len(run.time) - 1)
+        usable = run.usable & run.usable[ahead]
+        # Interpolation halves the later noise's variance on average, to two thirds.
+        return np.where(usable, (later - residual) / np.sqrt(1 + 2 / 3), np.nan)
+    ahead = np.searchsorted(run.time, run.time + period - 0.25 * width)
+    inside = ahead < len(run.time)
+    now = np.flatnonzero(inside)
+    later = ahead[inside]
+    same_phase = np.abs(run.time[later] - run.time[now] - period) < 0.3 * width
+    usable = run.usable[now] & run.usable[later] & same_phase[:, np.newaxis]
+    return np.where(usable, (residual[later] - residual[now]) / np.sqrt(2), np.nan)
+
+
+def faster(run: Run, residual: NDArray, than_s: float) -> NDArray:
+    """Return a residual (m, O) less its running average over ``than_s``, NaN where it is not usable.
+
+    Next to a gap or a reversal the average is of those samples that are usable, at least half.
+    """
+    width = _blocks(run, than_s)
+    known = uniform_filter1d(run.usable.astype(float), width, axis=0, mode="nearest")
+    mean = uniform_filter1d(np.where(run.usable, residual, 0.0), width, axis=0, mode="nearest")
+    return np.where(run.usable & (known > 0.5), residual - mean / np.maximum(known, 1e-9), np.nan)
+
+
+def _blocks(run: Run, seconds: float) -> int:
+    """Return how many blocks last so long, at least 3."""
+    return max(3, round(seconds * run.motion.sample_rate_hz / run.block.decimation))
+
+
+def _correlation_time(series: Sequence[NDArray]) -> float:
+    """Return the integrated autocorrelation time in samples, at least 1."""
+    variance = np.nanmean(np.concatenate(series) ** 2)
+    total = 1.0
+    for lag in range(1, 40):
+        products = np.concatenate([s[lag:] * s[:-lag] for s in series])
+        rho = np.nanmean(products) / variance
+        if not rho > 0.05:
+            break
+        total += 2 * rho
+    return float(total)
+
+
+def _slow_share(series: Sequence[NDArray], rate_hz: float) -> float:
+    """Compare slow scatter with that of noise which is as strong between 2 and 6 Hz, and as much alike from 1 to 8 Hz.
+
+    Noise of a first order has the density 1 / (1 + (2 pi f tau)^2): how it falls from 1.5 to 6 Hz tells tau. What comes
+    in bursts is held against white noise. Samples that are not usable count as nought, which leaves ratios as they are.
+    """
+    slow, fast, before, behind = (
+        sum(_density(s, rate_hz, band) for s in series) for band in ((0.05, 1.0), (2.0, 6.0), (1.0, 2.0), (4.0, 8.0))
+    )
+    if not fast > 0.0 or not behind > 0.0:
+        return 1.0
+    known = np.concatenate(series)
+    known = known[np.isfinite(known)]
+    if np.mean(known**4) > IN_BURSTS * np.mean(known**2) ** 2:
+        return slow / fast
+    falls = before / behind
+    longest = (2.0 * np.pi * LONGEST_NOISE_S) ** 2
+    room = 36.0 - 2.25 * falls  # of the density's ratio at 1.5 and 6 Hz, solved for (2 pi tau)^2
+    squared = float(np.clip((falls - 1.0) / room, 0.0, longest)) if room > 0.0 else longest
+    return slow / fast * (1.0 + 0.25 * squared) / (1.0 + 16.0 * squared)  # that of noise, at 0.5 and 4 Hz
+
+
+def _density(series: NDArray, rate_hz: float, band: tuple[float, float]) -> float:
+    """Return the mean power of a series (k,) within a band, Hz; nought of one that is too short to tell."""
+    filled = np.nan_to_num(series)
+    if len(filled) < 64:
+        return 0.0
+    frequency = np.fft.rfftfreq(len(filled), 1.0 / rate_hz)
+    power = np.abs(np.fft.rfft(filled * np.hanning(len(filled)))) ** 2
+    return float(power[(frequency > band[0]) & (frequency < band[1])].mean())

@@ -1,0 +1,123 @@
+"""All runs as one linear regression: outputs, baseline columns, masks and folds.
+
+An *output* is one measured torque: each drive's and, where there are cuff forces, the torque about each
+joint that they exert on the person. The second pair is a second measurement of the human's share, and
+what separates causes in the drive or the structure from causes in the person.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.estimation.regression import away_from_reversals, away_from_turns, block_average
+from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.slow_motion import filtered, unsure
+from pipelines.signals.blocks import BlockAverage
+
+FOLD_S = 10.0
+"""Length of a fold where the excitation does not repeat."""
+FOLDS = 4
+
+
+@dataclass(frozen=True)
+class Run:
+    """One motion behind the regression filter, m blocks, O outputs (drives, then cuffs)."""
+
+    motion: Motion
+    block: BlockAverage
+    starts: NDArray
+    time: NDArray
+    """(m,) s."""
+    state: tuple[NDArray, NDArray, NDArray]
+    """q, dq, ddq (m, J)."""
+    measured: NDArray
+    """(m, O) N·m; NaN where there is no such output."""
+    usable: NDArray
+    """(m, O) bool."""
+    valid: NDArray
+    """(m,) bool."""
+    fold: NDArray
+    """(m,) number of the fold: whole periods, dealt out in turn."""
+    period: NDArray
+    """(m,) number of the excitation's period, -1 where it does not repeat."""
+    cutoff_hz: float | None = None
+    """Above which neither torque nor columns are looked at; None where all that blocks pass is."""
+    fast: NDArray | None = None
+    """(m, O) N·m of the torque that blocks pass and the cut-off does not."""
+
+    def average(self, full_rate: NDArray) -> NDArray:
+        """Put (n, ...) at full rate behind the regression filter: (m, ...)."""
+        return self.block.mean(self.slow(full_rate), self.starts)
+
+    def slow(self, full_rate: NDArray) -> NDArray:
+        """Return what (n, ...) at full rate holds below the cut-off, where there is one."""
+        return full_rate if self.cutoff_hz is None else filtered(self.motion, full_rate, self.cutoff_hz)
+
+    def with_fast(self, residual: NDArray) -> NDArray:
+        """Return what is left (m, O) with what is faster than the cut-off: no column foretells it, and it may hum."""
+        return residual if self.fast is None else residual + self.fast
+
+    def blocks_in(self, seconds: float) -> float:
+        """Return how many blocks last so long."""
+        return seconds * self.motion.sample_rate_hz / self.block.decimation
+
+    @property
+    def bandwidth_hz(self) -> float:
+        """Frequency at which the regression filter has lost half the power."""
+        passed = self.block.cutoff_hz(self.motion.sample_rate_hz)
+        return passed if self.cutoff_hz is None else min(passed, self.cutoff_hz)
+
+    def measured_at(self, link: Motion) -> NDArray:
+        """Return what was measured where the links move otherwise than the encoders say, (m, O) N·m."""
+        if link.q is self.motion.q or not self.has_cuffs:
+            return self.measured
+        cuffs = self.motion.cuff_torque(link.q)
+        assert cuffs is not None, "a run that has cuffs has their forces"
+        joints = len(self.motion.joints)
+        return np.hstack([self.measured[:, :joints], np.nan_to_num(self.average(cuffs))])
+
+    @property
+    def has_cuffs(self) -> bool:
+        """Whether the person's share was measured."""
+        return self.measured.shape[1] > len(self.motion.joints) and bool(self.usable[:, -1].any())
+
+
+def observe(motion: Motion, cutoff_hz: float | None = None) -> Run:
+    """Put one motion behind the regression filter, which may let nothing pass that is faster than a cut-off."""
+    block = block_average(motion)
+    starts = block.starts(motion.segment)
+    time = block.mean(motion.time, starts)
+    trusted = motion.valid if cutoff_hz is None else motion.valid & ~unsure(motion, cutoff_hz)
+    valid = block.all(trusted, starts)
+    usable = valid[:, np.newaxis] & block.all(away_from_reversals(motion), starts)
+    outputs = [motion.torque]
+    cuffs = motion.cuff_torque(motion.q) if motion.run == "with_human" else None
+    if cuffs is None:
+        outputs.append(np.full_like(motion.torque, np.nan))
+        usable = np.hstack([usable, np.zeros_like(usable)])
+    else:
+        known = np.isfinite(block.mean(cuffs, starts))
+        outputs.append(cuffs)
+        steady = block.all(away_from_turns(motion), starts)
+        usable = np.hstack([usable, (valid & steady)[:, np.newaxis] & known])
+    whole = np.nan_to_num(np.hstack(outputs))
+    slow = whole if cutoff_hz is None else filtered(motion, whole, cutoff_hz)
+    length = motion.period_s or FOLD_S
+    number = np.floor(time / length + 1e-9).astype(int)
+    # A short run has no whole period for each fold: its stretches are dealt out instead.
+    part = min(length, (time[-1] - time[0]) / FOLDS + 1e-6)
+    return Run(
+        motion=motion,
+        block=block,
+        starts=starts,
+        time=time,
+        state=(block.mean(motion.q, starts), block.mean(motion.dq, starts), block.mean(motion.ddq, starts)),
+        measured=block.mean(slow, starts),
+        usable=usable,
+        valid=valid,
+        fold=np.floor((time - time[0]) / part).astype(int) % FOLDS if part < length else number % FOLDS,
+        period=number if motion.period_s else np.full(len(time), -1),
+        cutoff_hz=cutoff_hz,
+        fast=None if cutoff_hz is None else block.mean(whole - slow, starts),
+    )

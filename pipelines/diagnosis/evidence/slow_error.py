@@ -1,0 +1,74 @@
+"""Residuals in the band where physics lives: below a few hertz.
+
+The torque is averaged over 25 ms, the acceleration comes from a filter that lets 8 to 12 Hz pass. Between the two
+lies what the drive's control makes of counted angles: it repeats with the motion, is no missing physics, and no
+model of the motion can foretell it. Whether error is systematic is therefore asked of longer averages.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.evidence.noise_floor import noise_floor
+from pipelines.diagnosis.evidence.observed_run import Run
+from pipelines.signals.blocks import BlockAverage
+
+SLOW_S = 0.1
+"""Length of the averages: they pass what is slower than 4.4 Hz."""
+
+
+@dataclass(frozen=True)
+class SlowError:
+    """Of each output, (O,) each; outputs that were not measured have an infinite floor."""
+
+    rms: NDArray
+    """N·m."""
+    floor: NDArray
+    """N·m, from what does not repeat."""
+    independent: NDArray
+    """Independent samples."""
+
+    @property
+    def excess(self) -> NDArray:
+        """Systematic error, (O,) N·m."""
+        return np.sqrt(np.maximum(self.rms**2 - self.floor**2, 0.0))
+
+    @property
+    def sureness(self) -> NDArray:
+        """Systematic power in standard errors of the floor's, (O,)."""
+        return ((self.rms / self.floor) ** 2 - 1.0) / np.sqrt(2.0 / np.maximum(self.independent, 1.0))
+
+    def over(self, other: "SlowError") -> "SlowError":
+        """Return the same error over another's floor: what does not repeat in itself is in one's own."""
+        return replace(self, floor=other.floor, independent=other.independent)
+
+
+def slow_error(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SlowError:
+    """Return the error of residuals (m, O) in the slow band."""
+    slow = [slowed(run, residual) for run, residual in zip(runs, residuals, strict=True)]
+    longer = [run for run, _ in slow]
+    floor = noise_floor(longer, [residual for _, residual in slow])
+    squares = [np.sum(np.where(run.usable, r, 0.0) ** 2, axis=0) for run, r in slow]
+    count = np.maximum(np.sum([run.usable.sum(axis=0) for run in longer], axis=0), 1)
+    rms = np.sqrt(np.sum(squares, axis=0) / count)
+    independent = count * floor.independent_share
+    # Where not even a second's worth of samples could be compared the floor is unknown: nothing is systematic.
+    known = np.where(np.isfinite(floor.rms), floor.rms, np.inf)
+    return SlowError(rms, known, independent)
+
+
+def slowed(run: Run, residual: NDArray, length_s: float = SLOW_S, needed: float = 1.0) -> tuple[Run, NDArray]:
+    """Average neighbouring blocks to a length, (m/k, O), where a share of them is usable; never across a gap."""
+    width = run.block.decimation / run.motion.sample_rate_hz
+    k = max(1, round(length_s / width))
+    whole = len(residual) // k * k
+    time = run.time[:whole].reshape(-1, k)
+    together = time[:, -1] - time[:, 0] < (k - 0.5) * width
+    there = run.usable[:whole].reshape(-1, k, residual.shape[1])
+    count = there.sum(axis=1)
+    mean = np.where(there, residual[:whole].reshape(there.shape), 0.0).sum(axis=1) / np.maximum(count, 1)
+    usable = (count >= needed * k) & together[:, np.newaxis]
+    longer = replace(run, time=time.mean(axis=1), usable=usable, block=BlockAverage(k * run.block.decimation))
+    return longer, mean

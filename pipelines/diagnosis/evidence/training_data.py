@@ -1,0 +1,103 @@
+"""A session made ready: eligible, its faults marked, downsampled, split by purpose, observed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.contracts.joints import the
+from pipelines.diagnosis.data_faults import Fault, excluding, find_faults
+from pipelines.diagnosis.evidence.baseline import Baseline, baseline_of
+from pipelines.diagnosis.evidence.downsampling import thinned
+from pipelines.diagnosis.evidence.eligibility import refuse_unfit
+from pipelines.diagnosis.evidence.known_effects import known_effects
+from pipelines.diagnosis.evidence.noise_floor import noise_floor
+from pipelines.diagnosis.evidence.observed_run import Run, observe
+from pipelines.errors import InputError
+from pipelines.estimation.angle_noise import CUTOFF_HZ, is_loud
+from pipelines.mechanics.motion import Motion
+from pipelines.mechanics.origin import giving
+from pipelines.mechanics.scale import on_one_scale
+
+WHY = {"train": "causes are searched there", "validate": "the gain is measured there"}
+
+
+@dataclass(frozen=True)
+class TrainingData:
+    """The runs of one session, as everything after takes them."""
+
+    train: tuple[Run, ...]
+    validate: tuple[Run, ...]
+    baseline: Baseline
+    faults: tuple[Fault, ...]
+    noisy_angles: bool
+    """Whether only what is below 5 Hz is looked at, for the angles are noise above."""
+
+    @property
+    def spoilt(self) -> list[Fault]:
+        """Faults of acquisition that keep physics from being looked at."""
+        return [fault for fault in self.faults if fault.spoils]
+
+
+def training_data(motions: Sequence[Motion], known: Sequence[str] = ()) -> TrainingData:
+    """Make a session's motions ready.
+
+    Parameters
+    ----------
+    motions : sequence of Motion
+        Runs of one machine, some to train and some to validate.
+    known : sequence of str
+        Labels of what the machine is known to have besides rigid body and friction.
+
+    Raises
+    ------
+    InputError
+        Where runs are missing or too short, or no baseline can have what is ``known``.
+    """
+    motions = on_one_scale(motions)
+    refuse_unfit(motions)
+    effects = known_effects(known, motions[0].machine)
+    faults = tuple(find_faults(motions))
+    valid = [thinned(motion) for motion in excluding(motions, faults) if motion.valid.any()]
+    _refuse_missing_purpose(valid)
+    runs = [observe(motion) for motion in valid]
+    noisy = is_loud([motion for motion in valid if motion.purpose == "train"])
+    if noisy:
+        runs = [observe(motion, CUTOFF_HZ) for motion in valid]
+    train, validate = (_of(runs, purpose) for purpose in WHY)
+    if not any(fault.spoils for fault in faults):
+        _refuse_unknown_noise(validate)
+    return TrainingData(train, validate, baseline_of(train, effects), faults, noisy)
+
+
+def _of(runs: Sequence[Run], purpose: str) -> tuple[Run, ...]:
+    return tuple(run for run in runs if run.motion.purpose == purpose)
+
+
+def _refuse_missing_purpose(motions: Sequence[Motion]) -> None:
+    """Refuse motions of which none is to train or to validate, or a kind is to validate only."""
+    listed = ", ".join(f"{m.file} ({m.run}, {m.purpose})" for m in motions) or "none"
+    for purpose, why in WHY.items():
+        if not any(m.purpose == purpose for m in motions):
+            raise InputError(f"found no run to {purpose} on among: {listed}; {why}: {giving(purpose, motions)}")
+    trained = {m.run for m in motions if m.purpose == "train"}
+    strangers = [m.file for m in motions if m.purpose == "validate" and m.run not in trained]
+    if strangers:
+        raise InputError(
+            f"{strangers[0]} is the only kind of run without one to train on: {listed}; "
+            "record a train run of that kind, or leave it out"
+        )
+
+
+def _refuse_unknown_noise(validate: Sequence[Run]) -> None:
+    """Refuse validation runs of which too little is usable to tell noise from error."""
+    joints = validate[0].motion.joints
+    floor = noise_floor(validate, [run.measured for run in validate]).rms[: len(joints)]
+    for j, joint in enumerate(joints):
+        if not np.isfinite(floor[j]):
+            usable = sum(int(run.usable[:, j].sum()) for run in validate)
+            raise InputError(
+                f"{', '.join(run.motion.file for run in validate)}: {usable} blocks away from "
+                f"{the(joint)}'s reversals, too few in a row to tell noise from error; "
+                "validate on longer runs"
+            )

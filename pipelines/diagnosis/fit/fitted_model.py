@@ -1,0 +1,71 @@
+"""A fit as a model, as replays and control loops take it: the one that ``parameters.parquet`` tells of."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.evidence.baseline import Baseline
+from pipelines.diagnosis.evidence.observed_run import Run
+from pipelines.diagnosis.fit import parameter_rows
+from pipelines.diagnosis.fit.change_point import ALWAYS, NEVER
+from pipelines.diagnosis.fit.held_out import settled
+from pipelines.diagnosis.fit.joint_fit import Fit
+from pipelines.diagnosis.fit.uncertainty import Uncertainty
+from pipelines.effects import Effect
+from pipelines.model import Model, model_from_parameters
+
+
+def fitted_model(made: Fit, baseline: Baseline, kind: str) -> Model:
+    """Return a fit as the model of a kind of run; what each run has for itself is as in the first one fitted."""
+    # Nobody asks how sure the values are.
+    size = len(made.values)
+    frame, _ = parameter_rows.parameters(made, baseline, Uncertainty(np.zeros((size, size)), 1.0, (), np.eye(size)))
+    return model_from_parameters(frame, kind, baseline.machine)
+
+
+def model_of_run(made: Fit, baseline: Baseline, run: Run) -> Model:
+    """Return a fit as the model of one run, with the onsets and phases that it has for itself."""
+    model = fitted_model(made, baseline, run.motion.run)
+    if not any(cause.effect.per_run for cause in made.causes):
+        return model
+    own = {term.effect.label: term.values for term in settled(made, run, baseline)}
+    return Model(tuple(replace(t, values=own.get(t.effect.label, t.values)) for t in model))
+
+
+def values_of_each_run(
+    made: Fit, baseline: Baseline, sure: Uncertainty, train: Sequence[Run], validate: Sequence[Run]
+) -> dict[str, list[dict[str, Any]]]:
+    """Return what each run has for itself of the causes that have such values, by label, as ``verdict.json`` tells.
+
+    Those of the runs that were trained on are the fit's own, with its intervals; the others were learnt from their
+    runs, all else held, and have none.
+    """
+    told: dict[str, list[dict[str, Any]]] = {c.label: [] for c in made.causes if c.effect.per_run}
+    for number, cause in enumerate(made.causes):
+        for r in made.columns_of(number).runs if cause.label in told else ():
+            told[cause.label].append(
+                _told(cause.effect, train[r], *parameter_rows.values_in_run(made, sure, number, r))
+            )
+    for run in validate if told else ():
+        for term in settled(made, run, baseline):
+            if term.effect.label in told and term.effect.explains(run.motion):
+                told[term.effect.label].append(_told(term.effect, run, term.effect.physical(term.values)))
+    return told
+
+
+def _told(effect: Effect, run: Run, values: NDArray, ends: NDArray | None = None) -> dict[str, Any]:
+    """Return what a run has for itself of values (p,), and the ends (p, 2) of their intervals, as a verdict tells it.
+
+    An instant outside the run is none: what never came has no value, and what was there all along came at its begin.
+    """
+    own = {p.name: i for i, p in enumerate(effect.parameters) if p.per_run}
+    came, values = values < NEVER, np.where(values <= ALWAYS, 0.0, values)
+    return {
+        "file": run.motion.file,
+        "purpose": run.motion.purpose,
+        "values": {name: float(values[i]) if came[i] else None for name, i in own.items()},
+        "ci95": {name: ends[i].tolist() if ends is not None and came[i] else None for name, i in own.items()},
+    }

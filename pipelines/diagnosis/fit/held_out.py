@@ -1,0 +1,139 @@
+"""What a model leaves of the validation runs, which no fit has seen.
+
+Shared parameters come from training. What is tied to wall time, an onset or a phase, or set anew at each start, each
+validation run fits for itself: on one half of its seconds to be scored on the other, and the other way round.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.candidates.columns import columns_under
+from pipelines.diagnosis.evidence.baseline import Baseline
+from pipelines.diagnosis.evidence.observed_run import Run
+from pipelines.diagnosis.fit.change_point import ALWAYS, NEVER, Onset
+from pipelines.diagnosis.fit.joint_fit import NEWTON_STEPS, Fit, laden, step_of, within_reach
+from pipelines.model import Model, Term
+
+STRETCH_S = 1.0
+"""Of every second stretch a run's own onsets and phases are learnt, to be scored on the others."""
+ROUNDS = 2
+"""How often onsets are sought and all else fitted anew, for each is found with the others held."""
+
+
+def evaluate(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> list[NDArray]:
+    """Return the residuals (m, O) of each run under a model fitted elsewhere."""
+    return [_residual(fit, run, baseline) for run in laden(runs, fit, baseline)]
+
+
+def _residual(fit: Fit, run: Run, baseline: Baseline) -> NDArray:
+    effects = [cause.effect for cause in fit.causes]
+    if not any(effect.per_run and effect.explains(run.motion) for effect in effects):
+        columns, measured = columns_under([_shared_term(c) for c in fit.causes], run, baseline)
+        return measured - columns @ fit.layout.select(fit.values, None)
+    half = _halves(run)
+    left = np.zeros_like(run.measured)
+    for side in (0, 1):
+        scored = half == side
+        left[scored] = _learn(fit, run, baseline, run.usable & ~scored[:, np.newaxis])[1][scored]
+    return left
+
+
+def _halves(run: Run) -> NDArray:
+    """Deal the blocks out to two halves, second by second: an onset is as well known as that.
+
+    In Thue and Morse's order, which no rhythm shares.
+    """
+    return np.bitwise_count(np.floor((run.time - run.time[0]) / STRETCH_S).astype(np.int64)) % 2
+
+
+def _shared_term(cause: Candidate) -> Term:
+    return cause.term(0)
+
+
+def settled(fit: Fit, run: Run, baseline: Baseline) -> list[Term]:
+    """Return the causes as terms of a run's model with its own onsets and phases."""
+    values, _, terms = _learn(fit, laden([run], fit, baseline)[0], baseline, run.usable)
+    return list(Model(tuple(terms)).with_linear(values[baseline.size :])) if terms else []
+
+
+Learnt = tuple[NDArray, NDArray, list[Term]]
+"""Values, residual (m, O), and the terms with a run's own onsets."""
+
+
+def _learn(fit: Fit, run: Run, baseline: Baseline, learnt: NDArray) -> Learnt:
+    """Fit the run's own onsets, phases and bends to those samples that are to be learnt from, (m, O)."""
+    begins = [(number, i) for number, cause in enumerate(fit.causes) if (i := cause.onset) is not None]
+    terms = [_shared_term(cause) for cause in fit.causes]
+    for place in begins:
+        terms = _with_shape(terms, *place, NEVER)
+    made = _learn_amplitudes(fit, terms, run, baseline, learnt)
+    for _ in range(ROUNDS if begins else 0):
+        for place in begins:
+            instant = _begun(fit, made, place, run, baseline, learnt)
+            made = _learn_amplitudes(fit, _with_shape(made[2], *place, instant), run, baseline, learnt)
+    return made
+
+
+def _begun(fit: Fit, made: Learnt, place: tuple[int, int], run: Run, baseline: Baseline, learnt: NDArray) -> float:
+    """Return the instant (s) at which a cause begins, all else held."""
+    values, _, terms = made
+    ends = [columns_under(_with_shape(terms, *place, end), run, baseline) for end in (NEVER, ALWAYS)]
+    without, throughout = (measured - columns @ values for columns, measured in ends)
+    return Onset.of(run, without, throughout, learnt, fit.weights).likeliest
+
+
+def _learn_amplitudes(fit: Fit, terms: list[Term], run: Run, baseline: Baseline, learnt: NDArray) -> Learnt:
+    """Fit the run's own amplitudes and bends to samples (m, O)."""
+    shared, own = fit.layout.select(fit.values, None), fit.layout.per_run
+    bent, (columns, measured) = _bent(fit, terms, run, baseline, columns_under(terms, run, baseline), learnt)
+    values = shared.copy()
+    values[own] = _solved(columns[:, :, own], measured - columns @ shared, learnt, fit.weights)
+    return values, measured - columns @ values, bent
+
+
+def _bent(
+    fit: Fit, terms: list[Term], run: Run, baseline: Baseline, plain: tuple[NDArray, NDArray], learnt: NDArray
+) -> tuple[list[Term], tuple[NDArray, NDArray]]:
+    """Fit to some samples, (m, O), what bends the run in a way of its own; return the terms, and columns under them.
+
+    By Gauss and Newton's steps, as in ``fit.refined``; ``plain`` are the columns and torques under the terms as given.
+    """
+    shared, own = fit.layout.select(fit.values, None), fit.layout.per_run
+    places = [(number, i) for number, cause in enumerate(fit.causes) if (i := cause.own_bend) is not None]
+    for _ in range(NEWTON_STEPS if places else 0):
+        columns, measured = plain
+        slopes = [_slope(fit, terms, place, shared, run, baseline, plain) for place in places]
+        wide = np.concatenate([columns[:, :, own], *slopes], axis=2)
+        steps = _solved(wide, measured - columns @ shared, learnt, fit.weights)[int(own.sum()) :]
+        for (number, i), step in zip(places, steps, strict=True):
+            value = within_reach(terms[number].shape[i] + step, fit.causes[number].effect.shape[i])
+            terms = _with_shape(terms, number, i, value)
+        plain = columns_under(terms, run, baseline)
+    return terms, plain
+
+
+def _solved(columns: NDArray, left: NDArray, learnt: NDArray, weights: NDArray) -> NDArray:
+    """Return the amplitudes (k,) of columns (m, O, k) that explain most of what is left (m, O) where it is learnt."""
+    root = np.sqrt(weights) * learnt
+    A = (columns * root[:, :, np.newaxis]).reshape(root.size, columns.shape[2])
+    return np.asarray(np.linalg.lstsq(A, (left * root).ravel(), rcond=1e-9)[0])
+
+
+def _slope(
+    fit: Fit, terms: list[Term], place: tuple[int, int], values: NDArray, run: Run, baseline: Baseline,
+    plain: tuple[NDArray, NDArray],
+) -> NDArray:  # fmt: skip
+    """Return the column (m, O, 1) of a shape of one term, as ``fit.slope`` does of all runs."""
+    number, i = place
+    step = step_of(fit.causes[number], i)
+    ahead, read = columns_under(_with_shape(terms, number, i, terms[number].shape[i] + step), run, baseline)
+    columns, measured = plain
+    return (((ahead @ values - read) - (columns @ values - measured)) / step)[:, :, np.newaxis]
+
+
+def _with_shape(terms: list[Term], number: int, i: int, value: float) -> list[Term]:
+    """Return the terms with another shape of one of them."""
+    return [term.with_shape(i, value) if k == number else term for k, term in enumerate(terms)]

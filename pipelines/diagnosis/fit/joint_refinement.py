@@ -1,0 +1,130 @@
+"""All shapes of a set of causes refined together, at the full rate: Gauss and Newton's method.
+
+Each step solves for amplitudes and shapes at once, along the slopes of the prediction, and is
+halved until it lowers the cost. Instants at which something begins are found exactly in between.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.candidates.columns import gram_of_runs
+from pipelines.diagnosis.candidates.gram import solve
+from pipelines.diagnosis.candidates.shape_refinement import changed, free_shapes, unit_at
+from pipelines.diagnosis.evidence.baseline import Baseline, with_load
+from pipelines.diagnosis.evidence.observed_run import Run
+from pipelines.diagnosis.fit.joint_fit import Fit, fit, onsets_of, slope, stacked_columns
+
+ROUNDS = 3
+"""Rounds in which loads follow the rigid bodies that they are of."""
+STEPS = 3
+"""Steps of a round."""
+HALVINGS = 3
+ENOUGH = 1e-4
+"""Relative fall of the cost below which a round has converged."""
+
+Place = tuple[int, int, int, float]
+"""Cause, shape parameter, run (-1 where runs share it), and its unit of change."""
+
+
+class Refinement:
+    """Refines the shapes of one set of causes on the training runs."""
+
+    def __init__(self, runs: Sequence[Run], baseline: Baseline, weights: NDArray) -> None:
+        """Prepare; ``weights`` (O,) are the outputs' inverse variances."""
+        self._runs, self._baseline, self._weights = runs, baseline, weights
+
+    def __call__(self, causes: Sequence[Candidate]) -> Fit:
+        """Return the fit with every shape at its best."""
+        best = self._fit(causes, self._runs, None)
+        for _ in range(ROUNDS if causes else 0):
+            # The bodies of the fit before were biased by what was missing, and so were the loads.
+            loads = best.values
+            runs = [with_load(run, self._baseline, loads) for run in self._runs]
+            start = self._fit(best.causes, runs, loads)
+            ahead = self._round(start, runs)
+            done = ahead.cost > best.cost - ENOUGH * abs(best.cost)
+            best = ahead
+            if done:
+                break
+        return best
+
+    def _fit(self, causes: Sequence[Candidate], runs: Sequence[Run], loads: NDArray | None) -> Fit:
+        return fit(causes, runs, self._baseline, self._weights, loads)
+
+    def _round(self, best: Fit, runs: Sequence[Run]) -> Fit:
+        """Return the fit after a few steps with the loads held."""
+        best = self._forms(best, runs)
+        for _ in range(STEPS):
+            best = self._onsets(best, runs)
+            ahead = self._step(best, runs)
+            if ahead is None:
+                break
+            best = ahead
+        return best
+
+    def _forms(self, best: Fit, runs: Sequence[Run]) -> Fit:
+        """Return the best of a transmission's forms: the library has only its straight one."""
+        tried = [best]
+        for number, cause in enumerate(best.causes):
+            for i, parameter in enumerate(cause.effect.shape):
+                for form in parameter.forms if cause.bends else ():
+                    if form != cause.shapes[0][i]:
+                        causes = best.instead(number, cause.reshaped(i, form))
+                        tried.append(self._fit(causes, runs, best.loads))
+        return min(tried, key=lambda made: made.cost)
+
+    def _onsets(self, best: Fit, runs: Sequence[Run]) -> Fit:
+        """Move instants at which causes begin to where they explain most, all else held."""
+        for number, cause in enumerate(best.causes):
+            if (i := cause.onset) is None:
+                continue
+            found = onsets_of(best, number, i, runs, self._baseline)
+            acting = best.columns_of(number).runs
+            instants = [found[r].likeliest if r in acting else shape[i] for r, shape in enumerate(cause.shapes)]
+            causes = best.instead(number, cause.with_own(i, instants))
+            best = min((best, self._fit(causes, runs, best.loads)), key=lambda made: made.cost)
+        return best
+
+    def _step(self, best: Fit, runs: Sequence[Run]) -> Fit | None:
+        """Return the fit after one step that lowers the cost; None where there is none."""
+        places = self._places(best)
+        if not places:
+            return None
+        plain = stacked_columns(best.causes, runs, self._baseline)
+        slopes = [slope(best, place[:3], runs, self._baseline, plain) for place in places]
+        wide = [
+            np.concatenate([columns, np.stack([s[r] for s in slopes], axis=2)], axis=2)
+            for r, (columns, _) in enumerate(plain)
+        ]
+        gram = gram_of_runs(runs, wide, [measured for _, measured in plain])
+        steps = solve(gram, self._weights)[len(best.values) :]
+        length = 1.0
+        for _ in range(HALVINGS):
+            causes = _moved(best.causes, places, length * steps)
+            ahead = self._fit(causes, runs, best.loads)
+            if ahead.cost < best.cost:
+                return ahead
+            length *= 0.5
+        return None
+
+    def _places(self, made: Fit) -> list[Place]:
+        """Return the free shapes: of a cause that bends each run in its own way, one of each."""
+        places: list[Place] = []
+        for number, cause in enumerate(made.causes):
+            for i, unit in free_shapes(cause):
+                own = i == cause.own_bend
+                acting = made.columns_of(number).runs if own else (-1,)
+                places += [(number, i, run, unit) for run in acting]
+        return places
+
+
+def _moved(causes: Sequence[Candidate], places: Sequence[Place], steps: NDArray) -> list[Candidate]:
+    """Return the causes after steps of their shapes, each in its own unit, not in units of change."""
+    moved = list(causes)
+    for (number, i, run, unit), step in zip(places, steps, strict=True):
+        of_unit = step / unit_at(moved[number], i, unit, max(run, 0))
+        moved[number] = changed(moved[number], i, unit, of_unit, None if run < 0 else [run])
+    return moved

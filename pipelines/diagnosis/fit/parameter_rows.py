@@ -1,0 +1,129 @@
+"""The tables a diagnosis writes: parameters of the extended model, residuals before and after, candidates."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipelines.contracts.joints import joints_of
+from pipelines.diagnosis.evidence.baseline import Baseline
+from pipelines.diagnosis.evidence.observed_run import Run
+from pipelines.diagnosis.fit.joint_fit import Fit
+from pipelines.diagnosis.fit.uncertainty import Uncertainty
+from pipelines.diagnosis.fit.validation_error import scored
+from pipelines.effects import RUNS
+from pipelines.effects.force_sensor_zero import ForceSensorZero
+from pipelines.effects.rigid_body import RigidBody
+from pipelines.estimation.parameter_table import Row, interval, rows_of, table_of
+
+
+def parameters(fit: Fit, baseline: Baseline, sure: Uncertainty) -> tuple[pd.DataFrame, NDArray]:
+    """Return ``parameters/1`` of a fit, p rows, and their covariance (p, p).
+
+    A rigid body for each kind of run, and the human's.
+    """
+    units = np.eye(len(sure.covariance))
+    values = np.append(fit.values, np.zeros(len(units) - len(fit.values)))
+    rows: list[Row] = []
+    for run, bodies in _bodies(baseline).items():
+        slopes = units[bodies].sum(axis=0)
+        rows += rows_of(RigidBody(run=run, on=baseline.machine), slopes @ values, slopes, "inertia")
+    for term in baseline.layout.terms:
+        if not isinstance(term.effect, (RigidBody, ForceSensorZero)):
+            step = "extension" if term.effect in baseline.known else "friction"
+            fitted = term.effect.completed(values[term.slice])
+            rows += rows_of(term.effect, fitted, units[term.slice], step)
+    onsets: dict[int, tuple[float, float]] = {}
+    for number in range(len(fit.causes)):
+        first = fit.columns_of(number).runs[0]
+        onsets |= {len(rows) + at: ends for at, ends in _onsets(fit, sure, number, first).items()}
+        effect = fit.causes[number].effect
+        fitted, slopes = _in_run(fit, sure, number, first)
+        rows += rows_of(effect, fitted, slopes, "extension", positive=effect.parameters)
+    T = np.array([row.slope for row in rows])
+    covariance = T @ sure.covariance @ T.T
+    frame = table_of(rows, np.sqrt(np.maximum(np.diag(covariance), 0.0)), sure.critical)
+    for row, ends in onsets.items():
+        frame.loc[row, ["ci95_low", "ci95_high"]] = ends
+    return frame, covariance
+
+
+def _onsets(fit: Fit, sure: Uncertainty, number: int, run: int) -> dict[int, tuple[float, float]]:
+    """Return the ends of the interval of the instant at which a cause begins in a run, by its place among the cause's
+    parameters; nothing where it has none."""
+    linear = len(fit.causes[number].effect.linear)
+    return {linear + i: ends for (which, i, r), ends in sure.onsets.items() if (which, r) == (number, run)}
+
+
+def _bodies(baseline: Baseline) -> dict[str, NDArray]:
+    """Return the columns of the rigid bodies, (bodies, parameters), whose sum each row of a body tells of."""
+    layout = baseline.layout
+    if len(layout.bodies) == 1:
+        return {baseline.kinds[0]: layout.bodies_in(baseline.kinds[0])}
+    every = {kind: layout.bodies_in(kind) for kind in RUNS}
+    return {**every, "human": every["with_human"][1:]}
+
+
+def _in_run(fit: Fit, sure: Uncertainty, number: int, run: int) -> tuple[NDArray, NDArray]:
+    """Return a cause's fitted values in a run that it was fitted to and acts in, (p,), and their slopes.
+
+    The slopes, (p, size), are how they change with what the covariance is of.
+    """
+    cause, columns = fit.causes[number], fit.columns_of(number)
+    linear = len(cause.effect.linear)
+    slopes = np.zeros((len(cause.effect.fitted), len(sure.covariance)))
+    slopes[np.arange(linear), columns.places(run)] = 1.0
+    for order, (which, i, r) in enumerate(sure.shapes):
+        if which == number and r in (-1, run):
+            slopes[linear + i, len(fit.values) + order] = 1.0
+    fitted = columns.select(fit.values, run, np.zeros(linear))
+    return np.append(fitted, cause.shapes[run]), slopes
+
+
+def values_in_run(fit: Fit, sure: Uncertainty, number: int, run: int) -> tuple[NDArray, NDArray]:
+    """Return a cause's parameters in a run that it was fitted to, (p,), and the ends of their intervals, (p, 2)."""
+    effect = fit.causes[number].effect
+    fitted, fitted_slopes = _in_run(fit, sure, number, run)
+    values, slopes = effect.physical(fitted), effect.jacobian(fitted) @ fitted_slopes
+    error = np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", slopes, sure.covariance, slopes), 0.0))
+    one_way = np.array([p.typical[0] >= 0 for p in effect.parameters])
+    ends = interval(values, sure.critical * error, one_way)
+    for at, own in _onsets(fit, sure, number, run).items():
+        ends[at] = own
+    return values, ends
+
+
+def residual_rows(run: Run, residual: NDArray, model: str) -> pd.DataFrame:
+    """Return a run's rows of ``residuals/1`` for what a model leaves of it, (m, O) N·m."""
+    joints = joints_of(run.motion.metadata)
+    J = len(joints)
+    columns: dict[str, Any] = {
+        "file": np.full(len(run.time), run.motion.file),
+        "run": run.motion.run,
+        "purpose": run.motion.purpose,
+        "segment": run.motion.segment[run.starts],
+        "time_s": run.time,
+        "model": model,
+        "scored": scored(run),
+    }
+    quantities: Mapping[str, NDArray] = {
+        "angle": run.state[0], "velocity": run.state[1], "acceleration": run.state[2], "torque": run.measured[:, :J],
+        "predicted": run.measured[:, :J] - residual[:, :J], "residual": residual[:, :J],
+    }  # fmt: skip
+    for j, joint in enumerate(joints):
+        columns |= {joint.column(name): values[:, j] for name, values in quantities.items()}
+    return pd.DataFrame(columns)
+
+
+def residual_table(runs: Sequence[Run], by_model: Mapping[str, Sequence[NDArray]]) -> pd.DataFrame:
+    """Return ``residuals/1`` of several runs under several models, each residual (m, O) N·m."""
+    return pd.concat(
+        [
+            residual_rows(run, residual, model)
+            for model, residuals in by_model.items()
+            for run, residual in zip(runs, residuals, strict=True)
+        ],
+        ignore_index=True,
+    )

@@ -1,0 +1,101 @@
+"""Intervals of an extended model's parameters, shapes included, that survive autocorrelation and small misfit."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+
+from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.evidence.baseline import Baseline
+from pipelines.diagnosis.evidence.observed_run import Run
+from pipelines.diagnosis.evidence.slow_error import slow_error
+from pipelines.diagnosis.fit.change_point import ALIKE_S
+from pipelines.diagnosis.fit.joint_fit import Fit, laden, onsets_of, slope, stacked_columns
+from pipelines.estimation.long_run import long_run_covariance
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Joint covariance of the linear values and the free shapes."""
+
+    covariance: NDArray
+    critical: float
+    shapes: tuple[tuple[int, int, int], ...]
+    """(cause, shape parameter, run) behind each shape's place after the linear values; run -1 where shared."""
+    normal: NDArray
+    """Weighted normal matrix of the same parameters in the same order: what collinearity is read from."""
+    onsets: Mapping[tuple[int, int, int], tuple[float, float]] = field(default_factory=dict)
+    """Of those shapes that are instants at which a cause begins, the ends of the 95 % interval, s."""
+
+
+def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: NDArray) -> Uncertainty:
+    """Linearise about a fit: its columns, and what a step in each free shape does to the prediction.
+
+    Beside the noise stands what the model gets wrong with the motion: what it leaves of slow error, and at the least
+    what no model of a good rig gets right, ``imperfect`` (O,) N·m rms. It is small against the noise, but much alike
+    from sample to sample, and so the larger part of what hours of data leave in doubt. Shapes that are not fitted but
+    taken at a usual value may be anywhere in their typical range. When something begins is known so much better than
+    how large it is that neither makes the other less sure.
+    """
+    runs = laden(runs, fit, baseline)
+    plain = stacked_columns(fit.causes, runs, baseline)
+    columns = [c for c, _ in plain]
+    left = [y - c @ fit.values for c, y in plain]
+    places = _shapes(fit.causes, len(runs), fitted=True)
+    slopes = [slope(fit, place, runs, baseline, plain) for place in places]
+    wide = [np.concatenate([c, *(s[r][:, :, np.newaxis] for s in slopes)], axis=2) for r, c in enumerate(columns)]
+    weights = fit.weights
+    gram = sum(np.einsum("mo,o,moi,moj->ij", run.usable, weights, a, a) for run, a in zip(runs, wide, strict=True))
+    scores = [
+        np.einsum("mo,o,mo,moi->mi", run.usable, weights, e, a) for run, e, a in zip(runs, left, wide, strict=True)
+    ]
+    filling, critical, _ = long_run_covariance(lambda: enumerate(scores), gram.shape[0])
+    misfit = np.maximum(imperfect, slow_error(runs, left).excess)
+    for run, a in zip(runs, wide, strict=True):
+        filling = filling + np.einsum(
+            "mo,o,moi,moj->ij", run.usable, run.blocks_in(ALIKE_S) * (weights * misfit) ** 2, a, a
+        )
+    for place in _shapes(fit.causes, len(runs), fitted=False):
+        low, high = fit.causes[place[0]].effect.shape[place[1]].typical
+        assumed = slope(fit, place, runs, baseline, plain)
+        pull = sum(
+            np.einsum("mo,o,moi,mo->i", run.usable, weights, a, s)
+            for run, a, s in zip(runs, wide, assumed, strict=True)
+        )
+        filling = filling + np.outer(pull, pull) * (high - low) ** 2 / 12.0
+    inverse = np.linalg.pinv(gram, rcond=1e-13, hermitian=True)
+    covariance = inverse @ filling @ inverse
+    for at, (number, i, r) in enumerate(places, start=len(fit.values)):
+        if i == 0:
+            cause = fit.causes[number]
+            covariance[at, at] += (cause.effect.known_to * cause.shapes[max(r, 0)][0]) ** 2
+    onsets = _onsets(fit, runs, baseline, misfit)
+    return Uncertainty(
+        block_diag(covariance, *(((high - low) / (2.0 * critical)) ** 2 for low, high in onsets.values())),
+        critical, (*places, *onsets), block_diag(gram, np.zeros((len(onsets), len(onsets)))), onsets,
+    )  # fmt: skip
+
+
+def _onsets(
+    fit: Fit, runs: Sequence[Run], baseline: Baseline, misfit: NDArray
+) -> dict[tuple[int, int, int], tuple[float, float]]:
+    """Return the ends of the interval of each instant at which a cause begins, by (cause, shape parameter, run)."""
+    ends: dict[tuple[int, int, int], tuple[float, float]] = {}
+    for number, cause in enumerate(fit.causes):
+        if (i := cause.onset) is not None:
+            onsets = onsets_of(fit, number, i, runs, baseline)
+            ends |= {(number, i, r): onsets[r].interval(runs[r], misfit) for r in fit.columns_of(number).runs}
+    return ends
+
+
+def _shapes(causes: Sequence[Candidate], runs: int, fitted: bool) -> list[tuple[int, int, int]]:
+    """Return shapes but onsets that are fitted, or not: (cause, shape parameter, run), run -1 where all share it."""
+    return [
+        (number, i, run)
+        for number, cause in enumerate(causes)
+        for i, parameter in enumerate(cause.effect.shape)
+        if cause.is_free(i) == fitted and not parameter.forms and i != cause.onset
+        for run in (range(runs) if parameter.per_run else (-1,))
+    ]

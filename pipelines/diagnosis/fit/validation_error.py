@@ -1,0 +1,80 @@
+"""What naming causes gains on validation runs, with an interval from whole periods.
+
+A cause's gain, wherever a user reads of one, is what the error grows by where that cause alone is left out and all
+else is fitted anew. What a set of causes takes together is of the error of rigid body and friction.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.evidence.observed_run import Run
+
+RESAMPLES = 500
+STRETCH_S = 5.0
+"""Length of a bootstrap block where the excitation does not repeat."""
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Squared errors of one model on the validation runs, in blocks of whole periods."""
+
+    squares: NDArray
+    """(b, J) sums over scored samples."""
+    counts: NDArray
+    """(b,)."""
+    unmasked: NDArray
+    """(J,) rms on every valid sample, N·m."""
+
+    @property
+    def rms(self) -> NDArray:
+        """(J,) N·m over all scored samples."""
+        return np.sqrt(self.squares.sum(axis=0) / max(self.counts.sum(), 1))
+
+
+def scored(run: Run) -> NDArray:
+    """Tell which samples the RMSE counts: every drive's output usable, (m,) bool."""
+    return np.asarray(run.usable[:, : len(run.motion.joints)].all(axis=1))
+
+
+def errors_of(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Errors:
+    """Sum up the residuals (m, O) of each run's drives."""
+    squares, counts, everywhere, valid = [], [], 0.0, 0
+    for run, residual in zip(runs, residuals, strict=True):
+        J = len(run.motion.joints)
+        chosen = scored(run)
+        length = run.motion.period_s or STRETCH_S
+        number = np.floor(run.time / length).astype(int)
+        number -= number.min()
+        own = np.zeros((number.max() + 1, J))
+        np.add.at(own, number[chosen], residual[chosen, :J] ** 2)
+        squares.append(own)
+        counts.append(np.bincount(number[chosen], minlength=number.max() + 1))
+        everywhere = everywhere + np.sum(residual[run.valid, :J] ** 2, axis=0)
+        valid += int(run.valid.sum())
+    return Errors(np.concatenate(squares), np.concatenate(counts), np.sqrt(everywhere / max(valid, 1)))
+
+
+@dataclass(frozen=True)
+class Gain:
+    """RMSE before less after at one joint, N·m."""
+
+    joint: int
+    value: float
+    low: float
+    high: float
+
+
+def gain(before: Errors, after: Errors, joint: int | None = None, seed: int = 0) -> Gain:
+    """Return the gain at a joint (the one that gains most by default), its interval by resampling blocks."""
+    if joint is None:
+        joint = int(np.argmax(before.rms - after.rms))
+    rng = np.random.default_rng(seed)
+    blocks = len(before.counts)
+    drawn = rng.integers(0, blocks, (RESAMPLES, blocks))
+    counts = np.maximum(before.counts[drawn].sum(axis=1), 1)
+    worth = [np.sqrt(e.squares[drawn, joint].sum(axis=1) / counts) for e in (before, after)]
+    low, high = np.quantile(worth[0] - worth[1], [0.025, 0.975])
+    return Gain(joint, float(before.rms[joint] - after.rms[joint]), float(low), float(high))
