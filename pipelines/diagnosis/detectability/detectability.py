@@ -416,7 +416,8 @@ def _growth(
     price = 0.5 * columns * np.log(sight.independent) - CRITERIA.cause
     by_noise = needed_noncentrality(columns, price, power) / _squared(left)
     # A good rig has a little of the effect, as if its amplitude were known to so much.
-    by_background = 2.0 * price * (CRITERIA.background_cause / sight.share(effect, column)) ** 2
+    share = sight.share(effect, column)
+    by_background = 2.0 * price * (CRITERIA.background_cause / share) ** 2 if share > 0.0 else np.inf
     if by_noise >= by_background:
         return by_noise, "noise"
     return by_background, "materiality"

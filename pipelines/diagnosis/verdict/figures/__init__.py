@@ -6,10 +6,11 @@ from typing import Any
 from matplotlib import pyplot as plt
 
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.verdict.figures import budget, dependence, simulation, verdict
+from pipelines.diagnosis.verdict.figures import budget, decision, dependence, simulation, verdict
 from pipelines.plots import STYLE, save
 
 FIGURES = {
+    "decision": decision.figure,
     "verdict": verdict.figure,
     "error-budget": budget.figure,
     "simulation": simulation.figure,
