@@ -14,6 +14,8 @@ class Criteria:
     """How much of a drive row's likelihood counts: rows are not quite independent."""
     cuff_weight: float = 0.2
     """The same of a cuff row."""
+    form_misfit: float = 0.1
+    """Share of a residual's rms that counts as noise: no form of any cause follows it exactly."""
     background_law: float = 0.0005
     """Share by which each smooth law is off on a good rig."""
     background_cause: float = 0.003

@@ -9,12 +9,13 @@
 
 from collections.abc import Callable, Sequence
 
-from pipelines.diagnosis.candidates.library import Library, Prepared, build_library, prepare, silent
+from pipelines.diagnosis.candidates.library import Library, build_library, silent
 from pipelines.diagnosis.diagnosis import Diagnosis, Selected
 from pipelines.diagnosis.evidence.auxiliary_evidence import felt_in, heard_in
 from pipelines.diagnosis.evidence.baseline import like_trained, with_load
 from pipelines.diagnosis.evidence.model_error import imperfection
 from pipelines.diagnosis.evidence.noise_floor import noise_floor
+from pipelines.diagnosis.evidence.prepared_runs import Prepared, prepare
 from pipelines.diagnosis.evidence.residual_shares import ResidualShares, residual_shares
 from pipelines.diagnosis.evidence.training_data import TrainingData, training_data
 from pipelines.diagnosis.fit import parameter_rows
@@ -26,7 +27,7 @@ from pipelines.diagnosis.fit.validation import Validated, log_likelihood_ratio, 
 from pipelines.diagnosis.selection.answer import Answer, answer_of
 from pipelines.diagnosis.selection.evidence import Evidence
 from pipelines.diagnosis.selection.findings import findings
-from pipelines.diagnosis.selection.posterior import posterior
+from pipelines.diagnosis.selection.posterior import likely_contexts, posterior
 from pipelines.mechanics.motion import Motion
 
 LIBRARY_SHARE, FIT_SHARE = 0.6, 0.75
@@ -84,9 +85,12 @@ def nothing_selected(prepared: Prepared) -> Selected:
 
 
 def _evidence(prepared: Prepared, report: Report) -> tuple[Library, Evidence]:
+    """Return the library, causes refined beside the others of likely sets, and its evidence."""
     library = build_library(prepared, lambda share, what: report(LIBRARY_SHARE * share, what))
     residuals = prepared.residuals
     heard = heard_in(prepared.runs, residuals) | felt_in(prepared.runs, residuals)
+    contexts = likely_contexts(posterior(Evidence.of(library, heard)))
+    library = library.refined_together(contexts)
     return library, Evidence.of(library, heard)
 
 

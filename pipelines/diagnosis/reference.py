@@ -9,6 +9,7 @@ import inspect
 import json
 import sys
 from dataclasses import fields
+from itertools import pairwise
 from pathlib import Path
 
 from pipelines.diagnosis import criteria
@@ -30,7 +31,7 @@ def meanings() -> dict[str, str]:
     tree = ast.parse(inspect.getsource(criteria))
     (body,) = (n.body for n in tree.body if isinstance(n, ast.ClassDef) and n.name == "Criteria")
     found = {}
-    for field, below in zip(body[:-1], body[1:], strict=True):
+    for field, below in pairwise(body):
         if isinstance(field, ast.AnnAssign) and isinstance(below, ast.Expr):
             assert isinstance(field.target, ast.Name) and isinstance(below.value, ast.Constant)
             found[field.target.id] = " ".join(str(below.value.value).split())

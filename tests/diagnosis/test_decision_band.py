@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.candidates.candidate import Candidate, proposals
-from pipelines.diagnosis.candidates.columns import columns_under, signatures
+from pipelines.diagnosis.candidates.columns import signatures
+from pipelines.diagnosis.evidence.baseline_columns import columns_under
 from pipelines.diagnosis.candidates.library import prepare
 from pipelines.diagnosis.candidates.shape_grid import values_in
 from pipelines.diagnosis.evidence.baseline import baseline_of

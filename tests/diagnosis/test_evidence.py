@@ -11,7 +11,7 @@ from scipy.signal import butter, lfilter
 
 from pipelines.diagnosis import impacts
 from pipelines.diagnosis.candidates.candidate import Candidate, lowest
-from pipelines.diagnosis.candidates.columns import columns_under
+from pipelines.diagnosis.evidence.baseline_columns import columns_under
 from pipelines.diagnosis.dependence.spectral_lines import strongest_tone
 from pipelines.diagnosis.evidence.baseline import baseline_of, with_load
 from pipelines.diagnosis.evidence.cuff_coherence import evidence_of_will

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from pipelines.diagnosis.bank import fill
 
-from pipelines.diagnosis.candidates.gram import solve
+from pipelines.diagnosis.evidence.gram import solve
 from pipelines.diagnosis.evidence.baseline import baseline_of
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.effects.friction import Friction

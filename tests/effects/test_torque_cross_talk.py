@@ -9,7 +9,7 @@ from pipelines.diagnosis.bank import fill
 from scipy.optimize import minimize_scalar
 
 from pipelines.contracts import Joint
-from pipelines.diagnosis.candidates.gram import solve
+from pipelines.diagnosis.evidence.gram import solve
 from pipelines.diagnosis.evidence.baseline import baseline_of
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.effects.friction import Friction

@@ -2,15 +2,16 @@
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates.candidate import TURNS, Candidate, bends_motion, lowest
-from pipelines.diagnosis.candidates.shape_refinement import TONE_STEP_HZ, Fitted
+from pipelines.diagnosis.candidates.shape_refinement import TONE_STEP_HZ, Fitted, ShapeRefinement
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.evidence.observed_run import Run
-from pipelines.diagnosis.fit.change_point import ALWAYS, NEVER
+from pipelines.diagnosis.fit.change_point import ALWAYS
 from pipelines.effects import Effect, Parameter
 
 VALUES = 8
@@ -19,24 +20,23 @@ BENDING = 2
 """Values of one whose effect is nearly in proportion to it."""
 HARDENING = ("1/rad²", "1/m²")
 """Units of a form that only bends a spring: left to the refinement."""
-ONSETS = 40
-"""Instants tried for what begins at a time of its own in each run."""
 OSCILLATING = {"Hz", *TURNS}
 """Units of parameters along which an effect has many maxima."""
 APART = 2
 """Grid steps by which two maxima along an oscillating parameter differ at least."""
-WORTH = 0.1
-"""Share of the best run's gain from which an onset in another run is one."""
 
 Fit = Callable[[Candidate], Fitted | None]
 
 
-def screened(effect: Effect, fit: Fit, runs: Sequence[Run], regression: DecisionRegression) -> list[Fitted]:
+def screened(
+    effect: Effect, alone: ShapeRefinement, runs: Sequence[Run], regression: DecisionRegression
+) -> list[Fitted]:
     """Return the fits of an effect's grid, those that explain most first."""
+    fit = partial(alone.fit, rough=True)
     if chosen := effect.directions([run.motion for run in runs]):
         starts = [_along(effect, directions, len(runs)) for directions in chosen]
     elif any(p.per_run for p in effect.shape) and not bends_motion(effect):
-        starts = [_with_onsets(effect, fit, runs, regression)]
+        starts = [_from_the_begin(effect, len(runs))]
     else:
         starts = [Candidate(effect, (shape,) * len(runs)) for shape in _grid(effect, runs, regression)]
     fits = [fitted for start in starts if (fitted := fit(start)) is not None]
@@ -134,30 +134,7 @@ def _rhythms(effect: Effect, runs: Sequence[Run], regression: DecisionRegression
     return tried[peaks[np.argsort(-power[peaks])[:VALUES]]].tolist()
 
 
-def _with_onsets(effect: Effect, fit: Fit, runs: Sequence[Run], regression: DecisionRegression) -> Candidate:
-    """Return the candidate with the instant in each run at which it explains most.
-
-    Never in a run in which it explains next to nothing. What has begun acts as if it had always
-    been there: the column of an instant is that of all the run, zero before it.
-    """
-    defaults = [p.default or 0.0 for p in effect.shape]
-    at = next(i for i, p in enumerate(effect.shape) if p.per_run)
-
-    def shape(onset: float) -> tuple[float, ...]:
-        return tuple(onset if i == at else d for i, d in enumerate(defaults))
-
-    onsets, gains = [NEVER] * len(runs), np.zeros(len(runs))
-    for r, run in enumerate(runs):
-        alone = tuple(shape(ALWAYS if k == r else NEVER) for k in range(len(runs)))
-        throughout = fit(Candidate(effect, alone)) if effect.explains(run.motion) else None
-        if throughout is None:
-            continue
-        tried = np.linspace(run.time[0], run.time[-1], ONSETS + 2)[1:-1]
-        begun = (regression.time[:, np.newaxis] >= tried) & (regression.run == r)[:, np.newaxis]
-        columns = regression.project(throughout.columns[:, :1] * begun)
-        square = np.maximum(np.sum(columns**2, axis=0), np.finfo(float).tiny)
-        gain = (columns.T @ regression.measured) ** 2 / square
-        onsets[r], gains[r] = float(tried[np.argmax(gain)]), gain.max()
-    worth = WORTH * gains.max()
-    chosen = [t if g > worth else NEVER for t, g in zip(onsets, gains, strict=True)]
-    return Candidate(effect, tuple(shape(onset) for onset in chosen))
+def _from_the_begin(effect: Effect, runs: int) -> Candidate:
+    """Return an effect that begins at an instant, from the begin on: its instants are sought later."""
+    defaults = [ALWAYS if p.per_run else p.default or 0.0 for p in effect.shape]
+    return Candidate(effect, (tuple(defaults),) * runs)

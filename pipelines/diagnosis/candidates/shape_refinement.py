@@ -1,130 +1,210 @@
-"""The shape of one cause, refined by its derivative: Gauss and Newton's steps.
+"""The shape of one cause, refined by its derivative: Gauss and Newton's method.
 
-A step solves for the amplitudes and the shape's change together, with the baseline refitted. The derivative columns are kept: with them a set of causes can move every shape a
-little without computing any column anew.
+A step solves for the amplitudes and the shape's change together, with the baseline and whatever
+else is in the set refitted. The derivative columns are kept: with them a set of causes can move
+every shape a little without computing any column anew.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates.candidate import TURNS, Candidate
+from pipelines.diagnosis.candidates.candidate_rows import CandidateRows
+from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
+from pipelines.diagnosis.fit.change_point import ALWAYS, NEVER
 from pipelines.effects import Parameter
 
 STEPS = 3
 """Steps at most."""
+HALVINGS = 2
+"""Times that a step which gains nothing is halved."""
 ENOUGH = 0.2
 """Log likelihood that a step must gain to be followed by another."""
 DIFFERENCE = 0.02
 """Step of a difference quotient, in the shape's own unit of change."""
 LARGEST_STEP = 0.7
 """Of one step, in the shape's unit of change."""
-PRIOR_SD = 0.5
-"""Prior standard deviation of a step, in the shape's unit of change."""
 WIDE = 4.0
 """Ratio of the ends of a positive range from which a shape changes by factors."""
 MARGIN, BEYOND = 0.5, 2.0
 """Share of its typical range, and factor, by which a shape may leave that range."""
+ONSETS, WORTH = 40, 0.1
+"""Instants tried in a run, twice; and the share of the best run's gain from which one is taken."""
 TONE_STEP_HZ = 0.01
 """Unit of change of a rhythm's frequency: that of a line over 100 s, Hz."""
-
-Columns = Callable[[Candidate], NDArray | None]
-"""Compute a candidate's weighted rows, (N, k); None where they are not finite."""
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """One candidate and what it explains alone."""
+    """One candidate and what it explains."""
 
     candidate: Candidate
     columns: NDArray
-    """(N, k)."""
+    """(N, k) rows."""
     amplitudes: NDArray
-    """(k,) those that explain most."""
+    """(k,) that explain most; of a candidate that transforms the motion, 1 at its true shape."""
     gain: float
-    """Log likelihood over the baseline's."""
+    """Log likelihood over the baseline's, amplitudes free."""
+    gain_as_is: float
+    """The same, of a candidate that transforms the motion with its amplitude one."""
+
+    @property
+    def torque(self) -> NDArray:
+        """What the candidate explains as it is, (N,) rows."""
+        transforms = self.candidate.bends and not self.candidate.directions
+        amplitudes = np.ones_like(self.amplitudes) if transforms else self.amplitudes
+        return self.columns @ amplitudes
 
 
-class Alone:
-    """Fits single candidates to what the baseline leaves."""
+class ShapeRefinement:
+    """Fits single candidates beside the baseline, and beside rows of other causes where given."""
 
-    def __init__(self, columns: Columns, project: Callable[[NDArray], NDArray], measured: NDArray) -> None:
-        """Prepare.
+    def __init__(
+        self,
+        rows: CandidateRows,
+        regression: DecisionRegression,
+        beside: NDArray | None = None,
+    ) -> None:
+        """Prepare; ``beside`` (N, b) are rows of what else is fitted freely."""
+        self._rows, self._regression, self._beside = rows, regression, beside
+        measured = regression.measured
+        basis = np.zeros((len(measured), 0))
+        if beside is not None and beside.shape[1]:
+            basis, _ = np.linalg.qr(regression.project(beside))
+        self._basis = basis
+        self._measured = measured - basis @ (basis.T @ measured)
 
-        Parameters
-        ----------
-        columns : callable
-            A candidate's rows.
-        project : callable
-            Takes the baseline off rows (N, k).
-        measured : (N,) array
-            The torque less the baseline.
-        """
-        self.columns, self._project, self._measured = columns, project, measured
+    def _project(self, rows: NDArray) -> NDArray:
+        plain = self._regression.project(rows)
+        return plain - self._basis @ (self._basis.T @ plain)
 
-    def fit(self, candidate: Candidate) -> Fitted | None:
-        """Fit a candidate's amplitudes; None where its columns are not finite."""
-        columns = self.columns(candidate)
+    def fit(self, candidate: Candidate, *, rough: bool = False) -> Fitted | None:
+        """Fit a candidate's amplitudes; None where its rows are not finite."""
+        columns = self._rows(candidate, self._beside, rough=rough)
         if columns is None:
             return None
         plain = self._project(columns)
-        amplitudes, gain = self._solve(plain, np.zeros(plain.shape[1]))
-        return Fitted(candidate, columns, amplitudes, gain)
+        amplitudes, gain = _solved(plain, self._measured)
+        as_is = gain
+        if candidate.bends and not candidate.directions:
+            left = self._measured - plain.sum(axis=1)
+            as_is = 0.5 * float(self._measured @ self._measured - left @ left)
+        return Fitted(candidate, columns, amplitudes, gain, as_is)
 
     def refined(self, start: Fitted) -> tuple[Fitted, NDArray]:
         """Return the candidate at its best shape, and its derivative columns there, (N, d)."""
         if start.candidate.directions:
             # Linear in its shapes: the amplitudes are the shape.
             return _shaped(start), np.zeros((len(self._measured), 0))
-        best, units = start, free_shapes(start.candidate)
+        if start.candidate.onset is not None:
+            best = self._with_onsets(start.candidate)
+            return (best or start), np.zeros((len(self._measured), 0))
+        best, units = self._scaled(start), free_shapes(start.candidate)
         slopes = self._slopes(best, units)
         for _ in range(STEPS if units else 0):
             ahead = self._step(best, slopes, units)
-            if ahead is None or ahead.gain < best.gain + ENOUGH:
+            if ahead is None:
                 break
+            enough = ahead.gain_as_is > best.gain_as_is + ENOUGH
             best = ahead
             slopes = self._slopes(best, units)
+            if not enough:
+                break
         return best, slopes
+
+    def _with_onsets(self, candidate: Candidate) -> Fitted | None:
+        """Return a candidate that begins in each run at the instant at which it explains most.
+
+        It never begins in a run in which it explains next to nothing. What has begun acts as if it
+        had always been there: the column of an instant is that of all the run, zero before it.
+        """
+        regression, at, runs = self._regression, candidate.onset, len(candidate.shapes)
+        assert at is not None
+        onsets, gains = [NEVER] * runs, np.zeros(runs)
+        for r in range(runs):
+            alone = candidate.with_own(at, [ALWAYS if k == r else NEVER for k in range(runs)])
+            rows = self._rows(alone, self._beside)
+            if rows is None or not rows.any():
+                continue
+            onsets[r], gains[r] = self._best_onset(rows[:, 0], regression.run == r)
+        worth = WORTH * gains.max()
+        chosen = [t if g > worth else NEVER for t, g in zip(onsets, gains, strict=True)]
+        return self.fit(candidate.with_own(at, chosen))
+
+    def _best_onset(self, column: NDArray, here: NDArray) -> tuple[float, float]:
+        """Return the instant in one run's rows at which a column explains most, and its gain."""
+        time = self._regression.time
+        first, last = time[here].min(), time[here].max()
+        best, gain, step = first, -np.inf, (last - first) / ONSETS
+        tried = np.linspace(first, last, ONSETS + 1)[:-1]
+        for _ in range(2):
+            columns = self._project(column[:, np.newaxis] * (time[:, np.newaxis] >= tried))
+            square = np.maximum(np.sum(columns**2, axis=0), np.finfo(float).tiny)
+            gains = 0.5 * (columns.T @ self._measured) ** 2 / square
+            best, gain = float(tried[np.argmax(gains)]), float(gains.max())
+            tried = np.linspace(best - step, best + step, ONSETS + 1)
+        return best, gain
+
+    def _scaled(self, start: Fitted) -> Fitted:
+        """Return a candidate that transforms the motion at the shape that its amplitude asks for."""
+        effect, (amplitude, *others) = start.candidate.effect, start.amplitudes
+        if not start.candidate.bends or others or amplitude <= 0.0:
+            return start
+        parameter, now = effect.shape[0], start.candidate.shapes[0][0]
+        low, high = parameter.typical
+        wide = low > 0.0 and high / low > WIDE
+        if wide:
+            value = now / amplitude if effect.swings else now * amplitude
+            value = float(np.clip(value, low / BEYOND, high * BEYOND))
+        else:
+            value = parameter.neutral + amplitude * (now - parameter.neutral)
+            beyond = MARGIN * (high - low)
+            value = float(np.clip(value, low - beyond, high + beyond))
+        ahead = self.fit(start.candidate.reshaped(0, value))
+        return start if ahead is None or ahead.gain_as_is < start.gain_as_is else ahead
 
     def _slopes(self, fitted: Fitted, units: list[tuple[int, float]]) -> NDArray:
         """Return what each free shape does per unit of change, (N, d)."""
         slopes = np.zeros((len(self._measured), len(units)))
-        bends = fitted.candidate.bends
-        amplitudes = np.ones_like(fitted.amplitudes) if bends else fitted.amplitudes
         for d, (i, unit) in enumerate(units):
             step = DIFFERENCE * unit_at(fitted.candidate, i, unit)
-            moved = self.columns(fitted.candidate.moved(i, step))
+            moved = self._rows(fitted.candidate.moved(i, step), self._beside)
             if moved is not None and moved.shape == fitted.columns.shape:
-                change = (moved - fitted.columns) @ amplitudes
-                slopes[:, d] = change / DIFFERENCE
+                slopes[:, d] = replace(fitted, columns=moved - fitted.columns).torque / DIFFERENCE
         return slopes
 
     def _step(self, fitted: Fitted, slopes: NDArray, units: list[tuple[int, float]]) -> Fitted | None:
-        """Return the fit after one step along all free shapes."""
-        k = fitted.columns.shape[1]
-        bends = fitted.candidate.bends
-        parts = [slopes] if bends else [fitted.columns, slopes]
+        """Return the fit after one step along all free shapes; None where no step gains."""
+        transforms = fitted.candidate.bends
+        parts = [slopes] if transforms else [fitted.columns, slopes]
         plain = self._project(np.hstack(parts))
-        free = plain.shape[1] - len(units)
-        precision = np.append(np.zeros(free), np.full(len(units), PRIOR_SD**-2))
-        # A bent baseline has no amplitude: what its column leaves is the shape's to explain.
-        target = self._measured - self._project(fitted.columns) @ np.ones(k) if bends else None
-        solution, _ = self._solve(plain, precision, target)
-        candidate = fitted.candidate
-        for (i, unit), step in zip(units, solution[free:], strict=True):
-            candidate = changed(candidate, i, unit, step)
-        return self.fit(candidate)
+        # What transforms the motion has no amplitude: what it leaves is the shape's to explain.
+        left = self._measured - self._project(fitted.columns).sum(axis=1) * transforms
+        solution, _ = _solved(plain, left)
+        length = 1.0
+        for _ in range(HALVINGS + 1):
+            candidate = fitted.candidate
+            steps = length * solution[len(solution) - len(units) :]
+            for (i, unit), step in zip(units, steps, strict=True):
+                candidate = changed(candidate, i, unit, float(step))
+            ahead = self.fit(candidate)
+            if ahead is not None and ahead.gain_as_is > fitted.gain_as_is:
+                return ahead
+            length *= 0.3
+        return None
 
-    def _solve(self, plain: NDArray, precision: NDArray, target: NDArray | None = None) -> tuple[NDArray, float]:
-        """Return coefficients (k,) and the log likelihood that they gain."""
-        gram = plain.T @ plain + np.diag(precision)
-        size = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
-        scaled = gram / np.outer(size, size) + 1e-9 * np.eye(len(size))
-        right = plain.T @ (self._measured if target is None else target) / size
-        solution = np.linalg.solve(scaled, right)
-        return solution / size, 0.5 * float(right @ solution)
+
+def _solved(rows: NDArray, target: NDArray) -> tuple[NDArray, float]:
+    """Return coefficients (k,) of rows (N, k), and the log likelihood that they gain."""
+    gram = rows.T @ rows
+    size = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
+    scaled = gram / np.outer(size, size) + 1e-9 * np.eye(len(size))
+    right = rows.T @ target / size
+    solution = np.linalg.solve(scaled, right)
+    return solution / size, 0.5 * float(right @ solution)
 
 
 def _shaped(fitted: Fitted) -> Fitted:
@@ -135,6 +215,11 @@ def _shaped(fitted: Fitted) -> Fitted:
     shape = np.where(held, directions[0], fitted.amplitudes[: len(directions)] @ directions)
     shapes = (tuple(shape.tolist()),) * len(candidate.shapes)
     return replace(fitted, candidate=replace(candidate, shapes=shapes))
+
+
+def has_shapes(candidate: Candidate) -> bool:
+    """Tell whether a candidate has a shape that other causes beside it may move."""
+    return bool(free_shapes(candidate)) or candidate.onset is not None
 
 
 def free_shapes(candidate: Candidate) -> list[tuple[int, float]]:

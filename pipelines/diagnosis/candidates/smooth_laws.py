@@ -49,6 +49,15 @@ WANDER_CORNER_HZ = 0.1
 """Above it a wandering torque has less and less power, as a random walk has, Hz."""
 
 
+TIME = "time"
+"""The law whose columns are each run's own curves of time."""
+
+
+def law_label(kind: str, joint: int, joints: Sequence[str], wearer: str = "all") -> str:
+    """Return what a law is called, ``law:angle@hip``; with ``/human`` if it is the person's."""
+    return f"law:{kind}@{joints[joint]}" + ("" if wearer == "all" else f"/{wearer}")
+
+
 @dataclass(frozen=True)
 class LawColumn:
     """One column of a smooth law."""
@@ -59,6 +68,10 @@ class LawColumn:
     """``all`` runs' drives; the ``human``'s share, in drives and cuffs; the ``cuffs`` alone."""
     variance: float
     """Prior variance of the coefficient relative to the law's other columns."""
+
+    def variant(self, joints: Sequence[str]) -> str:
+        """Return the law's label, and whose share it is."""
+        return law_label(self.kind, self.joint, joints, self.wearer)
 
 
 @dataclass(frozen=True)

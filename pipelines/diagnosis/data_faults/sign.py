@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.contracts.joints import the
-from pipelines.diagnosis.candidates.columns import columns_under
 from pipelines.diagnosis.data_faults.fault import Fault, column
 from pipelines.diagnosis.evidence.baseline import Baseline, baseline_of
+from pipelines.diagnosis.evidence.baseline_columns import columns_under
 from pipelines.diagnosis.evidence.observed_run import Run, observe
 from pipelines.estimation.long_run import long_run_covariance
 from pipelines.estimation.regression import by_segment

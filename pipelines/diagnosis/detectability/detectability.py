@@ -23,13 +23,14 @@ from scipy.optimize import brentq
 from scipy.stats import ncx2
 
 from pipelines.diagnosis.candidates.candidate import Candidate, proposals
-from pipelines.diagnosis.candidates.columns import bent_column, columns_under, gram_of_runs, torque_columns
-from pipelines.diagnosis.candidates.gram import solve
+from pipelines.diagnosis.candidates.columns import bent_column, torque_columns
 from pipelines.diagnosis.candidates.shape_grid import BENDING, values_in, values_of
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.baseline import Baseline, baseline_of, with_load
+from pipelines.diagnosis.evidence.baseline_columns import columns_under, gram_of_runs
 from pipelines.diagnosis.evidence.downsampling import thinned
 from pipelines.diagnosis.evidence.eligibility import refuse_unfit
+from pipelines.diagnosis.evidence.gram import solve
 from pipelines.diagnosis.evidence.known_effects import known_effects
 from pipelines.diagnosis.evidence.noise_floor import Floor, noise_floor
 from pipelines.diagnosis.evidence.observed_run import Run, observe

@@ -36,14 +36,23 @@ class DecisionRegression:
     """(N,) the output of each row."""
     torque: NDArray
     """(O,) N·m rms of each output, with which columns become shares."""
+    baseline: NDArray
+    """(N, b) rows of the baseline."""
+    torque_rows: NDArray
+    """(N,) the measured torque."""
     basis: NDArray
-    """(N, b) orthonormal basis of the weighted baseline."""
+    """(N, r) orthonormal basis of the baseline."""
     measured: NDArray
     """(N,) the measured torque less its projection on the baseline."""
 
     @classmethod
     def of(
-        cls, runs: Sequence[Run], baseline: Sequence[NDArray], noise: NoiseModel, torque: NDArray
+        cls,
+        runs: Sequence[Run],
+        baseline: Sequence[NDArray],
+        noise: NoiseModel,
+        torque: NDArray,
+        misfit: NDArray,
     ) -> "DecisionRegression":
         """Set the regression up.
 
@@ -56,19 +65,24 @@ class DecisionRegression:
         noise : NoiseModel
         torque : (O,) array
             Rms of each output, N·m.
+        misfit : (O,) array
+            What counts as noise besides, for no form of a cause is exact, N·m.
         """
         bands = tuple(DecisionBand.of(run) for run in runs)
-        sigma = noise.sigma(LENGTH_S)
+        sigma = np.hypot(noise.sigma(LENGTH_S), misfit)
         precision = np.where(sigma > 0.0, 1.0 / np.where(sigma > 0.0, sigma, 1.0), 0.0)
         roots = tuple(np.sqrt(band.weight) * precision for band in bands)
         weighty = np.concatenate([root.ravel() for root in roots]) > 0.0
         output = np.concatenate([np.tile(np.arange(len(torque)), len(root)) for root in roots])
         operator = sparse.block_diag([_operator(b, r) for b, r in zip(bands, roots, strict=True)])
         operator = operator.tocsr()[weighty]
-        blank = cls(bands, roots, operator, weighty, output[weighty], torque, *[np.zeros(0)] * 2)
-        basis = _orthonormal(blank.rows(baseline))
+        empty = [np.zeros(0)] * 4
+        blank = cls(bands, roots, operator, weighty, output[weighty], torque, *empty)
+        rows = blank.rows(baseline)
         measured = blank.rows([run.measured[:, :, np.newaxis] for run in runs])[:, 0]
-        return replace(blank, basis=basis, measured=measured - basis @ (basis.T @ measured))
+        basis = _orthonormal(rows)
+        left = measured - basis @ (basis.T @ measured)
+        return replace(blank, baseline=rows, torque_rows=measured, basis=basis, measured=left)
 
     @property
     def joints(self) -> int:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates.candidate import Candidate
-from pipelines.diagnosis.candidates.columns import columns_under
 from pipelines.diagnosis.evidence.baseline import Baseline
+from pipelines.diagnosis.evidence.baseline_columns import columns_under
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit.change_point import ALWAYS, NEVER, Onset
 from pipelines.diagnosis.fit.joint_fit import NEWTON_STEPS, Fit, laden, step_of, within_reach

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates.candidate import Candidate
-from pipelines.diagnosis.candidates.columns import gram_of_runs
-from pipelines.diagnosis.candidates.gram import solve
 from pipelines.diagnosis.candidates.shape_refinement import changed, free_shapes, unit_at
 from pipelines.diagnosis.evidence.baseline import Baseline, with_load
+from pipelines.diagnosis.evidence.baseline_columns import gram_of_runs
+from pipelines.diagnosis.evidence.gram import solve
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit.joint_fit import Fit, fit, onsets_of, slope, stacked_columns
 

@@ -12,12 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.candidates.library import Cause, Library
-from pipelines.diagnosis.candidates.smooth_laws import FAMILIES, LawColumn
+from pipelines.diagnosis.candidates.cause import Cause
+from pipelines.diagnosis.candidates.library import Library
+from pipelines.diagnosis.candidates.smooth_laws import FAMILIES, TIME, LawColumn, law_label
 from pipelines.effects import Effect
-
-TIME = "time"
-"""The law whose columns are each run's own curves of time."""
 
 
 @dataclass(frozen=True)
@@ -54,9 +52,14 @@ class Element:
     place: int = -1
     """Of a cause: its number in the library."""
 
+    context: int = -1
+    """Of a cause: the set beside whose others it was refined; -1 where it was refined alone."""
+
     @property
     def variant(self) -> str:
-        """The label, and what kind of the cause it is: in every run anew, or the person's."""
+        """The label, and what kind of it: in every run anew, or the person's."""
+        if self.is_law:
+            return self.label + ("" if self.wearer == "all" else f"/{self.wearer}")
         return self.label + ("/each_run" if self.each_run else "") + ("/worn" if self.worn else "")
 
 
@@ -76,6 +79,8 @@ class Evidence:
     """What a good rig has: kind (``law``, ``cuff``, ``wander``, ``cause``), column, variance."""
     heard: Mapping[str, float]
     """Log likelihood of causes besides what they do to the mean torque, by label."""
+    contexts: tuple[tuple[int, ...], ...] = ()
+    """Sets of elements whose causes were refined beside one another."""
     about: Mapping[str, Any] = field(default_factory=dict)
     """Noise, torque, kinds of run: for reports."""
 
@@ -90,8 +95,8 @@ class Evidence:
         return cls(
             drives[0].T @ drives[0], cuffs[0].T @ cuffs[0],
             drives[0].T @ drives[1], cuffs[0].T @ cuffs[1],
-            tuple(_elements(library, at)), tuple(_background(library, at)), dict(heard),
-            _about(library),
+            (elements := tuple(_elements(library, at))), tuple(_background(library, at)),
+            dict(heard), tuple(_contexts(library, elements)), _about(library),
         )  # fmt: skip
 
     def packed(self) -> dict[str, Any]:
@@ -104,7 +109,8 @@ class Evidence:
             "text": json.dumps(
                 {
                     "elements": [asdict(element) for element in self.elements],
-                    "background": self.background, "heard": self.heard, "about": self.about,
+                    "background": self.background, "heard": self.heard,
+                    "contexts": self.contexts, "about": self.about,
                 }
             ),
         }  # fmt: skip
@@ -118,7 +124,7 @@ class Evidence:
             _symmetric(row["drives"], n), _symmetric(row["cuffs"], n), right[:n], right[n:],
             tuple(Element(**one) for one in text["elements"]),
             tuple((kind, place, v) for kind, place, v in text["background"]),
-            text["heard"], text["about"],
+            text["heard"], tuple(map(tuple, text["contexts"])), text["about"],
         )  # fmt: skip
 
 
@@ -160,7 +166,7 @@ def _elements(library: Library, at: _Places) -> list[Element]:
     elements = [_of_cause(number, cause, at, laws, names, two) for number, cause in enumerate(library.causes)]
     elements += [
         Element(
-            f"law:{kind}@{names[j]}", kind, names[j], FAMILIES[kind], True,
+            law_label(kind, j, names), kind, names[j], FAMILIES[kind], True,
             [int(p) for p, _ in own], _normalised([v for _, v in own]),
             repeats=FAMILIES[kind] != TIME, wearer=wearer,
         )
@@ -195,7 +201,7 @@ def _of_cause(number: int, cause: Cause, at: _Places, laws: Laws, names: Sequenc
         [p for p, _ in resembles], [v / total for _, v in resembles],
         cause.amplitudes[_positive(cause)].tolist(),
         not effect.goes_with_time and effect.family != TIME, cause.first, effect.each_run,
-        effect.run is not None, place=number,
+        effect.run is not None, place=number, context=cause.context,
     )  # fmt: skip
 
 
@@ -230,8 +236,16 @@ def _background(library: Library, at: _Places):
         yield "wander", int(place), variance
     for cause, places in zip(library.causes, at.causes, strict=True):
         effect = cause.candidate.effect
-        if cause.first and not effect.each_run and effect.run is None:
+        alone = cause.first and cause.context < 0
+        if alone and not effect.each_run and effect.run is None:
             yield from (("cause", int(place), 1.0 / len(places)) for place in places)
+
+
+def _contexts(library: Library, elements: Sequence[Element]):
+    """Yield the elements of each set whose causes were refined beside one another."""
+    laws = {element.variant: i for i, element in enumerate(elements) if element.is_law}
+    for context in library.contexts:
+        yield (*context.causes, *(laws[variant] for variant in context.laws))
 
 
 def _about(library: Library) -> dict[str, Any]:

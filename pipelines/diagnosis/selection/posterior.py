@@ -4,14 +4,17 @@ Every single element and every pair is weighed; triples extend the best pairs. W
 marginals: of nothing missing, of each cause, of something unlisted, of each family at each joint.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.diagnosis.candidates.library import Context
+from pipelines.diagnosis.candidates.smooth_laws import TIME
 from pipelines.diagnosis.criteria import CRITERIA, Criteria
-from pipelines.diagnosis.selection.evidence import TIME, Element, Evidence
+from pipelines.diagnosis.selection.evidence import Element, Evidence
 from pipelines.diagnosis.selection.marginal_likelihood import MarginalLikelihood
 
 SHAPES = 2
@@ -24,6 +27,9 @@ EXTENDED = 6
 """Pairs that are extended to triples."""
 TRIPLES = 8
 """Triples of each pair that are weighed in full."""
+
+CONTEXTS = 8
+"""Sets whose causes are refined beside one another."""
 
 Set = tuple[int, ...]
 
@@ -67,7 +73,7 @@ def posterior(evidence: Evidence, criteria: Criteria = CRITERIA) -> Posterior:
     weigh = MarginalLikelihood(evidence, criteria)
     odds: dict[Set, float] = {(): 0.0}
     odds |= {(i,): float(value) for i, value in enumerate(weigh.alone)}
-    for chosen in _pairs(weigh):
+    for chosen in (*_pairs(weigh), *map(_ordered, evidence.contexts)):
         odds[chosen] = weigh(chosen)
     for chosen in _triples(weigh, odds):
         odds[chosen] = weigh(chosen)
@@ -77,13 +83,31 @@ def posterior(evidence: Evidence, criteria: Criteria = CRITERIA) -> Posterior:
     return Posterior(evidence.elements, tuple(sets), p / p.sum())
 
 
+def _ordered(chosen: Sequence[int]) -> Set:
+    return tuple(sorted(chosen))
+
+
+def likely_contexts(weighed: Posterior) -> list[Context]:
+    """Return the most probable sets of several elements whose causes may be refined together."""
+    found: dict[frozenset[str], Context] = {}
+    for chosen in weighed.sets:
+        elements = [weighed.elements[i] for i in chosen]
+        causes = tuple(e.place for e in elements if not e.is_law)
+        if len(elements) > 1 and causes:
+            laws = tuple(e.variant for e in elements if e.is_law)
+            found.setdefault(frozenset(e.variant for e in elements), Context(causes, laws))
+        if len(found) == CONTEXTS:
+            break
+    return list(found.values())
+
+
 def _contenders(weigh: MarginalLikelihood) -> tuple[list[int], list[int], list[int]]:
     """Return the best shapes of each element, its best one, and the laws of wandering torque."""
     elements = weigh.evidence.elements
     shapes: dict[str, list[int]] = {}
     for i in np.argsort(-weigh.alone):
-        element = elements[i]
-        shapes.setdefault(f"{element.variant}/{element.wearer}", []).append(int(i))
+        if elements[i].context < 0:  # others are meant for their own set
+            shapes.setdefault(elements[i].variant, []).append(int(i))
     wide = [i for i, e in enumerate(elements) if e.is_law and e.name == TIME]
     several = [i for own in shapes.values() for i in own[:SHAPES] if i not in wide]
     return several, [own[0] for own in shapes.values()], wide

@@ -1,0 +1,85 @@
+"""A candidate's rows in the decision regression, at block rate where that is near enough."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.candidates.columns import torque_columns
+from pipelines.diagnosis.evidence.baseline import Baseline
+from pipelines.diagnosis.evidence.baseline_columns import columns_under
+from pipelines.diagnosis.evidence.block_rate import at_block_rate, needs_full_rate
+from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
+from pipelines.diagnosis.evidence.observed_run import Run
+
+RIDGE = 1e-10
+"""Relative to a column's square: keeps a refit of nearly dependent columns finite."""
+
+
+class CandidateRows:
+    """Computes weighted rows (N, k) of candidates, nothing projected out."""
+
+    def __init__(self, runs: Sequence[Run], baseline: Baseline, regression: DecisionRegression) -> None:
+        """Prepare the runs at both rates."""
+        self._baseline, self._regression = baseline, regression
+        slow = [at_block_rate(run) for run in runs]
+        self._runs = {True: list(runs), False: slow}
+        plain = [columns_under((), run, baseline)[0] for run in slow]
+        self._plain = {True: regression.baseline, False: regression.rows(plain)}
+        self._kinds = [run.motion.run for run in runs]
+
+    def __call__(self, candidate: Candidate, beside: NDArray | None = None, *, rough: bool = False) -> NDArray | None:
+        """Return a candidate's rows; None where they are not finite.
+
+        Parameters
+        ----------
+        beside : (N, b) array, optional
+            Rows of what else is fitted with the baseline where the candidate transforms the motion.
+        rough : bool
+            At block rate in any case, near enough to choose where to look.
+        """
+        full = needs_full_rate(candidate.effect) and not rough
+        if not candidate.bends:
+            runs = self._runs[full]
+            parts = [torque_columns(candidate, r, run) for r, run in enumerate(runs)]
+            rows = self._regression.rows(self._expanded(candidate, parts))
+        elif candidate.directions:
+            shapes = ((shape,) * len(self._kinds) for shape in candidate.directions)
+            single = [Candidate(candidate.effect, own) for own in shapes]
+            rows = np.hstack([self._transformed(one, full, beside) for one in single])
+        else:
+            rows = self._transformed(candidate, full, beside)
+        return rows if np.isfinite(rows).all() else None
+
+    def _expanded(self, candidate: Candidate, parts: Sequence[NDArray]) -> list[NDArray]:
+        own = candidate.columns_in(self._kinds)
+        return [own.expand(part, r) for r, part in enumerate(parts)]
+
+    def _transformed(self, candidate: Candidate, full: bool, beside: NDArray | None) -> NDArray:
+        """Return what the transformed baseline adds to the plain one, under the values it then has.
+
+        Each run has a column of its own where its shape is its own.
+        """
+        regression, runs = self._regression, self._runs[full]
+        acting = [candidate.effect.explains(run.motion) for run in runs]
+        terms = [[candidate.term(r)] * acts for r, acts in enumerate(acting)]
+        made = [columns_under(t, run, self._baseline) for t, run in zip(terms, runs, strict=True)]
+        columns = regression.rows([c for c, _ in made])
+        change = regression.rows([(y - run.measured)[:, :, np.newaxis] for (_, y), run in zip(made, runs, strict=True)])
+        target = regression.torque_rows + change[:, 0]
+        wide = columns if beside is None else np.hstack([columns, beside])
+        values = _least_squares(wide, target)[: columns.shape[1]]
+        row = ((columns - self._plain[full]) @ values)[:, np.newaxis] - change
+        if not candidate.effect.per_run:
+            return row
+        numbers = [r for r, acts in enumerate(acting) if acts]
+        return row * (regression.run[:, np.newaxis] == np.array(numbers))
+
+
+def _least_squares(rows: NDArray, target: NDArray) -> NDArray:
+    """Return the coefficients (k,) of rows (N, k) that are nearest to a target (N,)."""
+    gram = rows.T @ rows
+    size = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
+    scaled = gram / np.outer(size, size) + RIDGE * np.eye(len(size))
+    return np.asarray(np.linalg.solve(scaled, rows.T @ target / size) / size)

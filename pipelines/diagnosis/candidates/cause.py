@@ -1,0 +1,65 @@
+"""One shape of a cause, as columns of the decision regression."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.candidates.shape_refinement import Fitted
+from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
+
+RANK = 1e-6
+"""Relative share below which a column of a cause adds nothing to those before it."""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A cause at one shape, the baseline projected out of its columns.
+
+    The columns are orthonormal in shares: the square of their coefficients is the squared share of
+    the joint's torque that the cause has.
+    """
+
+    candidate: Candidate
+    columns: NDArray
+    """(N, k)."""
+    amplitudes: NDArray
+    """(p, k): the effect's own amplitudes per coefficient."""
+    derivative: NDArray
+    """(N, d) what a change of its shape does: along each shape, and towards another form."""
+    first: bool
+    """Whether it is the best shape of its effect."""
+    context: int = -1
+    """The set of causes beside which it was refined; -1 where it was refined alone."""
+
+    @classmethod
+    def of(
+        cls, fitted: Fitted, slopes: NDArray, regression: DecisionRegression, *, first: bool,
+        context: int = -1,
+    ) -> "Cause | None":  # fmt: skip
+        """Return a fitted candidate as a cause; None where the baseline leaves nothing of it."""
+        # The effect's own first amplitude keeps its sign as the last column of the triangle.
+        shares = regression.shares(fitted.columns)
+        _, triangle = np.linalg.qr(shares[:, ::-1])
+        size = np.abs(np.diag(triangle))
+        largest = max(size.max(initial=0.0), np.finfo(float).tiny)
+        kept = np.flatnonzero(size > RANK * largest)
+        if not len(kept) or not size.any():
+            return None
+        inverse = np.linalg.pinv(triangle)[::-1][:, kept]
+        columns = regression.project(fitted.columns @ inverse)
+        derivative = regression.project(slopes)
+        return cls(fitted.candidate, columns, inverse, derivative, first, context)
+
+
+def towards(best: Fitted, others: Sequence[Fitted]) -> NDArray:
+    """Return what changes from the best form of a cause to its best other form, (N, 0 or 1)."""
+    forms = [p.forms for p in best.candidate.effect.shape]
+    here = best.candidate.shapes[0]
+    for other in others:
+        there = other.candidate.shapes[0]
+        if any(f and a != b for f, a, b in zip(forms, here, there, strict=True)):
+            return (other.torque - best.torque)[:, np.newaxis]
+    return np.zeros((len(best.torque), 0))

@@ -1,0 +1,60 @@
+"""The training runs under the baseline alone: what it leaves, and the noise in that."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.evidence.baseline import Baseline, with_load
+from pipelines.diagnosis.evidence.baseline_columns import columns_under, gram_of_runs
+from pipelines.diagnosis.evidence.decision_band import DecisionBand
+from pipelines.diagnosis.evidence.gram import solve, weights_under
+from pipelines.diagnosis.evidence.model_error import telling_torque
+from pipelines.diagnosis.evidence.noise_model import NoiseModel, noise_model
+from pipelines.diagnosis.evidence.observed_run import Run
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """The training runs under the baseline alone."""
+
+    runs: tuple[Run, ...]
+    """With the loads that the baseline's rigid bodies make."""
+    baseline: Baseline
+    columns: tuple[NDArray, ...]
+    """(m, O, b) the baseline's columns in each run."""
+    values: NDArray
+    """(b,) the baseline fitted alone."""
+    weights: NDArray
+    """(O,) inverse variances under it."""
+    noise: NoiseModel
+    torque: NDArray
+    """(O,) N·m rms."""
+
+    @property
+    def slow_rms(self) -> NDArray:
+        """What the baseline leaves in the decision band, (O,) N·m rms; zero without such an output."""
+        squares, weight = np.zeros(len(self.torque)), np.zeros(len(self.torque))
+        for run, residual in zip(self.runs, self.residuals, strict=True):
+            band = DecisionBand.of(run)
+            squares += np.sum(band.weight * band.average(residual) ** 2, axis=0)
+            weight += band.weight.sum(axis=0)
+        return np.sqrt(squares / np.maximum(weight, 1.0))
+
+    @property
+    def residuals(self) -> list[NDArray]:
+        """What the baseline leaves, (m, O) N·m of each run."""
+        return [r.measured - c @ self.values for r, c in zip(self.runs, self.columns, strict=True)]
+
+
+def prepare(runs: Sequence[Run], baseline: Baseline) -> Prepared:
+    """Fit the baseline alone and measure the noise of what it leaves."""
+    columns = tuple(columns_under((), run, baseline)[0] for run in runs)
+    gram = gram_of_runs(runs, columns)
+    weights = weights_under(gram)
+    values = solve(gram, weights)
+    laden = tuple(with_load(run, baseline, values) for run in runs)
+    residuals = [r.measured - c @ values for r, c in zip(runs, columns, strict=True)]
+    noise = noise_model(laden, residuals)
+    return Prepared(laden, baseline, columns, values, weights, noise, telling_torque(runs))
