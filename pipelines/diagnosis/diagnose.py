@@ -27,11 +27,13 @@ from pipelines.diagnosis.fit.validation import Validated, log_likelihood_ratio, 
 from pipelines.diagnosis.selection.answer import Answer, answer_of
 from pipelines.diagnosis.selection.evidence import Evidence
 from pipelines.diagnosis.selection.findings import findings
-from pipelines.diagnosis.selection.posterior import likely_contexts, posterior
+from pipelines.diagnosis.selection.posterior import likely_contexts, posterior, strongest
 from pipelines.mechanics.motion import Motion
 
 LIBRARY_SHARE, FIT_SHARE = 0.6, 0.75
 """Of the progress bar, where the library and the posterior are done."""
+PARTNERS = 5
+"""Causes that are refined beside a strong one."""
 Report = Callable[[float, str], None]
 
 
@@ -89,8 +91,10 @@ def _evidence(prepared: Prepared, report: Report) -> tuple[Library, Evidence]:
     library = build_library(prepared, lambda share, what: report(LIBRARY_SHARE * share, what))
     residuals = prepared.residuals
     heard = heard_in(prepared.runs, residuals) | felt_in(prepared.runs, residuals)
-    contexts = likely_contexts(posterior(Evidence.of(library, heard)))
-    library = library.refined_together(contexts)
+    weighed = posterior(Evidence.of(library, heard))
+    for number in strongest(weighed):
+        library = library.with_partners(number, PARTNERS)
+    library = library.refined_together(likely_contexts(weighed))
     return library, Evidence.of(library, heard)
 
 

@@ -26,7 +26,7 @@ class CandidateRows:
         slow = [at_block_rate(run) for run in runs]
         self._runs = {True: list(runs), False: slow}
         plain = [columns_under((), run, baseline)[0] for run in slow]
-        self._plain = {True: regression.baseline, False: regression.rows(plain)}
+        self._plain = regression.rows(plain)
         self._kinds = [run.motion.run for run in runs]
 
     def __call__(self, candidate: Candidate, beside: NDArray | None = None, *, rough: bool = False) -> NDArray | None:
@@ -61,16 +61,17 @@ class CandidateRows:
 
         Each run has a column of its own where its shape is its own.
         """
-        regression, runs = self._regression, self._runs[full]
+        regression, runs, slow = self._regression, self._runs[full], self._runs[False]
+        at = slow if full else [None] * len(slow)
         acting = [candidate.effect.explains(run.motion) for run in runs]
         terms = [[candidate.term(r)] * acts for r, acts in enumerate(acting)]
-        made = [columns_under(t, run, self._baseline) for t, run in zip(terms, runs, strict=True)]
+        made = [columns_under(t, run, self._baseline, s) for t, run, s in zip(terms, runs, at, strict=True)]
         columns = regression.rows([c for c, _ in made])
-        change = regression.rows([(y - run.measured)[:, :, np.newaxis] for (_, y), run in zip(made, runs, strict=True)])
+        change = regression.rows([(y - run.measured)[:, :, np.newaxis] for (_, y), run in zip(made, slow, strict=True)])
         target = regression.torque_rows + change[:, 0]
         wide = columns if beside is None else np.hstack([columns, beside])
         values = _least_squares(wide, target)[: columns.shape[1]]
-        row = ((columns - self._plain[full]) @ values)[:, np.newaxis] - change
+        row = ((columns - self._plain) @ values)[:, np.newaxis] - change
         if not candidate.effect.per_run:
             return row
         numbers = [r for r, acts in enumerate(acting) if acts]

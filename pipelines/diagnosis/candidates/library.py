@@ -63,29 +63,53 @@ class Library:
     """Labels of effects whose columns are not finite at any shape, or add nothing."""
     contexts: tuple[Context, ...] = ()
     """Sets whose causes were refined beside one another."""
+    screened: tuple[tuple[Fitted, ...], ...] = ()
+    """Of each effect the fits of its coarse search."""
 
     def refined_together(self, contexts: Sequence[Context]) -> "Library":
         """Return the library with the causes of some sets refined beside one another as well."""
-        causes, refined = list(self.causes), list(self.contexts)
+        grown = self
         for context in contexts:
-            own = self._together(context, len(refined))
-            if own is not None:
-                numbers = range(len(causes), len(causes) + len(own))
-                refined.append(replace(context, causes=tuple(numbers)))
-                causes += own
-        return replace(self, causes=tuple(causes), contexts=tuple(refined))
+            grown = grown._with([self.causes[i] for i in context.causes], context.laws)
+        return grown
 
-    def _together(self, context: Context, number: int) -> list[Cause] | None:
+    def with_partners(self, number: int, most: int) -> "Library":
+        """Return the library with those causes that explain most beside one cause, refined with it.
+
+        Beside a large cause a small one has another shape than alone.
+        """
+        grown, main = self, self.causes[number]
+        beside = np.hstack([main.columns, main.derivative])
+        alone = ShapeRefinement(self.rows, self.regression, beside)
+        found = [alone.best_of(fits) for fits in self.screened if fits[0].candidate.label != main.candidate.label]
+        fits = sorted((f for f in found if f is not None), key=lambda f: -f.gain)
+        for fitted in fits[:most]:
+            none = np.zeros((len(beside), 0))
+            cause = Cause.of(fitted, none, self.regression, first=True)
+            grown = grown if cause is None else grown._with([main, cause])
+        return grown
+
+    def _with(self, made: Sequence[Cause], laws: Sequence[str] = ()) -> "Library":
+        """Return the library with a set of causes refined beside one another as well."""
+        own = self._together(list(made), laws)
+        if own is None:
+            return self
+        count, number = len(self.causes), len(self.contexts)
+        own = [replace(cause, context=number) for cause in own]
+        context = Context(tuple(range(count, count + len(own))), tuple(laws))
+        return replace(self, causes=(*self.causes, *own), contexts=(*self.contexts, context))
+
+    def _together(self, made: list[Cause], laws: Sequence[str]) -> list[Cause] | None:
         """Return the causes of a set, each refined with the rest of it fitted freely."""
         regression = self.regression
-        made = [self.causes[i] for i in context.causes]
         shaped = [n for n, cause in enumerate(made) if has_shapes(cause.candidate)]
-        if not shaped or len(made) + len(context.laws) < 2:
+        if not shaped or len(made) + len(laws) < 2:
             return None
-        laws = [self._law(label) for label in context.laws]
+        rows = [self._law(label) for label in laws]
         for _ in range(SWEEPS):
             for n in shaped:
-                beside = np.hstack([*laws, *(c.columns for k, c in enumerate(made) if k != n)])
+                others = [np.hstack([c.columns, c.derivative]) for k, c in enumerate(made) if k != n]
+                beside = np.hstack([*rows, *others])
                 alone = ShapeRefinement(self.rows, regression, beside)
                 start = alone.fit(made[n].candidate)
                 if start is None:
@@ -95,7 +119,7 @@ class Library:
                 if cause is None:
                     return None
                 made[n] = cause
-        return [replace(cause, context=number) for cause in made]
+        return made
 
     def _law(self, variant: str) -> NDArray:
         """Return the rows of a law, (N, k)."""
@@ -115,18 +139,20 @@ def build_library(prepared: Prepared, report: Report = silent) -> Library:
     alone = ShapeRefinement(rows, regression)
     causes: list[Cause] = []
     left_out: list[str] = []
+    grids: list[tuple[Fitted, ...]] = []
     effects = _effects(prepared)
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
         fits = screened(effect, alone, prepared.runs, regression)
         shapes = _shapes(fits, alone, regression)
         causes += shapes
+        grids += [tuple(fits)] if fits else []
         left_out += [] if shapes else [effect.label]
     laws, law_columns = law_rows(prepared, regression)
     curves, curve_columns = curve_rows(prepared, regression)
     return Library(
         prepared, regression, rows, tuple(causes), tuple(laws), law_columns, tuple(curves),
-        curve_columns, tuple(dict.fromkeys(left_out)),
+        curve_columns, tuple(dict.fromkeys(left_out)), (), tuple(grids),
     )  # fmt: skip
 
 

@@ -94,6 +94,14 @@ class ShapeRefinement:
             as_is = 0.5 * float(self._measured @ self._measured - left @ left)
         return Fitted(candidate, columns, amplitudes, gain, as_is)
 
+    def best_of(self, fits: Sequence[Fitted]) -> Fitted | None:
+        """Return that one of an effect's fits made elsewhere which explains most here."""
+        if fits[0].candidate.onset is not None:
+            return self._with_onsets(fits[0].candidate)
+        gains = [_solved(self._project(f.columns), self._measured)[1] for f in fits]
+        best = int(np.argmax(gains))
+        return replace(fits[best], gain=gains[best])
+
     def refined(self, start: Fitted) -> tuple[Fitted, NDArray]:
         """Return the candidate at its best shape, and its derivative columns there, (N, d)."""
         if start.candidate.directions:

@@ -76,6 +76,7 @@ class DecisionRegression:
         output = np.concatenate([np.tile(np.arange(len(torque)), len(root)) for root in roots])
         operator = sparse.block_diag([_operator(b, r) for b, r in zip(bands, roots, strict=True)])
         operator = operator.tocsr()[weighty]
+        operator.eliminate_zeros()
         empty = [np.zeros(0)] * 4
         blank = cls(bands, roots, operator, weighty, output[weighty], torque, *empty)
         rows = blank.rows(baseline)
@@ -109,7 +110,7 @@ class DecisionRegression:
     def rows(self, parts: Sequence[NDArray]) -> NDArray:
         """Return weighted rows (N, k) of columns (m, O, k) in each run."""
         flat = [part.reshape(-1, part.shape[2]) for part in parts]
-        return np.asarray(self.operator @ np.nan_to_num(np.concatenate(flat)))
+        return np.asarray(self.operator @ np.concatenate(flat))
 
     def project(self, columns: NDArray) -> NDArray:
         """Return columns (N, k) less what the baseline imitates."""

@@ -31,6 +31,9 @@ TRIPLES = 8
 CONTEXTS = 8
 """Sets whose causes are refined beside one another."""
 
+STRONGEST = 2
+"""Single causes whose partners are sought beside them."""
+
 Set = tuple[int, ...]
 
 
@@ -98,6 +101,18 @@ def likely_contexts(weighed: Posterior) -> list[Context]:
             found.setdefault(frozenset(e.variant for e in elements), Context(causes, laws))
         if len(found) == CONTEXTS:
             break
+    return list(found.values())
+
+
+def strongest(weighed: Posterior) -> list[int]:
+    """Return the library's numbers of the causes that alone explain most, unless nothing is missing."""
+    found: dict[str, int] = {}
+    for chosen in weighed.sets:
+        element = weighed.elements[chosen[0]] if len(chosen) == 1 else None
+        if not chosen or len(found) == STRONGEST:
+            break
+        if element is not None and not element.is_law:
+            found.setdefault(element.label, element.place)
     return list(found.values())
 
 
