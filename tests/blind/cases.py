@@ -54,6 +54,13 @@ class Case:
     plain: bool = False
     """As in the first examinations: one rate, one kind of motion, a faultless rig. Only in world ``mujoco``."""
 
+    def __post_init__(self) -> None:
+        """Refuse what no simulator has."""
+        if self.plain and self.world != "mujoco":
+            raise ValueError(f"plain cases are of world mujoco, not of {self.world}")
+        if self.machine != "leg" and not self.plain:
+            raise ValueError(f"a {self.machine} is simulated in plain cases only: set plain")
+
     @property
     def label(self) -> str:
         """What is hidden, for reports."""

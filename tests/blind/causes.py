@@ -81,11 +81,17 @@ WORLDS = ("mujoco", "planar", "two_mass")
 
 
 def form(
-    effect: str, *, own: bool = False, worlds: tuple[str, ...] = WORLDS, plain: bool = True
+    effect: str,
+    *,
+    own: bool = False,
+    worlds: tuple[str, ...] = WORLDS,
+    plain: bool = True,
+    warm: bool = False,
 ) -> Callable:
     """Register a form of a cause; the function's name is the form's.
 
-    ``worlds`` are those whose plants have it; ``plain`` cases draw from the forms of the first examinations only.
+    ``worlds`` are those whose plants have it, ``plain`` cases draw from the forms of the first
+    examinations only, and ``warm`` forms need temperatures, which plain cases have not.
     """
 
     def register(draw: Callable) -> Callable:
@@ -108,6 +114,7 @@ def form(
         made.form = draw.__name__
         made.worlds = worlds
         made.plain = plain
+        made.warm = warm
         FORMS.setdefault(effect, []).append(made)
         return draw
 
@@ -752,6 +759,6 @@ def random_cause(
     """
     known = [f for f in FORMS[effect] if (f.plain if world is None else world in f.worlds)]
     # What the first examinations did not hide has no plain forms: a machine of one joint takes any.
-    known = known or [f for f in FORMS[effect] if WORLDS[0] in f.worlds]
+    known = known or [f for f in FORMS[effect] if WORLDS[0] in f.worlds and not f.warm]
     forms = [f for f in known if form_name in (None, f.form)]
     return forms[int(rng.integers(len(forms)))](rng, joint, reach)

@@ -19,7 +19,7 @@ from tests.blind.detection import smallest_visible
 from tests.blind.scoring import Score, score
 
 SIMULATOR = (
-    "body", "cases", "causes", "channel", "conditions", "cuffs", "dry", "excitation", "families", "faults", "floor", "further_forms", "further_torques", "imperfections", "legs",
+    "body", "cases", "causes", "channel", "compiled", "conditions", "cuffs", "dry", "encoders", "excitation", "families", "faults", "floor", "further_forms", "further_torques", "imperfections", "legs",
     "loop", "machine", "magnitude", "mechanisms", "outside", "people", "plan", "planar", "plant", "recorded",
     "recorder", "session", "smooth", "temperature", "trajectories", "transmissions", "two_link", "two_mass", "units", "wandering",
     "worlds",

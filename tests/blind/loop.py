@@ -13,6 +13,7 @@ import numpy as np
 from tests.blind.body import PAYLOAD_INERTIA, evaluate
 from tests.blind.compiled import njit
 from tests.blind.dry import dry_levels, is_dry
+from tests.blind.encoders import WAVES, reading, slope
 from tests.blind.smooth import smooth_torque
 from tests.blind.transmissions import RIGID, transmitted
 
@@ -42,7 +43,7 @@ class Excited(NamedTuple):
 class Drives(NamedTuple):
     """PD loops and encoders, arrays (2,).
 
-    ``wobble`` (2, 4): amplitude and phase of the encoder's error once a turn, and twice a turn.
+    ``wobble`` (2, 6): amplitude and phase of the encoders' errors once, twice, three times a turn.
     """
 
     kp: np.ndarray
@@ -143,12 +144,6 @@ def reference_at(x, t, out):
 
 
 @njit()
-def _read(d, j, theta):
-    once = theta + d.offset[j] + d.wobble[j, 0] * sin(theta + d.wobble[j, 1])
-    return once + d.wobble[j, 2] * sin(2.0 * theta + d.wobble[j, 3])
-
-
-@njit()
 def _press(jt, z, u, force, pressed):
     """Let the machine's cuffs push the wearer's leg (coordinates 2 and 3): forces across thigh and shank."""
     thigh, shank, length = jt.levers
@@ -234,7 +229,7 @@ def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
     first = -round(LEAD_IN_S / sample_s) if with_drives else 0
     reference_at(x, first * sample_s, old_ref)
     for j in range(2):
-        angle[j] = _read(d, j, z[place[j]])
+        angle[j] = reading(d.offset[j], d.wobble[j], z[place[j]])
     half = STEPS_PER_TICK * ticks // 2
     for k in range(first, samples):
         opened[:] = u
@@ -246,7 +241,7 @@ def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
                 tick = STEPS_PER_TICK * DT
                 reference_at(x, t, ref)
                 for j in range(2):
-                    seen = _read(d, j, z[place[j]])
+                    seen = reading(d.offset[j], d.wobble[j], z[place[j]])
                     if d.count[j] > 0.0:
                         seen = d.count[j] * np.round(seen / d.count[j])
                     speed[j] += d.speed_share * ((seen - angle[j]) / tick - speed[j])
@@ -338,13 +333,12 @@ def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
                 z[i] += DT * u[i]
         if k >= 0:
             for j in range(2):
-                at = z[place[j]] + d.wobble[j, 1]
                 mean = (u[place[j]] - opened[place[j]]) / sample_s
-                bent = d.wobble[j, 0] * (cos(at) * mean - sin(at) * u[place[j]] ** 2)
-                twice = 2.0 * z[place[j]] + d.wobble[j, 3]
-                bent += (
-                    2.0 * d.wobble[j, 2] * (cos(twice) * mean - 2.0 * sin(twice) * u[place[j]] ** 2)
-                )
+                bent = 0.0
+                for n_waves in range(1, WAVES + 1):
+                    size = n_waves * d.wobble[j, 2 * n_waves - 2]
+                    at = n_waves * z[place[j]] + d.wobble[j, 2 * n_waves - 1]
+                    bent += size * (cos(at) * mean - n_waves * sin(at) * u[place[j]] ** 2)
                 out.acceleration[k, j] = mean + bent
             for i in range(2):
                 out.link[k, 4 + i] = (u[i] - opened[i]) / sample_s
@@ -372,13 +366,11 @@ def _latch(out, k, z, u, place, d, human, ref, speed, pressed):
     """Log what is measured: positions half a step back, and the speeds ``u`` of that moment."""
     for j in range(2):
         theta = z[place[j]] - 0.5 * DT * u[place[j]]
-        seen = _read(d, j, theta)
+        seen = reading(d.offset[j], d.wobble[j], theta)
         out.angle[k, j] = seen
         count = d.recorded_count[j]
         out.reading[k, j] = count * np.round(seen / count) if count > 0.0 else seen
-        turns = d.wobble[j, 0] * cos(theta + d.wobble[j, 1])
-        turns += 2.0 * d.wobble[j, 2] * cos(2.0 * theta + d.wobble[j, 3])
-        out.speed[k, j] = u[place[j]] * (1.0 + turns)
+        out.speed[k, j] = u[place[j]] * slope(d.wobble[j], theta)
         out.human[k, j] = human[j]
         out.reference[k, j] = ref[j]
         out.drive_speed[k, j] = speed[j]

@@ -6,7 +6,7 @@ integrator, at a rate of its own, and estimates velocity from counts. The torque
 """
 
 from dataclasses import dataclass, replace
-from math import cos, exp, sin
+from math import exp, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ from tests.blind.channel import through
 from tests.blind.compiled import njit
 from tests.blind.conditions import Conditions
 from tests.blind.dry import dry_levels, is_dry
+from tests.blind.encoders import curvature, reading, slope
 from tests.blind.legs import Reported, check, cuff_forces, links_of, needed
 from tests.blind.loop import LEAD_IN_S, Excited, reference_at
 from tests.blind.plan import HIP, Plan, Run
@@ -173,7 +174,7 @@ def _felt(leg: Leg) -> NDArray:
 
 
 class Drives(NamedTuple):
-    """Cascaded loops and encoders; arrays (2,), ``wobble`` (2, 4)."""
+    """Cascaded loops and encoders; arrays (2,), ``wobble`` (2, 6)."""
 
     position: np.ndarray
     velocity: np.ndarray
@@ -224,12 +225,6 @@ class Log(NamedTuple):
 
 
 @njit()
-def _read(d, j, theta):
-    once = theta + d.offset[j] + d.wobble[j, 0] * sin(theta + d.wobble[j, 1])
-    return once + d.wobble[j, 2] * sin(2.0 * theta + d.wobble[j, 3])
-
-
-@njit()
 def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
     """Run the leg from rest at ``start`` (2,) and log ``samples`` samples from time 0 on into ``out``."""
     q, v, a = np.zeros(2), np.zeros(2), np.zeros(2)
@@ -251,7 +246,7 @@ def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
     c = w.driven.copy()
     for j in range(2):
         q[j] = th[j] = hq[j] = start[j]
-        seen[j] = _read(d, j, start[j])
+        seen[j] = reading(d.offset[j], d.wobble[j], start[j])
     first = -round(LEAD_IN_S / DT) if with_drives else 0
     reference_at(x, first * DT, old_ref)
     tick = d.steps * DT
@@ -265,7 +260,7 @@ def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
         if with_drives and s % d.steps == 0:
             reference_at(x, t, ref)
             for j in range(2):
-                now = _read(d, j, th[j])
+                now = reading(d.offset[j], d.wobble[j], th[j])
                 if d.count[j] > 0.0:
                     now = d.count[j] * np.floor(now / d.count[j])
                 speed[j] += d.speed_share * ((now - seen[j]) / tick - speed[j])
@@ -377,15 +372,14 @@ def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
 @njit()
 def _latch(out, k, j, d, theta, omega, acceleration):
     """Log a motor's angle as its encoder tells it, and what speed and acceleration that is."""
-    told = _read(d, j, theta)
+    told = reading(d.offset[j], d.wobble[j], theta)
     count = d.recorded_count[j]
-    once, twice = theta + d.wobble[j, 1], 2.0 * theta + d.wobble[j, 3]
-    slope = 1.0 + d.wobble[j, 0] * cos(once) + 2.0 * d.wobble[j, 2] * cos(twice)
-    bend = -d.wobble[j, 0] * sin(once) - 4.0 * d.wobble[j, 2] * sin(twice)
     out.angle[k, j] = told
     out.reading[k, j] = count * np.round(told / count) if count > 0.0 else told
-    out.speed[k, j] = omega * slope
-    out.acceleration[k, j] = acceleration * slope + bend * omega * omega
+    factor = slope(d.wobble[j], theta)
+    out.speed[k, j] = omega * factor
+    bend = curvature(d.wobble[j], theta)
+    out.acceleration[k, j] = acceleration * factor + bend * omega * omega
 
 
 def record(

@@ -13,8 +13,8 @@ from dataclasses import replace
 import pytest
 
 from tests.blind import fixed_set
-from tests.blind.cases import SINGLES
-from tests.blind.causes import CAUSES
+from tests.blind.cases import PLAIN_SINGLES
+from tests.blind.causes import PLAIN_CAUSES
 from tests.blind.examine import examine
 from tests.blind.fixed_set import Outcome, complaints, outcomes, read
 from tests.blind.plan import HIP, KNEE
@@ -44,8 +44,8 @@ def test_the_fixed_set_has_every_cause_at_both_joints_in_turn_and_every_category
     singles = [c.hidden[0] for c in cases if c.category == "single"]
     assert len(cases) >= 40
     assert uses(c.seed for c in cases) == {"fixed"}
-    assert [effect for effect, _ in singles] == list(CAUSES)
-    assert set(singles) < set(SINGLES)
+    assert [effect for effect, _ in singles] == list(PLAIN_CAUSES)
+    assert set(singles) < set(PLAIN_SINGLES)
     joints = Counter(joint for _, joint in singles)
     assert min(joints[HIP], joints[KNEE]) >= 10
     assert {c.category for c in cases} == {"single", *fixed_set.OTHERS}
