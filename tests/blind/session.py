@@ -197,7 +197,8 @@ class _Draw:
         periods = [motion.period_s or LONGEST_PILOT_S for motion in self.motion.values()]
         pilot_s = float(np.clip(max(periods), PILOT_S, LONGEST_PILOT_S))
         duration = self.duration if cause.slow else min(pilot_s, self.duration)
-        purposes = PURPOSES[:1] if cause.slow else PURPOSES
+        each = cause.follows_temperature or not cause.slow
+        purposes = PURPOSES if each else PURPOSES[:1]
 
         def pilot(size: float) -> list[Recorded]:
             return [

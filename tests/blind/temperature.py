@@ -7,8 +7,6 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 RATE_HZ = 50.0
-LEAST_BETWEEN_C = 1.5
-"""By how much runs differ at least."""
 
 
 class Warmth:

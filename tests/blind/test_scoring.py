@@ -1,5 +1,6 @@
 """Right is right, an honest tie too, and nothing else."""
 
+import math
 import sys
 
 import pytest
@@ -206,3 +207,79 @@ def test_what_can_be_seen_is_read_where_it_is_said(tmp_path):
         '{"causes": [{"effect": "base_tilt", "joint": null, "smallest_rms_nm": 0.4}]}'
     )
     assert smallest_visible(tmp_path) == {("base_tilt", None): 0.4}
+
+
+def finding(family, joint, probability=0.8):
+    return {"level": "family", "family": family, "joint": joint, "probability": probability}
+
+
+@pytest.mark.parametrize(
+    ("told", "right"),
+    [
+        ([finding("angle", "knee")], True),
+        ([finding("time", "hip"), finding("reversal", "knee")], True),
+        ([finding("angle", None)], True),
+        ([finding("angle", "hip")], False),
+        ([finding("speed", "knee")], False),
+        ([finding("angle", "knee", probability=0.4)], False),
+        ([], False),
+    ],
+)
+def test_a_family_is_right_at_its_joint_where_it_is_likely(told, right):
+    truth = truth_of("outside", ("outside:friction_by_other_joint", "knee"))
+    truth["hidden"][0]["families"] = ["angle", "reversal"]
+    answer = answer_of(status="unknown_cause")
+    answer["verdict"]["findings"] = told
+    assert score(truth, answer).family_right is right
+
+
+def test_a_verdict_without_findings_has_no_family():
+    truth = truth_of("outside", ("outside:tone", "knee"))
+    truth["hidden"][0]["families"] = ["time"]
+    assert score(truth, answer_of(status="unknown_cause")).family_right is None
+
+
+def test_an_unlikely_cause_beside_an_unknown_one_is_no_wrong_name():
+    truth = truth_of("outside", ("outside:tone", "knee"))
+    named = [cause("cogging", "knee", probability=p) for p in (0.3, 0.7)]
+    assert score(truth, answer_of(named[0], status="partly_explained")).right
+    assert not score(truth, answer_of(named[1], status="partly_explained")).right
+
+
+@pytest.mark.parametrize(
+    ("category", "hidden", "probability"),
+    [
+        ("none", (), 0.2),
+        ("single", (PLAY,), 0.7),
+        ("single", (("base_tilt", None),), 0.05),
+        ("single", (("cogging", "hip"),), 1e-4),
+        ("outside", (("outside:tone", "hip"),), 0.3),
+        ("pair", (PLAY, ("base_tilt", None)), (0.7 * 0.05) ** 0.5),
+    ],
+)
+def test_the_truths_probability_is_read_off_the_posterior(category, hidden, probability):
+    answer = answer_of(cause(*PLAY))
+    causes = {"backlash@knee": 0.7, "base_tilt": 0.05}
+    answer["verdict"]["posterior"] = {"nothing_missing": 0.2, "unlisted": 0.3, "causes": causes}
+    found = score(truth_of(category, *hidden), answer).log_probability
+    assert found == pytest.approx(math.log(probability))
+
+
+def test_a_gap_that_the_file_declares_is_no_false_alarm():
+    truth = truth_of("none") | {"with_gaps": ["run_1.parquet"]}
+    gap = {"file": "run_1.parquet", "channel": "time_s", "what": "2 gaps in the recording"}
+    other = gap | {"file": "run_2.parquet"}
+    assert score(truth, answer_of(status="nothing_missing", faults=[gap])).right
+    assert not score(truth, answer_of(status="nothing_missing", faults=[other])).right
+
+
+def test_the_report_shows_each_world():
+    planar = truth_of("single", PLAY)
+    planar["case"] |= {"world": "planar"}
+    scores = [
+        score(truth_of("single", PLAY), answer_of(cause(*PLAY))),
+        score(planar, answer_of(cause("cogging", "knee"))),
+    ]
+    tables = {page.title: page for page in pages(scores)}
+    assert tables["By world"].head == ("", "mujoco", "planar")
+    assert [cell[:5] for cell in tables["By world"].rows[0][1:]] == ["100.0", "0.0 %"]

@@ -63,7 +63,7 @@ def random_trajectory(
 ) -> Trajectory:
     """Draw a motion for runs of this length, of this family or of any."""
     family = family or random_family(rng)
-    longest = min(PERIODS_S[1], duration_s / FEWEST_PERIODS)
+    longest = max(PERIODS_S[0], min(PERIODS_S[1], duration_s / FEWEST_PERIODS))
     period = float(rng.uniform(PERIODS_S[0], longest))
     draw = {
         "optimal": _optimal, "multisine": _multisine, "paper": _paper, "ramps": _ramps, "gait": _gait,
