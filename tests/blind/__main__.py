@@ -67,7 +67,7 @@ def main(
         )
     if one_joint and (fixed or every or only):
         raise typer.BadParameter(
-            "machines of one joint have mixed examinations only: leave --fixed, --full and --only away",
+            "machines of one joint have mixed examinations only: leave out --fixed, --full, --only",
             param_hint="--one-joint",
         )
     if world not in (*WORLDS, "all"):

@@ -1,8 +1,9 @@
-"""The compiled loop: MuJoCo's leg under sampled PD drives, with sticking friction and whatever is hidden.
+"""The compiled loop: MuJoCo's leg under sampled PD drives, with sticking friction and whatever is
+hidden.
 
-Velocities are stepped first, positions with the new velocity (symplectic Euler); viscous friction is
-implicit. Dry friction is an impulse within its levels that stops the joint if it can (Moreau, 1988),
-found by projected Gauss-Seidel over both joints.
+Velocities are stepped first, positions with the new velocity (symplectic Euler); viscous friction
+is implicit. Dry friction is an impulse within its levels that stops the joint if it can (Moreau,
+1988), found by projected Gauss-Seidel over both joints.
 """
 
 from math import cos, pi, sin
@@ -30,7 +31,8 @@ TABLE_STEP_S = 0.02
 class Excited(NamedTuple):
     """Fourier coefficients, (2,), (2, n), (2, n); or, where there is one, a table of the motion.
 
-    ``table`` (m, 4): angles and speeds of hip and knee each ``TABLE_STEP_S`` from ``-LEAD_IN_S`` on.
+    ``table`` (m, 4): angles and speeds of hip and knee each ``TABLE_STEP_S`` from ``-LEAD_IN_S``
+    on.
     """
 
     theta0: np.ndarray
@@ -59,8 +61,8 @@ class Drives(NamedTuple):
 class Joints(NamedTuple):
     """Friction and transmission, arrays (2,), ``added_mass`` (2, 2), ``spring`` (2, 5).
 
-    ``cuffs`` (2, 3) for thigh and shank: stiffness (N/m), damping (N·s/m), hardening (1/m²); ``levers`` (3,):
-    distance of each cuff from its joint, thigh length.
+    ``cuffs`` (2, 3) for thigh and shank: stiffness (N/m), damping (N·s/m), hardening (1/m²);
+    ``levers`` (3,): distance of each cuff from its joint, thigh length.
     """
 
     coulomb: np.ndarray
@@ -74,7 +76,8 @@ class Joints(NamedTuple):
 
 
 class World(NamedTuple):
-    """What is outside the leg: tilt of gravity (base, sway, Hz), payload (body, mass, start, ramp, direction)."""
+    """What is outside the leg: tilt of gravity (base, sway, Hz), payload (body, mass, start, ramp,
+    direction)."""
 
     gravity: float
     tilt: np.ndarray
@@ -93,7 +96,8 @@ class Hidden(NamedTuple):
 
 
 class Log(NamedTuple):
-    """What happened. Samples of 5 ms, latched in their middle: (n, 2); drive torque by ticks of 1 ms."""
+    """What happened. Samples of 5 ms, latched in their middle: (n, 2); drive torque by ticks of 1
+    ms."""
 
     reading: np.ndarray
     """Counted angle, rad."""
@@ -145,7 +149,8 @@ def reference_at(x, t, out):
 
 @njit()
 def _press(jt, z, u, force, pressed):
-    """Let the machine's cuffs push the wearer's leg (coordinates 2 and 3): forces across thigh and shank."""
+    """Let the machine's cuffs push the wearer's leg (coordinates 2 and 3): forces across thigh and
+    shank."""
     thigh, shank, length = jt.levers
     bend = length * cos(z[1])
     hip, knee = z[0] - z[2], z[1] - z[3]
@@ -200,7 +205,8 @@ def _set_world(h, w, t):
 
 @njit()
 def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
-    """Run the leg from rest at ``start`` (2,) and log ``samples`` samples of ``ticks`` ms into ``out``.
+    """Run the leg from rest at ``start`` (2,) and log ``samples`` samples of ``ticks`` ms into
+    ``out``.
 
     Without drives there is no lead-in and no torque: the leg swings freely.
     """
@@ -254,7 +260,8 @@ def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
                 if k >= 0:
                     out.torque[k * ticks + s // STEPS_PER_TICK] = drive
             for i in range(nv):
-                # Speeds belong half a step before the positions; Coriolis torque wants both at one instant.
+                # Speeds belong half a step before the positions; Coriolis torque wants both at one
+                # instant.
                 qpos[i], qvel[i] = z[i], 1.5 * u[i] - 0.5 * before[i]
             evaluate(model, data, bias)
             for i in range(nv):
@@ -326,7 +333,8 @@ def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
                 )
                 load[j] = drive[j] - lam[j] / DT - jt.viscous[j] * u[place[j]] - inert
             if k >= 0 and s == half:
-                # Kicks come at the beginning of a step, where the drive's torque is spread over it: half a
+                # Kicks come at the beginning of a step, where the drive's torque is spread over it:
+                # half a
                 # step back, where the last speeds are, motion and torque belong together.
                 _latch(out, k, z, before, place, d, human, ref, speed, pressed)
             for i in range(n):
@@ -346,7 +354,8 @@ def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
 
 @njit()
 def _grip(V, place, up, down, speed, lam):
-    """Find the friction impulses ``lam`` (2,) within their levels that leave each joint stuck or opposed."""
+    """Find the friction impulses ``lam`` (2,) within their levels that leave each joint stuck or
+    opposed."""
     for j in range(2):
         lam[j] = DT * (max(0.0, up[j]) if speed[j] > 0 else -max(0.0, down[j]))
     for _ in range(25):

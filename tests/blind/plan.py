@@ -1,4 +1,5 @@
-"""What is hidden in one run: every place where an effect can act, gathered before the run is simulated."""
+"""What is hidden in one run: every place where an effect can act, gathered before the run is
+simulated."""
 
 from dataclasses import dataclass, replace
 
@@ -56,7 +57,8 @@ class Plan:
         self.cuffs: NDArray | None = None
         """(2, 6) of thigh and shank cuff, about their joints; None where both legs move as one.
 
-        Stiffness (N·m/rad), damping (N·m·s/rad), hardening (1/rad²), slack (rad), share that relaxes, and its time (s).
+        Stiffness (N·m/rad), damping (N·m·s/rad), hardening (1/rad²), slack (rad), share that
+        relaxes, and its time (s).
         """
 
     def with_lumps(self, leg: Leg) -> Leg:

@@ -1,8 +1,10 @@
-"""World *planar*: closed-form dynamics, friction of bristles, drives in cascade, current sampled at instants.
+"""World *planar*: closed-form dynamics, friction of bristles, drives in cascade, current sampled at
+instants.
 
-Nothing here comes from MuJoCo. Joints have LuGre friction, whose bristles bend a little before a joint slides (Canudas
-de Wit, Olsson, Astrom, Lischinsky, 1995, IEEE TAC 40(3)). A drive has a position loop around a velocity loop with
-integrator, at a rate of its own, and estimates velocity from counts. The torque is what the current was at an instant.
+Nothing here comes from MuJoCo. Joints have LuGre friction, whose bristles bend a little before a
+joint slides (Canudas de Wit, Olsson, Astrom, Lischinsky, 1995, IEEE TAC 40(3)). A drive has a
+position loop around a velocity loop with integrator, at a rate of its own, and estimates velocity
+from counts. The torque is what the current was at an instant.
 """
 
 from dataclasses import dataclass, replace
@@ -35,11 +37,13 @@ DRIVE_RATES_HZ = (500.0, 1000.0, 2000.0, 4000.0)
 KNEE_ROTOR = 0.04
 """kg·m², felt behind a soft transmission only."""
 SOFT_DAMPING = 120.0
-"""Most velocity gain per motor inertia, 1/s, with which drives behind a soft transmission do not hunt."""
+"""Most velocity gain per motor inertia, 1/s, with which drives behind a soft transmission do not
+hunt."""
 CHATTER_NM = 1.0
 """Torque of the velocity loop for one count."""
 COARSE = 2.0**15
-"""Counts per turn below which a drive counts on its motor's side, finer than the angle that it reports."""
+"""Counts per turn below which a drive counts on its motor's side, finer than the angle that it
+reports."""
 STRIBECK_FREE = 1e-3
 """Least friction level, N·m, so that bristles always have one."""
 
@@ -94,7 +98,8 @@ class PlanarMachine:
         return np.array([self.hip_rotor, KNEE_ROTOR])
 
     def tuned_for_soft(self, joint: int) -> "PlanarMachine":
-        """Return the machine with the drive of a joint tuned as a lab would tune it behind a soft transmission."""
+        """Return the machine with the drive of a joint tuned as a lab would tune it behind a soft
+        transmission."""
         gain = self.velocity_gain.copy()
         gain[joint] = min(gain[joint], SOFT_DAMPING * self.rotors[joint])
         return replace(self, velocity_gain=gain)
@@ -104,9 +109,12 @@ class PlanarMachine:
         kd = float(self.velocity_gain[joint])
         stiffness = kd * float(self.position_gain[joint] + 1.0 / self.integral_time[joint])
         return {
-            "type": "cascade", "kp_nm_rad": stiffness, "kd_nm_s_rad": kd, "rate_hz": self.drive_rate_hz,
+            "type": "cascade",
+            "kp_nm_rad": stiffness,
+            "kd_nm_s_rad": kd,
+            "rate_hz": self.drive_rate_hz,
             "limit_nm": float(self.limit[joint]),
-        }  # fmt: skip
+        }
 
 
 def random_machine(rng: Generator, thigh_length: float) -> PlanarMachine:
@@ -207,7 +215,8 @@ class Joints(NamedTuple):
 
 
 class Log(NamedTuple):
-    """What happened, at the samples (n, 2), and torque and angle of the motors at each millisecond."""
+    """What happened, at the samples (n, 2), and torque and angle of the motors at each
+    millisecond."""
 
     reading: np.ndarray
     angle: np.ndarray
@@ -226,7 +235,8 @@ class Log(NamedTuple):
 
 @njit()
 def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
-    """Run the leg from rest at ``start`` (2,) and log ``samples`` samples from time 0 on into ``out``."""
+    """Run the leg from rest at ``start`` (2,) and log ``samples`` samples from time 0 on into
+    ``out``."""
     q, v, a = np.zeros(2), np.zeros(2), np.zeros(2)
     th, om, motor_a = np.zeros(2), np.zeros(2), np.zeros(2)
     hq, hv, ha = np.zeros(2), np.zeros(2), np.zeros(2)
@@ -422,18 +432,34 @@ def move(
     sample_steps = STEPS_PER_MS * conditions.ticks
     tick = round(1.0 / (DT * m.drive_rate_hz))
     drives = Drives(
-        m.position_gain, m.velocity_gain, m.velocity_gain / m.integral_time, m.feedforward, m.limit,
-        2 * np.pi / m.drive_counts, 2 * np.pi / m.counts, plan.encoder_offset, plan.wobble,
+        m.position_gain,
+        m.velocity_gain,
+        m.velocity_gain / m.integral_time,
+        m.feedforward,
+        m.limit,
+        2 * np.pi / m.drive_counts,
+        2 * np.pi / m.counts,
+        plan.encoder_offset,
+        plan.wobble,
         float(1.0 - np.exp(-2 * np.pi * m.velocity_cutoff_hz / m.drive_rate_hz)),
-        float(1.0 - np.exp(-DT / m.current_lag_s)), tick,
-    )  # fmt: skip
+        float(1.0 - np.exp(-DT / m.current_lag_s)),
+        tick,
+    )
     log = empty_log(samples, conditions.ticks)
     none = np.zeros((2, 1))
     excited = Excited(motion.middle, none, none, 1.0, motion.table(samples * conditions.sample_s))
     simulate(
-        excited, drives, _joints(rig, plan), links_of(rig, plan, run), plan.hidden(), motion.middle, samples,
-        sample_steps, True, log,
-    )  # fmt: skip
+        excited,
+        drives,
+        _joints(rig, plan),
+        links_of(rig, plan, run),
+        plan.hidden(),
+        motion.middle,
+        samples,
+        sample_steps,
+        True,
+        log,
+    )
     check(log.angle, log.torque)
     return log
 
@@ -456,15 +482,24 @@ def _joints(rig: Rig, plan: Plan) -> Joints:
     levers = np.array([*m.cuff_distance, m.leg.length])
     cuffs = np.zeros((2, 6)) if plan.cuffs is None else per_metre(plan.cuffs, levers)
     return Joints(
-        m.coulomb, m.viscous, m.coulomb / m.presliding, m.bristle_damping, mass, plan.transmission, m.rotors,
-        plan.spring, cuffs, levers,
-    )  # fmt: skip
+        m.coulomb,
+        m.viscous,
+        m.coulomb / m.presliding,
+        m.bristle_damping,
+        mass,
+        plan.transmission,
+        m.rotors,
+        plan.spring,
+        cuffs,
+        levers,
+    )
 
 
 def _error(
     m: PlanarMachine, clean: NDArray, angle: NDArray, noise: Generator, conditions: Conditions
 ) -> NDArray:
-    """Return the error of the measured torque: its constant, white and coloured noise, lines, and a slow walk."""
+    """Return the error of the measured torque: its constant, white and coloured noise, lines, and a
+    slow walk."""
     n = len(clean)
     out = m.torque_constant * clean
     for j in range(2):

@@ -37,7 +37,8 @@ class Measure:
 
     @property
     def met(self) -> bool | None:
-        """Is the measured value within its bounds? None where nothing is asked for, or nothing was measured."""
+        """Is the measured value within its bounds? None where nothing is asked for, or nothing was
+        measured."""
         if self.value is None or not self.target:
             return None
         return (self.low is None or self.value >= self.low) and (
@@ -147,7 +148,8 @@ def right(scores: Iterable[Score]) -> list[bool]:
 
 
 def rmse_over_floor(scores: Iterable[Score]) -> list[float]:
-    """Return the extended model's RMSE over the true noise floor, of each joint where a model could reach it."""
+    """Return the extended model's RMSE over the true noise floor, of each joint where a model could
+    reach it."""
     return [r for s in of(scores, "single", "pair", "none") for r in s.rmse_over_floor.values()]
 
 

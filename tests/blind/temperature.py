@@ -10,7 +10,8 @@ RATE_HZ = 50.0
 
 
 class Warmth:
-    """How warm both motors are in each run of a session, in the order in which the runs were made."""
+    """How warm both motors are in each run of a session, in the order in which the runs were
+    made."""
 
     def __init__(self, rng: Generator, runs: int) -> None:
         self.room = rng.uniform(18.0, 27.0)

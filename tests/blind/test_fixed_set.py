@@ -1,10 +1,11 @@
 """A fixed set of blind sessions comes out as recorded.
 
-``fixed_set.json`` records of each case what is hidden, the verdict's status, the first cause named, and whether that is
-right. A sixth of the set, all of it in ``make test-slow``, is examined as by ``make blind``, in two processes that
-diagnose by the command. Rounding differs between machines, and decides where two causes or a threshold are close: so
-two of the cases may differ from the record in the first cause or in being right, as long as no more than one right
-answer is lost (``fixed_set.complaints``). All cases are in one test, so that pytest-xdist examines them once.
+``fixed_set.json`` records of each case what is hidden, the verdict's status, the first cause named,
+and whether that is right. A sixth of the set, all of it in ``make test-slow``, is examined as by
+``make blind``, in two processes that diagnose by the command. Rounding differs between machines,
+and decides where two causes or a threshold are close: so two of the cases may differ from the
+record in the first cause or in being right, as long as no more than one right answer is lost
+(``fixed_set.complaints``). All cases are in one test, so that pytest-xdist examines them once.
 """
 
 from collections import Counter
@@ -89,5 +90,6 @@ def test_a_new_false_alarm_is_never_roundings():
 
 def test_a_record_of_other_cases_is_of_no_use():
     assert complaints(RECORDED[1:], RECORDED) == [
-        "fixed_set.json tells of other cases than the fixed set has: rewrite it by `make blind-fixed`"
+        "fixed_set.json tells of other cases than the fixed set has: "
+        "rewrite it by `make blind-fixed`"
     ]

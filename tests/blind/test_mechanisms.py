@@ -57,7 +57,8 @@ def away_from_reversals(dq):
 
 
 def terms(session, m):
-    """Return what inertia, gravity or weight, Coulomb and viscous friction take: the rig in these units."""
+    """Return what inertia, gravity or weight, Coulomb and viscous friction take: the rig in these
+    units."""
     rig, machine = session.rig, session.rig.machine
     torque, angle = rig.units.torque, rig.units.angle
     link = machine.leg.thigh

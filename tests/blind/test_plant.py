@@ -1,4 +1,5 @@
-"""The rig of the blind examination obeys mechanics, and agrees with exoid where nothing is hidden."""
+"""The rig of the blind examination obeys mechanics, and agrees with exoid where nothing is
+hidden."""
 
 import numpy as np
 import pytest

@@ -16,11 +16,17 @@ SECRET = {"hip": 0.5, "knee": 0.4}
 def truth_of(category, *hidden, fault=None, kin=()):
     effects = [
         {
-            "effect": effect, "joint": joint, "form": "some", "own_form": False, "parameters": {"play": 0.03},
-            "magnitude": 0.1, "rms_nm": 1.0, "kin": list(kin),
+            "effect": effect,
+            "joint": joint,
+            "form": "some",
+            "own_form": False,
+            "parameters": {"play": 0.03},
+            "magnitude": 0.1,
+            "rms_nm": 1.0,
+            "kin": list(kin),
         }
         for effect, joint in hidden
-    ]  # fmt: skip
+    ]
     case = {"seed": 1, "category": category, "kinds": ["exo_alone", "with_human"], "machine": "leg"}
     return {
         "case": case,
@@ -34,19 +40,28 @@ def truth_of(category, *hidden, fault=None, kin=()):
 def cause(effect, joint, *ties, probability=0.9, parameters=()):
     tied = [{"effect": e, "joint": j, "why": "", "how_to_separate": ""} for e, j in ties]
     return {
-        "effect": effect, "joint": joint, "probability": probability, "parameters": list(parameters),
+        "effect": effect,
+        "joint": joint,
+        "probability": probability,
+        "parameters": list(parameters),
         "indistinguishable_from": tied,
-    }  # fmt: skip
+    }
 
 
 def answer_of(*causes, status="explained", faults=(), exit_code=0, message=""):
     verdict = {
-        "status": status, "causes": list(causes), "data_faults": list(faults),
-        "extended_rmse_nm": {"hip": 0.55, "knee": 0.4}, "noise_floor_nm": {"hip": 0.5, "knee": 0.36},
-    }  # fmt: skip
+        "status": status,
+        "causes": list(causes),
+        "data_faults": list(faults),
+        "extended_rmse_nm": {"hip": 0.55, "knee": 0.4},
+        "noise_floor_nm": {"hip": 0.5, "knee": 0.36},
+    }
     return {
-        "exit_code": exit_code, "message": message, "seconds": 2.0, "verdict": None if exit_code else verdict,
-    }  # fmt: skip
+        "exit_code": exit_code,
+        "message": message,
+        "seconds": 2.0,
+        "verdict": None if exit_code else verdict,
+    }
 
 
 PLAY = ("backlash", "knee")
@@ -190,8 +205,9 @@ def test_the_diagnosis_gets_the_recordings_and_nothing_else(tmp_path):
     )
     files = ["run_1.parquet", "run_2.parquet"]
     assert answer["verdict"] == {
-        "argv": ["diagnose", *files, "--out", str(tmp_path / "answers"), "--no-figures"], "there": files,
-    }  # fmt: skip
+        "argv": ["diagnose", *files, "--out", str(tmp_path / "answers"), "--no-figures"],
+        "there": files,
+    }
     assert answer["message"] == "a warning"
     assert answer["exit_code"] == 0
 

@@ -1,4 +1,5 @@
-"""A session is what its seed says, hits its magnitude, reads as a recording, and keeps its secret."""
+"""A session is what its seed says, hits its magnitude, reads as a recording, and keeps its
+secret."""
 
 import json
 
@@ -127,7 +128,8 @@ def test_recordings_say_nothing_of_the_truth(tmp_path):
         assert not [secret for secret in secrets if secret in said]
         header = json.loads(schema.metadata[b"exoid"])
         assert set(header) == {
-            "contract", "run", "purpose", "sample_rate_hz", "period_s", "session", "controller", "geometry",
+            "contract", "run", "purpose", "sample_rate_hz", "period_s", "session", "controller",
+            "geometry",
         }  # fmt: skip
 
 
@@ -135,7 +137,8 @@ def test_every_cause_of_the_contract_can_be_hidden(pytestconfig):
     page = (pytestconfig.rootpath / "docs" / "contracts.md").read_text()
     table = page.split("## The causes' names")[1].split("\n## ")[0]
     named = {line.split("`")[1] for line in table.splitlines() if line.startswith("| `")}
-    # No motion tells a rotor's coupling from the shank's and the rotor's inertia: nothing could name it.
+    # No motion tells a rotor's coupling from the shank's and the rotor's inertia: nothing could
+    # name it.
     assert set(CAUSES) >= named - {"rotor_coupling"}
 
 

@@ -1,9 +1,11 @@
-"""World *two_mass*: motors and links are masses of their own, joined by stiff springs at both joints.
+"""World *two_mass*: motors and links are masses of their own, joined by stiff springs at both
+joints.
 
 Friction acts on the motors: regularised Coulomb friction whose level rises a little with the load
-over a preload, and a gear that loses a share of what it transmits. Cuffs are always firm but finite,
-so the wearer's leg is one of its own. Drives follow a model of the leg (computed torque, or position
-control with gravity) that is a little wrong. The measured torque is a mean over the sample.
+over a preload, and a gear that loses a share of what it transmits. Cuffs are always firm but
+finite, so the wearer's leg is one of its own. Drives follow a model of the leg (computed torque, or
+position control with gravity) that is a little wrong. The measured torque is a mean over the
+sample.
 """
 
 from dataclasses import dataclass, replace
@@ -247,7 +249,8 @@ def _command(d, ref, old_ref, older_ref, seen, speed, tick, M, bias, wanted):
     for j in range(2):
         rate = (ref[j] - old_ref[j]) / tick
         error = d.kp[j] * (ref[j] - seen[j]) + d.kd[j] * (rate - speed[j])
-        # Here kp and kd are torques; a computed torque wants accelerations of the diagonal's inertia.
+        # Here kp and kd are torques; a computed torque wants accelerations of the diagonal's
+        # inertia.
         pull[j] = error / M[j, j] if d.computed_torque else error
         if d.computed_torque:
             pull[j] += (ref[j] - 2.0 * old_ref[j] + older_ref[j]) / (tick * tick)
