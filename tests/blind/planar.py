@@ -157,7 +157,7 @@ def random_machine(rng: Generator, thigh_length: float) -> PlanarMachine:
         drive_counts=drive_counts,
         ripple=ripple,
         ripple_time=np.exp(rng.uniform(np.log(0.002), np.log(0.2), 2)),
-        ripple_white=rng.uniform(0.1, 0.7, 2),
+        ripple_white=rng.uniform(0.0, 0.4, 2),
         ripple_lines=lines,
         ripple_cycles=rng.integers(500, 2000, (2, 3)).astype(float),
         ripple_phase=rng.uniform(0.0, 2 * np.pi, (2, 3)),
