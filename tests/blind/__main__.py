@@ -94,9 +94,9 @@ def main(
         console=console,
     )
     scores = list(progress)
-    report.show(console, scores)
     command = " ".join(["python -m tests.blind", *sys.argv[1:]])
     report.write(out, report.Examination(command, scores))
+    report.show(console, scores)
     if write:
         fixed_set.write(fixed_set.outcomes(planned, scores))
 

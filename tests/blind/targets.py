@@ -75,6 +75,8 @@ def measures(scores: Sequence[Score]) -> list[Measure]:
             (s.status == SILENT for s in outside),
             high=0.05,
         ),
+        _rate("outside the catalogue: right family of laws", family(outside), low=0.80),
+        _rate("outside, kinds never learned from", right(s for s in outside if s.held_back)),
         _rate("data fault named", right(of(scores, "fault"))),
         _rate(
             "refused or crashed", (s.status in ("refused", "crashed") for s in physical), high=0.0
@@ -86,6 +88,7 @@ def measures(scores: Sequence[Score]) -> list[Measure]:
         ),
         _number("Brier score", brier(forecasts), high=0.05),
         _number("expected calibration error", calibration_error(forecasts), high=0.05),
+        _number("mean log probability of the truth", log_probability(scores)),
         _rate(
             "95 % intervals that hold the truth",
             (c[2] for s in scores for c in s.covered),
