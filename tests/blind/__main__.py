@@ -67,7 +67,7 @@ def main(
         )
     if one_joint and (fixed or every or only):
         raise typer.BadParameter(
-            "machines of one joint have mixed examinations only: leave --fixed, --full and --only away",
+            "machines of one joint have mixed examinations only: leave out --fixed, --full, --only",
             param_hint="--one-joint",
         )
     if world not in (*WORLDS, "all"):
@@ -94,9 +94,9 @@ def main(
         console=console,
     )
     scores = list(progress)
-    report.show(console, scores)
     command = " ".join(["python -m tests.blind", *sys.argv[1:]])
     report.write(out, report.Examination(command, scores))
+    report.show(console, scores)
     if write:
         fixed_set.write(fixed_set.outcomes(planned, scores))
 

@@ -33,7 +33,8 @@ PAYLOAD_INERTIA = 1e-3
 
 @dataclass(frozen=True)
 class Segment:
-    """A rigid link: mass (kg), centre of mass along and in front of its axis (m), inertia about that centre (kg·m²)."""
+    """A rigid link: mass (kg), centre of mass along and in front of its axis (m), inertia about
+    that centre (kg·m²)."""
 
     mass: float
     along: float
@@ -66,7 +67,8 @@ class Leg:
         return Leg(self.thigh + other.thigh, self.shank + other.shank, self.length, self.gravity)
 
     def inertial(self) -> NDArray:
-        """X1..X4 of the leg: what an identification should find where the centres lie on the axes."""
+        """X1..X4 of the leg: what an identification should find where the centres lie on the
+        axes."""
         t, s = self.thigh, self.shank
         X2 = s.mass * s.along**2 + s.inertia
         X1 = t.mass * t.along**2 + t.inertia + s.mass * self.length**2 + X2
@@ -75,7 +77,8 @@ class Leg:
 
 @dataclass(frozen=True)
 class Payload:
-    """A lump on a segment (0 thigh, 1 shank), ``distance`` m down its axis; its mass is set as time goes by."""
+    """A lump on a segment (0 thigh, 1 shank), ``distance`` m down its axis; its mass is set as time
+    goes by."""
 
     joint: int
     distance: float
@@ -91,13 +94,25 @@ class Body:
 
     @property
     def handles(self) -> tuple:
-        """What the compiled loop takes: addresses, state, bias, mass matrix (lower triangle), masses, gravity."""
+        """What the compiled loop takes: addresses, state, bias, mass matrix (lower triangle),
+        masses, gravity."""
         m, d = self.model, self.data
         pattern = np.array([m.M_rowadr, m.M_rownnz]).astype(np.int64)
         return (
-            m._address, d._address, d.qpos, d.qvel, d.qacc, d.qfrc_bias, d.M, pattern, m.M_colind.astype(np.int64),
-            m.body_mass, m.body_subtreemass, m.body_inertia, m.opt.gravity,
-        )  # fmt: skip
+            m._address,
+            d._address,
+            d.qpos,
+            d.qvel,
+            d.qacc,
+            d.qfrc_bias,
+            d.M,
+            pattern,
+            m.M_colind.astype(np.int64),
+            m.body_mass,
+            m.body_subtreemass,
+            m.body_inertia,
+            m.opt.gravity,
+        )
 
     def inverse(self, q: NDArray, dq: NDArray, ddq: NDArray) -> NDArray:
         """Torque that moves the leg along a motion, (n, 2) N·m."""
@@ -107,7 +122,8 @@ class Body:
 
 
 def mjcf(leg: Leg, wearer: Leg | None = None, payload: Payload | None = None) -> str:
-    """Return the model: hinges turn about -y, so that with z up and the leg hanging, forward (x) is positive.
+    """Return the model: hinges turn about -y, so that with z up and the leg hanging, forward (x) is
+    positive.
 
     A wearer who is not one with the machine hangs beside it as a second leg.
     """
@@ -128,7 +144,8 @@ def _chain(leg: Leg, inside: list[str]) -> str:
 
 
 def _inertial(s: Segment) -> str:
-    # Only the inertia about the hinges' direction matters; the others keep MuJoCo's triangle inequality.
+    # Only the inertia about the hinges' direction matters; the others keep MuJoCo's triangle
+    # inequality.
     return (
         f'<inertial pos="{s.forward!r} 0 {-s.along!r}" mass="{s.mass!r}" '
         f'diaginertia="{s.inertia!r} {s.inertia!r} {s.inertia!r}"/>'

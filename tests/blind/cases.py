@@ -52,7 +52,15 @@ class Case:
     machine: str = "leg"
     world: str = "mujoco"
     plain: bool = False
-    """As in the first examinations: one rate, one kind of motion, a faultless rig. Only in world ``mujoco``."""
+    """As in the first examinations: one rate, one kind of motion, a faultless rig. Only in world
+    ``mujoco``."""
+
+    def __post_init__(self) -> None:
+        """Refuse what no simulator has."""
+        if self.plain and self.world != "mujoco":
+            raise ValueError(f"plain cases are of world mujoco, not of {self.world}")
+        if self.machine != "leg" and not self.plain:
+            raise ValueError(f"a {self.machine} is simulated in plain cases only: set plain")
 
     @property
     def label(self) -> str:
@@ -69,7 +77,8 @@ class Case:
 def mixed(
     cases: int, seed_base: int, mix: dict[str, float] = MIX, worlds: Sequence[str] = ("mujoco",)
 ) -> list[Case]:
-    """Return cases of all categories, as many of each world; each goes through its causes in turn."""
+    """Return cases of all categories, as many of each world; each goes through its causes in
+    turn."""
     each = [cases // len(worlds) + (w < cases % len(worlds)) for w in range(len(worlds))]
     planned = [
         (category, i + w * STAGGER, world)
@@ -90,7 +99,8 @@ def _counts(cases: int, mix: dict[str, float]) -> dict[str, int]:
 def of_one_joint(
     cases: int, seed_base: int, mix: dict[str, float] = MIX_OF_ONE_JOINT
 ) -> list[Case]:
-    """Return cases of machines of one joint, each category going through machines and causes in turn."""
+    """Return cases of machines of one joint, each category going through machines and causes in
+    turn."""
     places = [
         (name, effect)
         for effect in CAUSES
@@ -103,7 +113,8 @@ def of_one_joint(
     planned = []
     for category, count in _counts(cases, mix).items():
         choices = hides[category]
-        # A step that shares no factor with their number takes every choice before any a second time.
+        # A step that shares no factor with their number takes every choice before any a second
+        # time.
         step = next(s for s in range(7, 7 + len(choices)) if np.gcd(s, len(choices)) == 1)
         planned += [(category, *choices[i * step % len(choices)]) for i in range(count)]
     return [
@@ -123,7 +134,8 @@ def of_one_joint(
 def full(
     seed_base: int, each: int = 30, none: int = 300, worlds: Sequence[str] = ("mujoco",)
 ) -> list[Case]:
-    """Return ``none`` cases with nothing hidden and ``each`` of every cause and joint, in turn in each world."""
+    """Return ``none`` cases with nothing hidden and ``each`` of every cause and joint, in turn in
+    each world."""
     silent = [case(seed_base + k, "none", k, worlds[k % len(worlds)]) for k in range(none)]
     singles = [
         # Every cause in every world, though their numbers may share a factor.

@@ -1,8 +1,8 @@
 """The catalogue's causes as a plant would have them: for each, several functional forms.
 
-``FORMS[cause]`` lists functions that draw one form's shape and return a ``Cause``; ``own`` marks the forms
-that the catalogue itself writes down, all others are what the literature offers beside them. ``size`` is the
-one number by which a cause's magnitude is set.
+``FORMS[cause]`` lists functions that draw one form's shape and return a ``Cause``; ``own`` marks
+the forms that the catalogue itself writes down, all others are what the literature offers beside
+them. ``size`` is the one number by which a cause's magnitude is set.
 """
 
 from collections.abc import Callable
@@ -81,11 +81,17 @@ WORLDS = ("mujoco", "planar", "two_mass")
 
 
 def form(
-    effect: str, *, own: bool = False, worlds: tuple[str, ...] = WORLDS, plain: bool = True
+    effect: str,
+    *,
+    own: bool = False,
+    worlds: tuple[str, ...] = WORLDS,
+    plain: bool = True,
+    warm: bool = False,
 ) -> Callable:
     """Register a form of a cause; the function's name is the form's.
 
-    ``worlds`` are those whose plants have it; ``plain`` cases draw from the forms of the first examinations only.
+    ``worlds`` are those whose plants have it, ``plain`` cases draw from the forms of the first
+    examinations only, and ``warm`` forms need temperatures, which plain cases have not.
     """
 
     def register(draw: Callable) -> Callable:
@@ -108,6 +114,7 @@ def form(
         made.form = draw.__name__
         made.worlds = worlds
         made.plain = plain
+        made.warm = warm
         FORMS.setdefault(effect, []).append(made)
         return draw
 
@@ -147,9 +154,13 @@ def hidden_torque(
 def _stribeck(kind, rng, joint):
     vs = rng.uniform(0.12, 0.45)
     return dict(
-        install=hidden_torque(kind, joint, vs), start=3.0, shape=(vs,),
-        parameters=lambda s: {"stribeck_torque": s, "stribeck_velocity": vs} if kind == dry.STRIBECK_GAUSS else {},
-    )  # fmt: skip
+        install=hidden_torque(kind, joint, vs),
+        start=3.0,
+        shape=(vs,),
+        parameters=lambda s: (
+            {"stribeck_torque": s, "stribeck_velocity": vs} if kind == dry.STRIBECK_GAUSS else {}
+        ),
+    )
 
 
 @form("stribeck_friction", own=True)
@@ -191,26 +202,30 @@ def smooth_transition(rng, joint):
 def by_speed(rng, joint):
     sign = either(rng)
     return dict(
-        install=hidden_torque(smooth.VISCOUS_ASYMMETRY, joint, sign=sign), start=2.0,
+        install=hidden_torque(smooth.VISCOUS_ASYMMETRY, joint, sign=sign),
+        start=2.0,
         parameters=lambda s: {"asymmetry": sign * s},
-    )  # fmt: skip
+    )
 
 
 @form("viscous_asymmetry")
 def rounded(rng, joint):
     width = rng.uniform(0.1, 0.3)
     return dict(
-        install=hidden_torque(smooth.VISCOUS_ASYMMETRY_SMOOTH, joint, width, sign=either(rng)), start=2.0,
+        install=hidden_torque(smooth.VISCOUS_ASYMMETRY_SMOOTH, joint, width, sign=either(rng)),
+        start=2.0,
         shape=(width,),
-    )  # fmt: skip
+    )
 
 
 @form("load_dependent_friction", own=True)
 def proportional(rng, joint):
     return dict(
-        install=hidden_torque(dry.LOAD_LINEAR, joint), start=0.1, largest=0.45,
+        install=hidden_torque(dry.LOAD_LINEAR, joint),
+        start=0.1,
+        largest=0.45,
         parameters=lambda s: {"load_coefficient": s},
-    )  # fmt: skip
+    )
 
 
 @form("load_dependent_friction")
@@ -245,9 +260,13 @@ def power(rng, joint):
 def _presliding(kind, rng, joint, *more):
     angle = log_uniform(rng, 0.015, 0.1)
     return dict(
-        install=hidden_torque(kind, joint, angle, *more), start=1.5, shape=(angle, *more),
-        parameters=lambda s: {"friction_torque": s, "presliding_angle": angle} if kind == smooth.DAHL else {},
-    )  # fmt: skip
+        install=hidden_torque(kind, joint, angle, *more),
+        start=1.5,
+        shape=(angle, *more),
+        parameters=lambda s: (
+            {"friction_torque": s, "presliding_angle": angle} if kind == smooth.DAHL else {}
+        ),
+    )
 
 
 @form("presliding_hysteresis", own=True)
@@ -281,10 +300,16 @@ def _warm_up(coulomb_kind, viscous_kind, rng, joint):
 
     own = coulomb_kind == dry.WARMUP_EXPONENTIAL
     return dict(
-        install=install, start=2.0, slow=True, shape=(time, share),
-        parameters=lambda s: {"viscous_drop": s * viscous, "coulomb_drop": s * share, "time_constant": time} if own
-        else {},
-    )  # fmt: skip
+        install=install,
+        start=2.0,
+        slow=True,
+        shape=(time, share),
+        parameters=lambda s: (
+            {"viscous_drop": s * viscous, "coulomb_drop": s * share, "time_constant": time}
+            if own
+            else {}
+        ),
+    )
 
 
 @form("friction_warmup", own=True)
@@ -300,9 +325,13 @@ def power_law(rng, joint):
 def _cogging(rng, joint, second):
     cycles, phase = float(rng.integers(8, 60)), rng.uniform(0.0, 2 * np.pi)
     return dict(
-        install=hidden_torque(smooth.COGGING, joint, cycles, phase, second, rng.uniform(0.0, 2 * np.pi)), start=1.0,
-        shape=(cycles, phase, second), parameters=lambda s: {"amplitude": s, "cycles_per_turn": cycles},
-    )  # fmt: skip
+        install=hidden_torque(
+            smooth.COGGING, joint, cycles, phase, second, rng.uniform(0.0, 2 * np.pi)
+        ),
+        start=1.0,
+        shape=(cycles, phase, second),
+        parameters=lambda s: {"amplitude": s, "cycles_per_turn": cycles},
+    )
 
 
 @form("cogging", own=True)
@@ -344,9 +373,13 @@ def play(kind, rng, joint):
         plan.soft(joint, kind, stiffness, damping, size)
 
     return dict(
-        install=install, start=0.03, smallest=0.004, largest=0.2, shape=(stiffness, damping),
+        install=install,
+        start=0.03,
+        smallest=0.004,
+        largest=0.2,
+        shape=(stiffness, damping),
         parameters=lambda s: {"play": s} if kind == PLAY else {},
-    )  # fmt: skip
+    )
 
 
 @form("backlash")
@@ -365,10 +398,13 @@ def elastic(kind, rng, joint, *more):
         plan.soft(joint, kind, 1.0 / size, damping, *more)
 
     return dict(
-        install=install, start=1 / 800.0,
-        smallest=1 / 4000.0, largest=1 / 90.0, shape=more,
+        install=install,
+        start=1 / 800.0,
+        smallest=1 / 4000.0,
+        largest=1 / 90.0,
+        shape=more,
         parameters=lambda s: {"stiffness": 1.0 / s} if not more else {},
-    )  # fmt: skip
+    )
 
 
 @form("joint_elasticity", own=True)
@@ -392,9 +428,11 @@ def soft_wind_up(rng, joint):
 def _spring(rng, joint, cubic, damping):
     rest = rng.uniform(LOWEST[joint], HIGHEST[joint])
     return dict(
-        install=hidden_torque(smooth.SPRING, joint, rest, cubic, damping), start=5.0, shape=(rest, cubic, damping),
+        install=hidden_torque(smooth.SPRING, joint, rest, cubic, damping),
+        start=5.0,
+        shape=(rest, cubic, damping),
         parameters=lambda s: {"stiffness": s, "rest_angle": rest} if cubic == damping == 0 else {},
-    )  # fmt: skip
+    )
 
 
 @form("parallel_spring", own=True)
@@ -479,9 +517,12 @@ def payload(rng, joint, ramp, *, everywhere):
             plan.load = np.array([size / distance, share * run.duration_s, ramp, direction])
 
     return dict(
-        install=install, start=0.5, slow=True, shape=(distance, ramp, direction),
+        install=install,
+        start=0.5,
+        slow=True,
+        shape=(distance, ramp, direction),
         parameters=lambda s: {"mass_moment": direction * s},
-    )  # fmt: skip
+    )
 
 
 @form("payload_change", own=True)
@@ -618,9 +659,11 @@ def _end_range(kind, rng, joint, reach, *sharpness):
     depth = rng.uniform(0.25, 0.45) * (high - low)
     onset = high - depth if side > 0 else low + depth
     return dict(
-        install=hidden_torque(kind, joint, onset, *sharpness, side, human=True), start=2.0, human=True,
+        install=hidden_torque(kind, joint, onset, *sharpness, side, human=True),
+        start=2.0,
+        human=True,
         shape=(onset, *sharpness, side),
-    )  # fmt: skip
+    )
 
 
 @form("passive_joint_torque", own=True)
@@ -656,9 +699,13 @@ def _rhythm(kind, rng, joint, depth):
 
     own = kind == smooth.RHYTHM
     return dict(
-        install=install, start=2.0, human=True, slow=True, shape=(frequency, depth),
+        install=install,
+        start=2.0,
+        human=True,
+        slow=True,
+        shape=(frequency, depth),
         parameters=lambda s: {"amplitude": s, "frequency": frequency} if own else {},
-    )  # fmt: skip
+    )
 
 
 @form("voluntary_torque", own=True)
@@ -679,10 +726,14 @@ def pushes(rng, joint):
 def _reflex(kind, rng, joint, *more):
     threshold, side = rng.uniform(0.2, 0.6), either(rng)
     return dict(
-        install=hidden_torque(kind, joint, threshold, side, *more, human=True), start=5.0, human=True,
+        install=hidden_torque(kind, joint, threshold, side, *more, human=True),
+        start=5.0,
+        human=True,
         shape=(threshold, side, *more),
-        parameters=lambda s: {"gain": s, "threshold_velocity": threshold} if kind == smooth.REFLEX else {},
-    )  # fmt: skip
+        parameters=lambda s: (
+            {"gain": s, "threshold_velocity": threshold} if kind == smooth.REFLEX else {}
+        ),
+    )
 
 
 @form("spasticity", own=True)
@@ -752,6 +803,6 @@ def random_cause(
     """
     known = [f for f in FORMS[effect] if (f.plain if world is None else world in f.worlds)]
     # What the first examinations did not hide has no plain forms: a machine of one joint takes any.
-    known = known or [f for f in FORMS[effect] if WORLDS[0] in f.worlds]
+    known = known or [f for f in FORMS[effect] if WORLDS[0] in f.worlds and not f.warm]
     forms = [f for f in known if form_name in (None, f.form)]
     return forms[int(rng.integers(len(forms)))](rng, joint, reach)

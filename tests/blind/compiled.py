@@ -13,7 +13,8 @@ import numba
 
 HERE = Path(__file__).parent
 SOURCES = (
-    "body", "dry", "further_torques", "loop", "planar", "smooth", "transmissions", "two_link", "two_mass",
+    "body", "dry", "encoders", "further_torques", "loop", "planar", "smooth", "transmissions",
+    "two_link", "two_mass",
 )  # fmt: skip
 """Files with compiled functions."""
 

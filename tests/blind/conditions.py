@@ -34,7 +34,8 @@ WITH_TEMPERATURE = 0.25
 WITHOUT_REFERENCE, WITHOUT_SPEED, WITHOUT_COUNTER, WITHOUT_CONTROLLER = 0.15, 0.25, 0.2, 0.25
 """Shares of sessions without what a recording may have."""
 IMPERFECTIONS, SMALLEST, LARGEST = (2, 5), 0.0002, 0.0025
-"""How many small effects even a good rig has, and how large: rms over that of the joint's torque."""
+"""How many small effects even a good rig has, and how large: rms over that of the joint's
+torque."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ from tests.blind.recorded import Rig
 def pad_forces(rig: Rig, along: NDArray, across: NDArray, noise: Generator) -> NDArray:
     """Return the forces of four sensors (n, 4, 3) N: thigh front and back, shank front and back.
 
-    Axes are distal, forward, lateral; ``along`` and ``across`` (n, 2) are the forces at thigh and shank.
+    Axes are distal, forward, lateral; ``along`` and ``across`` (n, 2) are the forces at thigh and
+    shank.
     """
     machine = rig.machine
     forces = np.zeros((len(across), 4, 3))
@@ -24,10 +25,11 @@ def pad_forces(rig: Rig, along: NDArray, across: NDArray, noise: Generator) -> N
 
 
 def firm_forces(rig: Rig, q: NDArray, torque: NDArray) -> tuple[NDArray, NDArray]:
-    """Return forces along and across thigh and shank, (n, 2) N each, when the wearer's leg moves as the machine does.
+    """Return forces along and across thigh and shank, (n, 2) N each, when the wearer's leg moves as
+    the machine does.
 
-    ``torque`` (n, 2) is what the wearer's own leg takes at its angles ``q`` from the vertical; forces follow from the
-    levers, the shank's first.
+    ``torque`` (n, 2) is what the wearer's own leg takes at its angles ``q`` from the vertical;
+    forces follow from the levers, the shank's first.
     """
     machine, leg = rig.machine, rig.person.leg
     thigh_lever, shank_lever = machine.cuff_distance

@@ -1,7 +1,7 @@
 """Hidden dry friction: what it adds to the level that opposes motion forward and backward.
 
-Each form is a number, its parameters ``p``, and a line in ``dry_levels``. Sources: Armstrong-Helouvry,
-Dupont, Canudas de Wit (1994), Automatica 30(7) for the Stribeck shapes.
+Each form is a number, its parameters ``p``, and a line in ``dry_levels``. Sources:
+Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30(7) for the Stribeck shapes.
 """
 
 from math import exp, sin, sqrt, tanh
@@ -21,7 +21,8 @@ WARMUP_TWO, WARMUP_LATE, LEVEL_TABLE = 106, 107, 108
 POSITION_LINEAR, POSITION_SINE, POSITION_PATCH = 109, 110, 111
 OTHER_LOAD, LOAD_LOPSIDED = 112, 113
 LAST_DRY, FIRST_DRY_AGAIN = 19, 100
-"""Numbers up to the one and from the other on are dry friction, those between them are smooth torques."""
+"""Numbers up to the one and from the other on are dry friction, those between them are smooth
+torques."""
 
 
 @njit()
@@ -34,7 +35,8 @@ def is_dry(kind):
 def dry_levels(kind, p, table, t, j, angle, other_angle, speed, load):
     """Levels added forward and backward at joint ``j``, N·m.
 
-    ``angle`` is the joint's own, ``speed`` and ``load`` (the torque passed on to the link) are of both joints.
+    ``angle`` is the joint's own, ``speed`` and ``load`` (the torque passed on to the link) are of
+    both joints.
     """
     v = abs(speed[j])
     level = 0.0

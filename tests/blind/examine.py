@@ -19,12 +19,14 @@ from tests.blind.detection import smallest_visible
 from tests.blind.scoring import Score, score
 
 SIMULATOR = (
-    "body", "cases", "causes", "channel", "conditions", "cuffs", "dry", "excitation", "families", "faults", "floor", "further_forms", "further_torques", "imperfections", "legs",
-    "loop", "machine", "magnitude", "mechanisms", "outside", "people", "plan", "planar", "plant", "recorded",
-    "recorder", "session", "smooth", "temperature", "trajectories", "transmissions", "two_link", "two_mass", "units", "wandering",
-    "worlds",
+    "body", "cases", "causes", "channel", "compiled", "conditions", "cuffs", "dry", "encoders",
+    "excitation", "families", "faults", "floor", "further_forms", "further_torques",
+    "imperfections", "legs", "loop", "machine", "magnitude", "mechanisms", "outside", "people",
+    "plan", "planar", "plant", "recorded", "recorder", "session", "smooth", "temperature",
+    "trajectories", "transmissions", "two_link", "two_mass", "units", "wandering", "worlds",
 )  # fmt: skip
-"""What decides how a session looks: when one of these files changes, sessions are simulated anew."""
+"""What decides how a session looks: when one of these files changes, sessions are simulated
+anew."""
 ONE_THREAD = {
     name: "1"
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -61,7 +63,8 @@ def fingerprint() -> str:
 
 
 def neutral_name(case: Case) -> str:
-    """Name a session so that the name says nothing, and is another one when the simulator has changed."""
+    """Name a session so that the name says nothing, and is another one when the simulator has
+    changed."""
     return hashlib.sha256(f"{fingerprint()} {case}".encode()).hexdigest()[:12]
 
 
@@ -119,9 +122,13 @@ def diagnose(recordings: Path, out: Path, program: Sequence[str | Path] = EXOID)
     begin = time.perf_counter()
     try:
         ended = subprocess.run(
-            [*program, "diagnose", *files, "--out", out, "--no-figures"], cwd=recordings, env=os.environ | ONE_THREAD,
-            text=True, capture_output=True, timeout=TIME_LIMIT_S,
-        )  # fmt: skip
+            [*program, "diagnose", *files, "--out", out, "--no-figures"],
+            cwd=recordings,
+            env=os.environ | ONE_THREAD,
+            text=True,
+            capture_output=True,
+            timeout=TIME_LIMIT_S,
+        )
         exit_code, message = ended.returncode, ended.stderr[-2000:]
     except subprocess.TimeoutExpired:
         exit_code, message = 1, f"no answer within {TIME_LIMIT_S:g} s"

@@ -1,4 +1,5 @@
-"""Excitations: periodic multi-sines within the paper's Table 2, the most informative of a few random ones."""
+"""Excitations: periodic multi-sines within the paper's Table 2, the most informative of a few
+random ones."""
 
 from dataclasses import dataclass
 
@@ -34,7 +35,8 @@ class Excitation:
 
 
 def random_excitation(rng: Generator, tries: int = 60) -> Excitation:
-    """Draw feasible excitations of one number of harmonics and return the one with the largest determinant."""
+    """Draw feasible excitations of one number of harmonics and return the one with the largest
+    determinant."""
     harmonics = int(rng.integers(3, 6))
     drawn = [_feasible(rng, harmonics) for _ in range(tries)]
     return max(drawn, key=_information)

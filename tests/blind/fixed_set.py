@@ -1,7 +1,8 @@
 """The fixed set that CI examines, and the record of how each of its cases came out.
 
-The set is chosen by number alone: every cause once, hip and knee in turn, then the first few of each other category.
-``fixed_set.json`` holds what came out; ``python -m tests.blind --fixed --write`` rewrites it.
+The set is chosen by number alone: every cause once, hip and knee in turn, then the first few of
+each other category. ``fixed_set.json`` holds what came out; ``python -m tests.blind --fixed
+--write`` rewrites it.
 """
 
 import json
@@ -75,10 +76,11 @@ def read(path: Path = RECORD) -> list[Outcome]:
 def complaints(recorded: Sequence[Outcome], found: Sequence[Outcome]) -> list[str]:
     """Say what is not as recorded, a line each; nothing where all is well.
 
-    Rounding differs between machines, and where two causes or a threshold are close it decides. So of the cases at
-    most two may differ in whether they are right or in the first cause, and at most one right answer may be lost. Two
-    things are never allowed: a new false alarm, and a case that has become right, which belongs into the record lest it
-    be lost again unnoticed. Once recorded, a machine whose rounding makes it wrong is within what is allowed.
+    Rounding differs between machines, and where two causes or a threshold are close it decides. So
+    of the cases at most two may differ in whether they are right or in the first cause, and at most
+    one right answer may be lost. Two things are never allowed: a new false alarm, and a case that
+    has become right, which belongs into the record lest it be lost again unnoticed. Once recorded,
+    a machine whose rounding makes it wrong is within what is allowed.
     """
     if [(o.seed, o.hidden) for o in recorded] != [(o.seed, o.hidden) for o in found]:
         return [

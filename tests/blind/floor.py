@@ -1,4 +1,5 @@
-"""The true noise floor: what is left when everything hidden is known, after the regression filter."""
+"""The true noise floor: what is left when everything hidden is known, after the regression
+filter."""
 
 from collections.abc import Sequence
 
@@ -15,10 +16,11 @@ CUTOFFS_HZ = (3.0, 5.0, 8.0, 12.0, 18.0)
 
 
 def noise_floor(rig: Rig, runs: Sequence[Recorded]) -> NDArray:
-    """RMS (2,) N·m of measured torque less the truth's, along the measured motion, pooled over runs.
+    """RMS (2,) N·m of measured torque less the truth's, along the measured motion, pooled over
+    runs.
 
-    The truth along a motion that was measured with coarse encoders and filtered is itself noisy; of some
-    cut-offs the best counts, as the most that any method could reach.
+    The truth along a motion that was measured with coarse encoders and filtered is itself noisy; of
+    some cut-offs the best counts, as the most that any method could reach.
     """
     squares = np.min([_squares(rig, runs, hz) for hz in CUTOFFS_HZ], axis=0)
     return np.sqrt(squares)
@@ -31,11 +33,13 @@ def ripple_floor(runs: Sequence[Recorded]) -> NDArray:
 
 
 def left_by_the_baseline(rig: Rig, runs: Sequence[Recorded]) -> NDArray:
-    """RMS (2,) N·m of the hidden effects that rigid body and friction cannot imitate, over these runs."""
+    """RMS (2,) N·m of the hidden effects that rigid body and friction cannot imitate, over these
+    runs."""
     kinds = sorted({r.run.kind for r in runs})
     rows, effects = [], []
     for r in runs:
-        # Along the true links: near enough to the reported motion to span what the baseline can absorb.
+        # Along the true links: near enough to the reported motion to span what the baseline can
+        # absorb.
         q, dq, ddq = (r.link[:, 2 * i : 2 * i + 2] for i in range(3))
         Y = baseline_columns(q, dq, ddq, rig.machine.leg.length, rig.machine.leg.gravity)
         wide = np.zeros((*Y.shape[:2], 4 * len(kinds) + 4))

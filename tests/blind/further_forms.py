@@ -29,9 +29,9 @@ from tests.blind.wandering import random_walk
 PLANAR, TWO_MASS, NEW_WORLDS = ("planar",), ("two_mass",), ("planar", "two_mass")
 
 
-def new(effect, worlds=WORLDS, *, own=False):
+def new(effect, worlds=WORLDS, *, own=False, warm=False):
     """Register a form that plain cases do not draw."""
-    return form(effect, own=own, worlds=worlds, plain=False)
+    return form(effect, own=own, worlds=worlds, plain=False, warm=warm)
 
 
 # --- Dry and viscous friction
@@ -317,7 +317,7 @@ def _stop(rng, joint, reach, exponent):
         install=install,
         start=20.0,
         shape=(contact, side, exponent),
-        parameters=lambda s: {"stiffness": s, "contact_angle": contact},
+        parameters=lambda s: {"stiffness": s, "contact_angle": float(contact)},
     )
 
 
@@ -337,7 +337,7 @@ def hardening_with_damping(rng, joint, reach=BOUNDS):
         install=install,
         start=20.0,
         shape=shape,
-        parameters=lambda s: {"contact_angle": contact},
+        parameters=lambda s: {"contact_angle": float(contact)},
     )
 
 
@@ -349,7 +349,7 @@ def linear_in_angle(rng, joint, reach=BOUNDS):
         install=hidden_torque(dry.POSITION_LINEAR, joint, middle, span, way),
         start=3.0,
         shape=(middle, span, way),
-        parameters=lambda s: {"slope": way * s / span, "curvature": 0.0},
+        parameters=lambda s: {"slope": float(way * s / span), "curvature": 0.0},
     )
 
 
@@ -378,7 +378,7 @@ def _share_of_cold(run: Run, joint: int):
     return (warmest - run.temperature[:, joint]) / (warmest - coldest)
 
 
-@new("friction_temperature", own=True)
+@new("friction_temperature", own=True, warm=True)
 def in_proportion(rng, joint):
     """Both frictions fall by the degree."""
     share = rng.uniform(0.2, 0.7)
@@ -391,7 +391,7 @@ def in_proportion(rng, joint):
     return dict(install=install, start=3.0, slow=True, follows_temperature=True, shape=(share,))
 
 
-@new("friction_temperature")
+@new("friction_temperature", warm=True)
 def viscosity_falls_exponentially(rng, joint):
     depth = rng.uniform(1.5, 4.0)
 
@@ -402,7 +402,7 @@ def viscosity_falls_exponentially(rng, joint):
     return dict(install=install, start=3.0, slow=True, follows_temperature=True, shape=(depth,))
 
 
-@new("friction_temperature")
+@new("friction_temperature", warm=True)
 def dry_friction_alone(rng, joint):
     """A seal that softens: faster at first."""
     bend = rng.uniform(0.5, 2.0)
@@ -414,7 +414,7 @@ def dry_friction_alone(rng, joint):
     return dict(install=install, start=3.0, slow=True, follows_temperature=True, shape=(bend,))
 
 
-@new("gain_drift", own=True)
+@new("gain_drift", own=True, warm=True)
 def with_recorded_temperature(rng, joint):
     sign = either(rng)
 
@@ -571,32 +571,41 @@ def slipping_between_runs(rng, joint):
     return dict(install=install, start=0.05, largest=0.3, shape=(sign, spread))
 
 
-def _eccentric(joint, once, twice, phases):
+def _eccentric(rng, joint, once, twice, thrice=0.0):
+    phases = rng.uniform(0.0, 2 * np.pi, 3)
+
     def install(plan: Plan, size: float, run: Run) -> None:
-        plan.eccentric(joint, once * size, phases[0], twice * size, phases[1])
+        waves = (once * size, phases[0], twice * size, phases[1], thrice * size, phases[2])
+        plan.eccentric(joint, *waves)
 
     return dict(
         install=install,
         start=0.04,
         largest=0.25,
-        shape=(once, twice, *phases),
+        shape=(once, twice, thrice, *phases),
         parameters=lambda s: {"amplitude": once * s, "amplitude_twice": twice * s},
     )
 
 
 @new("encoder_eccentricity", own=True)
 def once_a_turn(rng, joint):
-    return _eccentric(joint, 1.0, 0.0, rng.uniform(0.0, 2 * np.pi, 2))
+    return _eccentric(rng, joint, 1.0, 0.0)
 
 
 @new("encoder_eccentricity", own=True)
 def twice_a_turn(rng, joint):
-    return _eccentric(joint, 0.0, 0.5, rng.uniform(0.0, 2 * np.pi, 2))
+    return _eccentric(rng, joint, 0.0, 0.5)
 
 
 @new("encoder_eccentricity", own=True)
 def once_and_twice_a_turn(rng, joint):
-    return _eccentric(joint, 1.0, rng.uniform(0.15, 0.5), rng.uniform(0.0, 2 * np.pi, 2))
+    return _eccentric(rng, joint, 1.0, rng.uniform(0.15, 0.5))
+
+
+@new("encoder_eccentricity", NEW_WORLDS)
+def with_a_third_wave(rng, joint):
+    """A scale that is not round: it errs three times a turn as well."""
+    return _eccentric(rng, joint, 1.0, rng.uniform(0.0, 0.3), rng.uniform(0.05, 0.15))
 
 
 def _leak(rng, joint, bend, lag_s, parameters):

@@ -113,7 +113,8 @@ def warming(late, first, second, t):
 
 @njit()
 def _reflex(kind, p, q, v):
-    """``p``: gain, threshold speed, side, then an exponent, or a slope with the angle and its zero."""
+    """``p``: gain, threshold speed, side, then an exponent, or a slope with the angle and its
+    zero."""
     over = max(0.0, p[2] * v - p[1])
     if kind == REFLEX_POWER:
         return p[2] * p[0] * over ** p[3]
@@ -143,7 +144,8 @@ def _rhythm(kind, p, t):
 
 @njit()
 def _stop(kind, p, q, v):
-    """``p``: stiffness at ``DEPTH``, contact, side, then an exponent, or a hardening and damping."""
+    """``p``: stiffness at ``DEPTH``, contact, side, then an exponent, or a hardening and
+    damping."""
     depth = p[2] * (q - p[1])
     if depth <= 0.0:
         return 0.0
@@ -164,7 +166,8 @@ def _unlisted(kind, p, m, dt, j, q, v, a):
         m[0] += dt / p[2] * (x - m[0])
         return p[0] * (x - p[3] * m[0])
     # A lump of one kilogram's moment that slides along the segment as it swings, and is felt by its
-    # weight and its inertia; the acceleration through a lag of 5 ms, as it is that of the last step.
+    # weight and its inertia; the acceleration through a lag of 5 ms, as it is that of the last
+    # step.
     absolute = q[0] if j == 0 else q[0] + q[1]
     turn = tanh((q[j] - p[1]) / p[2])
     place = p[3] * (1.0 + 0.6 * turn)

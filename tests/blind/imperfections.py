@@ -1,4 +1,5 @@
-"""What a good rig has too: several small effects at once, each below 1 % of the joint's rms torque."""
+"""What a good rig has too: several small effects at once, each below 1 % of the joint's rms
+torque."""
 
 from collections.abc import Sequence
 
@@ -10,9 +11,10 @@ from tests.blind.plan import HIP, KNEE
 
 SMALL = (
     ("encoder_offset", HIP), ("encoder_offset", KNEE), ("torque_gain", HIP), ("torque_gain", KNEE),
-    ("torque_offset", HIP), ("torque_offset", KNEE), ("time_delay", HIP), ("time_delay", KNEE), ("base_tilt", None),
-    ("cogging", HIP), ("cogging", KNEE), ("mass_off_axis", KNEE), ("torque_drift", HIP), ("torque_drift", KNEE),
-    ("joint_elasticity", HIP), ("rotor_inertia", KNEE), ("parallel_spring", HIP), ("parallel_spring", KNEE),
+    ("torque_offset", HIP), ("torque_offset", KNEE), ("time_delay", HIP), ("time_delay", KNEE),
+    ("base_tilt", None), ("cogging", HIP), ("cogging", KNEE), ("mass_off_axis", KNEE),
+    ("torque_drift", HIP), ("torque_drift", KNEE), ("joint_elasticity", HIP),
+    ("rotor_inertia", KNEE), ("parallel_spring", HIP), ("parallel_spring", KNEE),
 )  # fmt: skip
 LEAST, MOST = 0.002, 0.009
 
@@ -33,7 +35,8 @@ def random_imperfections(
 def random_background(
     rng: Generator, world: str, hidden: Sequence[Spec]
 ) -> list[tuple[Cause, float]]:
-    """Draw the small effects of a good rig, none of them of a kind that is hidden, and the magnitude of each."""
+    """Draw the small effects of a good rig, none of them of a kind that is hidden, and the
+    magnitude of each."""
     taken = {effect for effect, _ in hidden}
     free = [one for one in GOOD_RIG if one[0] not in taken]
     count = int(rng.integers(IMPERFECTIONS[0], IMPERFECTIONS[1] + 1))
@@ -44,10 +47,20 @@ def random_background(
     ]
 
 
+FRICTION = (
+    "presliding_hysteresis", "coulomb_asymmetry", "viscous_asymmetry", "load_dependent_friction",
+    "stribeck_friction", "friction_warmup",
+)  # fmt: skip
 GOOD_RIG = (
     *(one for one in SMALL if one[0] != "joint_elasticity"),
-    *((effect, joint) for effect in ("presliding_hysteresis", "coulomb_asymmetry", "viscous_asymmetry",
-      "load_dependent_friction", "stribeck_friction", "friction_warmup") for joint in (HIP, KNEE)),
+    *((effect, joint) for effect in FRICTION for joint in (HIP, KNEE)),
+    *(("encoder_eccentricity", joint) for joint in (HIP, KNEE)),
+    *(("torque_cross_talk", joint) for joint in (HIP, KNEE)),
+    *(("position_dependent_friction", joint) for joint in (HIP, KNEE)),
+    *(("gain_drift", joint) for joint in (HIP, KNEE)),
     ("mass_off_axis", HIP),
-)  # fmt: skip
-"""What may be a little off on any rig; its transmissions are stiff, or its drives would be tuned for them."""
+)
+"""What may be a little off on any rig.
+
+Its transmissions are stiff: behind soft ones a lab would tune the drives otherwise.
+"""

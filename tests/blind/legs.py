@@ -19,11 +19,13 @@ FOLLOWED_HZ = 12.0
 FASTEST_RAD = 10.0
 """An angle that no leg reaches: the simulation has become unstable."""
 HUNTING_NM = 4.0
-"""RMS change of a drive's torque from one millisecond to the next: it hunts, and no lab would record that."""
+"""RMS change of a drive's torque from one millisecond to the next: it hunts, and no lab would
+record that."""
 
 
 class Links(NamedTuple):
-    """Coefficients of the driven leg and of a wearer's own (``own`` 0 where there is none), and the base."""
+    """Coefficients of the driven leg and of a wearer's own (``own`` 0 where there is none), and the
+    base."""
 
     driven: np.ndarray
     wearer: np.ndarray
@@ -95,7 +97,8 @@ def cuff_forces(
     t: NDArray,
     noise: Generator,
 ) -> NDArray:
-    """Return what four sensors feel (n, 4, 3) N, ``across`` (n, 2) being known where the cuffs give way."""
+    """Return what four sensors feel (n, 4, 3) N, ``across`` (n, 2) being known where the cuffs give
+    way."""
     if across is not None:
         return pad_forces(rig, np.zeros_like(across), across, noise)
     base, sway, frequency = plan.tilt
@@ -108,7 +111,8 @@ def cuff_forces(
 
 
 def check(angle: NDArray, torque: NDArray) -> None:
-    """Raise FloatingPointError where a leg ran away or its drives hunt; ``torque`` each millisecond."""
+    """Raise FloatingPointError where a leg ran away or its drives hunt; ``torque`` each
+    millisecond."""
     if not np.isfinite(angle).all() or np.abs(angle).max() > FASTEST_RAD:
         raise FloatingPointError("the simulated leg became unstable")
     if np.sqrt(np.mean(np.diff(torque, axis=0) ** 2, axis=0)).max() > HUNTING_NM:

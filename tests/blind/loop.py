@@ -1,8 +1,9 @@
-"""The compiled loop: MuJoCo's leg under sampled PD drives, with sticking friction and whatever is hidden.
+"""The compiled loop: MuJoCo's leg under sampled PD drives, with sticking friction and whatever is
+hidden.
 
-Velocities are stepped first, positions with the new velocity (symplectic Euler); viscous friction is
-implicit. Dry friction is an impulse within its levels that stops the joint if it can (Moreau, 1988),
-found by projected Gauss-Seidel over both joints.
+Velocities are stepped first, positions with the new velocity (symplectic Euler); viscous friction
+is implicit. Dry friction is an impulse within its levels that stops the joint if it can (Moreau,
+1988), found by projected Gauss-Seidel over both joints.
 """
 
 from math import cos, pi, sin
@@ -13,6 +14,7 @@ import numpy as np
 from tests.blind.body import PAYLOAD_INERTIA, evaluate
 from tests.blind.compiled import njit
 from tests.blind.dry import dry_levels, is_dry
+from tests.blind.encoders import WAVES, reading, slope
 from tests.blind.smooth import smooth_torque
 from tests.blind.transmissions import RIGID, transmitted
 
@@ -29,7 +31,8 @@ TABLE_STEP_S = 0.02
 class Excited(NamedTuple):
     """Fourier coefficients, (2,), (2, n), (2, n); or, where there is one, a table of the motion.
 
-    ``table`` (m, 4): angles and speeds of hip and knee each ``TABLE_STEP_S`` from ``-LEAD_IN_S`` on.
+    ``table`` (m, 4): angles and speeds of hip and knee each ``TABLE_STEP_S`` from ``-LEAD_IN_S``
+    on.
     """
 
     theta0: np.ndarray
@@ -42,7 +45,7 @@ class Excited(NamedTuple):
 class Drives(NamedTuple):
     """PD loops and encoders, arrays (2,).
 
-    ``wobble`` (2, 4): amplitude and phase of the encoder's error once a turn, and twice a turn.
+    ``wobble`` (2, 6): amplitude and phase of the encoders' errors once, twice, three times a turn.
     """
 
     kp: np.ndarray
@@ -58,8 +61,8 @@ class Drives(NamedTuple):
 class Joints(NamedTuple):
     """Friction and transmission, arrays (2,), ``added_mass`` (2, 2), ``spring`` (2, 5).
 
-    ``cuffs`` (2, 3) for thigh and shank: stiffness (N/m), damping (N·s/m), hardening (1/m²); ``levers`` (3,):
-    distance of each cuff from its joint, thigh length.
+    ``cuffs`` (2, 3) for thigh and shank: stiffness (N/m), damping (N·s/m), hardening (1/m²);
+    ``levers`` (3,): distance of each cuff from its joint, thigh length.
     """
 
     coulomb: np.ndarray
@@ -73,7 +76,8 @@ class Joints(NamedTuple):
 
 
 class World(NamedTuple):
-    """What is outside the leg: tilt of gravity (base, sway, Hz), payload (body, mass, start, ramp, direction)."""
+    """What is outside the leg: tilt of gravity (base, sway, Hz), payload (body, mass, start, ramp,
+    direction)."""
 
     gravity: float
     tilt: np.ndarray
@@ -92,7 +96,8 @@ class Hidden(NamedTuple):
 
 
 class Log(NamedTuple):
-    """What happened. Samples of 5 ms, latched in their middle: (n, 2); drive torque by ticks of 1 ms."""
+    """What happened. Samples of 5 ms, latched in their middle: (n, 2); drive torque by ticks of 1
+    ms."""
 
     reading: np.ndarray
     """Counted angle, rad."""
@@ -143,14 +148,9 @@ def reference_at(x, t, out):
 
 
 @njit()
-def _read(d, j, theta):
-    once = theta + d.offset[j] + d.wobble[j, 0] * sin(theta + d.wobble[j, 1])
-    return once + d.wobble[j, 2] * sin(2.0 * theta + d.wobble[j, 3])
-
-
-@njit()
 def _press(jt, z, u, force, pressed):
-    """Let the machine's cuffs push the wearer's leg (coordinates 2 and 3): forces across thigh and shank."""
+    """Let the machine's cuffs push the wearer's leg (coordinates 2 and 3): forces across thigh and
+    shank."""
     thigh, shank, length = jt.levers
     bend = length * cos(z[1])
     hip, knee = z[0] - z[2], z[1] - z[3]
@@ -205,7 +205,8 @@ def _set_world(h, w, t):
 
 @njit()
 def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
-    """Run the leg from rest at ``start`` (2,) and log ``samples`` samples of ``ticks`` ms into ``out``.
+    """Run the leg from rest at ``start`` (2,) and log ``samples`` samples of ``ticks`` ms into
+    ``out``.
 
     Without drives there is no lead-in and no torque: the leg swings freely.
     """
@@ -234,7 +235,7 @@ def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
     first = -round(LEAD_IN_S / sample_s) if with_drives else 0
     reference_at(x, first * sample_s, old_ref)
     for j in range(2):
-        angle[j] = _read(d, j, z[place[j]])
+        angle[j] = reading(d.offset[j], d.wobble[j], z[place[j]])
     half = STEPS_PER_TICK * ticks // 2
     for k in range(first, samples):
         opened[:] = u
@@ -246,7 +247,7 @@ def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
                 tick = STEPS_PER_TICK * DT
                 reference_at(x, t, ref)
                 for j in range(2):
-                    seen = _read(d, j, z[place[j]])
+                    seen = reading(d.offset[j], d.wobble[j], z[place[j]])
                     if d.count[j] > 0.0:
                         seen = d.count[j] * np.round(seen / d.count[j])
                     speed[j] += d.speed_share * ((seen - angle[j]) / tick - speed[j])
@@ -259,7 +260,8 @@ def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
                 if k >= 0:
                     out.torque[k * ticks + s // STEPS_PER_TICK] = drive
             for i in range(nv):
-                # Speeds belong half a step before the positions; Coriolis torque wants both at one instant.
+                # Speeds belong half a step before the positions; Coriolis torque wants both at one
+                # instant.
                 qpos[i], qvel[i] = z[i], 1.5 * u[i] - 0.5 * before[i]
             evaluate(model, data, bias)
             for i in range(nv):
@@ -331,20 +333,20 @@ def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
                 )
                 load[j] = drive[j] - lam[j] / DT - jt.viscous[j] * u[place[j]] - inert
             if k >= 0 and s == half:
-                # Kicks come at the beginning of a step, where the drive's torque is spread over it: half a
+                # Kicks come at the beginning of a step, where the drive's torque is spread over it:
+                # half a
                 # step back, where the last speeds are, motion and torque belong together.
                 _latch(out, k, z, before, place, d, human, ref, speed, pressed)
             for i in range(n):
                 z[i] += DT * u[i]
         if k >= 0:
             for j in range(2):
-                at = z[place[j]] + d.wobble[j, 1]
                 mean = (u[place[j]] - opened[place[j]]) / sample_s
-                bent = d.wobble[j, 0] * (cos(at) * mean - sin(at) * u[place[j]] ** 2)
-                twice = 2.0 * z[place[j]] + d.wobble[j, 3]
-                bent += (
-                    2.0 * d.wobble[j, 2] * (cos(twice) * mean - 2.0 * sin(twice) * u[place[j]] ** 2)
-                )
+                bent = 0.0
+                for n_waves in range(1, WAVES + 1):
+                    size = n_waves * d.wobble[j, 2 * n_waves - 2]
+                    at = n_waves * z[place[j]] + d.wobble[j, 2 * n_waves - 1]
+                    bent += size * (cos(at) * mean - n_waves * sin(at) * u[place[j]] ** 2)
                 out.acceleration[k, j] = mean + bent
             for i in range(2):
                 out.link[k, 4 + i] = (u[i] - opened[i]) / sample_s
@@ -352,7 +354,8 @@ def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
 
 @njit()
 def _grip(V, place, up, down, speed, lam):
-    """Find the friction impulses ``lam`` (2,) within their levels that leave each joint stuck or opposed."""
+    """Find the friction impulses ``lam`` (2,) within their levels that leave each joint stuck or
+    opposed."""
     for j in range(2):
         lam[j] = DT * (max(0.0, up[j]) if speed[j] > 0 else -max(0.0, down[j]))
     for _ in range(25):
@@ -372,13 +375,11 @@ def _latch(out, k, z, u, place, d, human, ref, speed, pressed):
     """Log what is measured: positions half a step back, and the speeds ``u`` of that moment."""
     for j in range(2):
         theta = z[place[j]] - 0.5 * DT * u[place[j]]
-        seen = _read(d, j, theta)
+        seen = reading(d.offset[j], d.wobble[j], theta)
         out.angle[k, j] = seen
         count = d.recorded_count[j]
         out.reading[k, j] = count * np.round(seen / count) if count > 0.0 else seen
-        turns = d.wobble[j, 0] * cos(theta + d.wobble[j, 1])
-        turns += 2.0 * d.wobble[j, 2] * cos(2.0 * theta + d.wobble[j, 3])
-        out.speed[k, j] = u[place[j]] * (1.0 + turns)
+        out.speed[k, j] = u[place[j]] * slope(d.wobble[j], theta)
         out.human[k, j] = human[j]
         out.reference[k, j] = ref[j]
         out.drive_speed[k, j] = speed[j]

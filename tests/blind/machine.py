@@ -1,4 +1,5 @@
-"""Random exoskeletons: links, friction, drives, encoders, and how well torque and forces are measured."""
+"""Random exoskeletons: links, friction, drives, encoders, and how well torque and forces are
+measured."""
 
 from dataclasses import dataclass, replace
 
@@ -11,7 +12,8 @@ from tests.blind.body import Leg, Segment
 SPEED_CUTOFF_HZ = 40.0
 DRIVE_RATE_HZ = 1000.0
 KNEE_ROTOR = 0.04
-"""kg·m², felt behind a soft transmission only; one that is felt elsewhere is an effect to be hidden."""
+"""kg·m², felt behind a soft transmission only; one that is felt elsewhere is an effect to be
+hidden."""
 SOFT_DAMPING = 150.0
 """Most damping per motor inertia, 1/s, with which drives behind a soft transmission do not hunt."""
 CHATTER_NM = 0.8
@@ -55,7 +57,8 @@ class Machine:
         return np.array([self.hip_rotor, KNEE_ROTOR])
 
     def tuned_for_soft(self, joint: int) -> "Machine":
-        """Return the machine with the drive of a joint tuned as a lab would tune it behind a soft transmission."""
+        """Return the machine with the drive of a joint tuned as a lab would tune it behind a soft
+        transmission."""
         kd = self.kd.copy()
         kd[joint] = min(kd[joint], SOFT_DAMPING * self.rotors[joint])
         return replace(self, kd=kd)

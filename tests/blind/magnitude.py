@@ -1,4 +1,5 @@
-"""How large a hidden effect is: rms of its torque away from reversals over the rms of the joint's, a weight apart."""
+"""How large a hidden effect is: rms of its torque away from reversals over the rms of the joint's,
+a weight apart."""
 
 from collections.abc import Callable, Sequence
 
@@ -24,7 +25,8 @@ def magnitude(cause: Cause, runs: Sequence[Recorded]) -> float:
 
 
 def rms(cause: Cause, runs: Sequence[Recorded]) -> tuple[float, float]:
-    """Return rms of what is hidden and of the torque, N·m, away from reversals, over the runs where the cause acts."""
+    """Return rms of what is hidden and of the torque, N·m, away from reversals, over the runs where
+    the cause acts."""
     j = HIP if cause.joint is None else cause.joint
     acting = [r for r in runs if cause.acts_in(r.run.kind)]
     # What is faster than blocks is told sample by sample.
@@ -73,7 +75,8 @@ def size_for(
 def small_size_for(
     cause: Cause, wanted: float, pilot: Callable[[float], Sequence[Recorded]]
 ) -> float:
-    """Return the size at which a cause has a small magnitude, in proportion to that of one larger size."""
+    """Return the size at which a cause has a small magnitude, in proportion to that of one larger
+    size."""
     size = cause.start
     for _ in range(3):
         try:

@@ -1,7 +1,7 @@
 """What is moved and recorded: the exoskeleton's leg with its wearer, or a machine of one joint.
 
-A machine of one joint is the simulated leg whose knee stands still and whose shank weighs nothing; what it records is
-the hip's, under another name and in the units of a machine of another size.
+A machine of one joint is the simulated leg whose knee stands still and whose shank weighs nothing;
+what it records is the hip's, under another name and in the units of a machine of another size.
 """
 
 from collections.abc import Callable, Sequence
@@ -48,7 +48,8 @@ class Mechanism(Protocol):
         """Return what the recording says of the machine."""
 
     def truth(self, rig: Rig, kinds: Sequence[str]) -> dict[str, Any]:
-        """Return what a truth file says of the rig in these kinds of run, in the recording's units."""
+        """Return what a truth file says of the rig in these kinds of run, in the recording's
+        units."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,8 @@ class OneJoint:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Causes of the contract that such a machine can have, and that are no part of its rigid body."""
+        """Causes of the contract that such a machine can have, and that are no part of its rigid
+        body."""
         turned = (
             "backlash",
             "mass_off_axis",
@@ -147,7 +149,8 @@ class OneJoint:
         )
 
     def excitation(self, rng: Generator) -> Excitation:
-        """Draw a motion, on either side of where stops and detents are; what would be the knee stands still."""
+        """Draw a motion, on either side of where stops and detents are; what would be the knee
+        stands still."""
         drawn = random_excitation(rng)
         still = np.zeros_like(drawn.a)
         still[HIP] = 1.0
@@ -192,9 +195,9 @@ class OneJoint:
 
 
 ANYWHERE = (
-    "stribeck_friction", "viscous_asymmetry", "load_dependent_friction", "quadratic_drag", "presliding_hysteresis",
-    "friction_warmup", "cogging", "joint_elasticity", "parallel_spring", "torque_drift", "time_delay",
-    "end_stop", "position_dependent_friction", "gain_drift",
+    "stribeck_friction", "viscous_asymmetry", "load_dependent_friction", "quadratic_drag",
+    "presliding_hysteresis", "friction_warmup", "cogging", "joint_elasticity", "parallel_spring",
+    "torque_drift", "time_delay", "end_stop", "position_dependent_friction", "gain_drift",
 )  # fmt: skip
 """Causes that a joint can have wherever it stands."""
 ONE_JOINT: dict[str, OneJoint] = {
@@ -207,7 +210,8 @@ MECHANISMS: dict[str, Mechanism] = {"leg": ExoskeletonLeg(), **ONE_JOINT}
 
 
 class _Quantity(NamedTuple):
-    """What is recorded of each joint: the end of its column's name, values (n, 2), powers of torque and of angle."""
+    """What is recorded of each joint: the end of its column's name, values (n, 2), powers of torque
+    and of angle."""
 
     column: str
     values: NDArray

@@ -70,7 +70,8 @@ def voltage_sag(rng, joint):
 
 @unlisted("time", repeats=False)
 def cable_drag(rng, joint):
-    """A cable bundle that settles ever anew: a drag that wanders within seconds, other in each run."""
+    """A cable bundle that settles ever anew: a drag that wanders within seconds, other in each
+    run."""
     smoothing = rng.uniform(0.5, 1.5)
 
     def install(plan: Plan, size: float, run: Run) -> None:
@@ -239,8 +240,8 @@ def lopsided_efficiency(rng, joint):
 OUTSIDE = tuple(KINDS)
 """Names of all kinds; the first four are those of the fixed set, in its order."""
 OF_ONE_JOINT = (
-    "tone", "cable_drag", "ringing", "kicks", "dead_zone_damper", "detent", "bent_gain", "creeping_spring",
-    "torque_steps", "held_torque", "wandering_viscosity", "lopsided_efficiency",
+    "tone", "cable_drag", "ringing", "kicks", "dead_zone_damper", "detent", "bent_gain",
+    "creeping_spring", "torque_steps", "held_torque", "wandering_viscosity", "lopsided_efficiency",
 )  # fmt: skip
 """What a machine of one joint can have of it."""
 

@@ -1,7 +1,7 @@
 """Random people: their legs by body mass and height.
 
-Winter (2009), Biomechanics and Motor Control of Human Movement, table 4.1: segment masses, centres of
-mass and radii of gyration as shares; thigh 0.245 and shank 0.246 of the height (figure 4.1).
+Winter (2009), Biomechanics and Motor Control of Human Movement, table 4.1: segment masses, centres
+of mass and radii of gyration as shares; thigh 0.245 and shank 0.246 of the height (figure 4.1).
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,5 @@
-"""What is hidden in one run: every place where an effect can act, gathered before the run is simulated."""
+"""What is hidden in one run: every place where an effect can act, gathered before the run is
+simulated."""
 
 from dataclasses import dataclass, replace
 
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 
 from tests.blind.body import Leg, Payload, Segment
 from tests.blind.channel import Channel
+from tests.blind.encoders import WAVES
 from tests.blind.loop import Hidden
 from tests.blind.smooth import MEMORIES
 from tests.blind.transmissions import RIGID
@@ -45,8 +47,8 @@ class Plan:
         self.transmission = np.full(2, RIGID)
         self.spring = np.zeros((2, 5))
         self.encoder_offset = np.zeros(2)
-        self.wobble = np.zeros((2, 4))
-        """Of the encoders: amplitude and phase once a turn, amplitude and phase twice a turn."""
+        self.wobble = np.zeros((2, 2 * WAVES))
+        """Of the encoders: amplitude and phase of errors once, twice and three times a turn."""
         self.tilt = np.zeros(3)
         self.lumps: list[tuple[int, Segment]] = []
         self.payload: Payload | None = None
@@ -55,7 +57,8 @@ class Plan:
         self.cuffs: NDArray | None = None
         """(2, 6) of thigh and shank cuff, about their joints; None where both legs move as one.
 
-        Stiffness (N·m/rad), damping (N·m·s/rad), hardening (1/rad²), slack (rad), share that relaxes, and its time (s).
+        Stiffness (N·m/rad), damping (N·m·s/rad), hardening (1/rad²), slack (rad), share that
+        relaxes, and its time (s).
         """
 
     def with_lumps(self, leg: Leg) -> Leg:
@@ -65,16 +68,14 @@ class Plan:
             leg = replace(leg, **{name: getattr(leg, name) + lump})
         return leg
 
-    def eccentric(
-        self, joint: int, once: float, phase: float, twice: float = 0.0, phase_twice: float = 0.0
-    ) -> None:
-        """Add an error once and twice a turn to what an encoder has already."""
-        for c, new in ((0, (once, phase)), (2, (twice, phase_twice))):
+    def eccentric(self, joint: int, *waves: float) -> None:
+        """Add errors to an encoder: amplitude and phase once a turn, twice, three times."""
+        for c in range(0, len(waves), 2):
             size, angle = self.wobble[joint, c : c + 2]
             if not size:
-                self.wobble[joint, c : c + 2] = new
-            elif new[0]:
-                both = size * np.exp(1j * angle) + new[0] * np.exp(1j * new[1])
+                self.wobble[joint, c : c + 2] = waves[c : c + 2]
+            elif waves[c]:
+                both = size * np.exp(1j * angle) + waves[c] * np.exp(1j * waves[c + 1])
                 self.wobble[joint, c : c + 2] = abs(both), np.angle(both)
 
     def torque(

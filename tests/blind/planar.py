@@ -1,12 +1,14 @@
-"""World *planar*: closed-form dynamics, friction of bristles, drives in cascade, current sampled at instants.
+"""World *planar*: closed-form dynamics, friction of bristles, drives in cascade, current sampled at
+instants.
 
-Nothing here comes from MuJoCo. Joints have LuGre friction, whose bristles bend a little before a joint slides (Canudas
-de Wit, Olsson, Astrom, Lischinsky, 1995, IEEE TAC 40(3)). A drive has a position loop around a velocity loop with
-integrator, at a rate of its own, and estimates velocity from counts. The torque is what the current was at an instant.
+Nothing here comes from MuJoCo. Joints have LuGre friction, whose bristles bend a little before a
+joint slides (Canudas de Wit, Olsson, Astrom, Lischinsky, 1995, IEEE TAC 40(3)). A drive has a
+position loop around a velocity loop with integrator, at a rate of its own, and estimates velocity
+from counts. The torque is what the current was at an instant.
 """
 
 from dataclasses import dataclass, replace
-from math import cos, exp, sin
+from math import exp, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +22,7 @@ from tests.blind.channel import through
 from tests.blind.compiled import njit
 from tests.blind.conditions import Conditions
 from tests.blind.dry import dry_levels, is_dry
+from tests.blind.encoders import curvature, reading, slope
 from tests.blind.legs import Reported, check, cuff_forces, links_of, needed
 from tests.blind.loop import LEAD_IN_S, Excited, reference_at
 from tests.blind.plan import HIP, Plan, Run
@@ -34,11 +37,13 @@ DRIVE_RATES_HZ = (500.0, 1000.0, 2000.0, 4000.0)
 KNEE_ROTOR = 0.04
 """kg·m², felt behind a soft transmission only."""
 SOFT_DAMPING = 120.0
-"""Most velocity gain per motor inertia, 1/s, with which drives behind a soft transmission do not hunt."""
+"""Most velocity gain per motor inertia, 1/s, with which drives behind a soft transmission do not
+hunt."""
 CHATTER_NM = 1.0
 """Torque of the velocity loop for one count."""
 COARSE = 2.0**15
-"""Counts per turn below which a drive counts on its motor's side, finer than the angle that it reports."""
+"""Counts per turn below which a drive counts on its motor's side, finer than the angle that it
+reports."""
 STRIBECK_FREE = 1e-3
 """Least friction level, N·m, so that bristles always have one."""
 
@@ -93,7 +98,8 @@ class PlanarMachine:
         return np.array([self.hip_rotor, KNEE_ROTOR])
 
     def tuned_for_soft(self, joint: int) -> "PlanarMachine":
-        """Return the machine with the drive of a joint tuned as a lab would tune it behind a soft transmission."""
+        """Return the machine with the drive of a joint tuned as a lab would tune it behind a soft
+        transmission."""
         gain = self.velocity_gain.copy()
         gain[joint] = min(gain[joint], SOFT_DAMPING * self.rotors[joint])
         return replace(self, velocity_gain=gain)
@@ -103,9 +109,12 @@ class PlanarMachine:
         kd = float(self.velocity_gain[joint])
         stiffness = kd * float(self.position_gain[joint] + 1.0 / self.integral_time[joint])
         return {
-            "type": "cascade", "kp_nm_rad": stiffness, "kd_nm_s_rad": kd, "rate_hz": self.drive_rate_hz,
+            "type": "cascade",
+            "kp_nm_rad": stiffness,
+            "kd_nm_s_rad": kd,
+            "rate_hz": self.drive_rate_hz,
             "limit_nm": float(self.limit[joint]),
-        }  # fmt: skip
+        }
 
 
 def random_machine(rng: Generator, thigh_length: float) -> PlanarMachine:
@@ -148,7 +157,7 @@ def random_machine(rng: Generator, thigh_length: float) -> PlanarMachine:
         drive_counts=drive_counts,
         ripple=ripple,
         ripple_time=np.exp(rng.uniform(np.log(0.002), np.log(0.2), 2)),
-        ripple_white=rng.uniform(0.1, 0.7, 2),
+        ripple_white=rng.uniform(0.0, 0.4, 2),
         ripple_lines=lines,
         ripple_cycles=rng.integers(500, 2000, (2, 3)).astype(float),
         ripple_phase=rng.uniform(0.0, 2 * np.pi, (2, 3)),
@@ -173,7 +182,7 @@ def _felt(leg: Leg) -> NDArray:
 
 
 class Drives(NamedTuple):
-    """Cascaded loops and encoders; arrays (2,), ``wobble`` (2, 4)."""
+    """Cascaded loops and encoders; arrays (2,), ``wobble`` (2, 6)."""
 
     position: np.ndarray
     velocity: np.ndarray
@@ -206,7 +215,8 @@ class Joints(NamedTuple):
 
 
 class Log(NamedTuple):
-    """What happened, at the samples (n, 2), and torque and angle of the motors at each millisecond."""
+    """What happened, at the samples (n, 2), and torque and angle of the motors at each
+    millisecond."""
 
     reading: np.ndarray
     angle: np.ndarray
@@ -224,14 +234,9 @@ class Log(NamedTuple):
 
 
 @njit()
-def _read(d, j, theta):
-    once = theta + d.offset[j] + d.wobble[j, 0] * sin(theta + d.wobble[j, 1])
-    return once + d.wobble[j, 2] * sin(2.0 * theta + d.wobble[j, 3])
-
-
-@njit()
 def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
-    """Run the leg from rest at ``start`` (2,) and log ``samples`` samples from time 0 on into ``out``."""
+    """Run the leg from rest at ``start`` (2,) and log ``samples`` samples from time 0 on into
+    ``out``."""
     q, v, a = np.zeros(2), np.zeros(2), np.zeros(2)
     th, om, motor_a = np.zeros(2), np.zeros(2), np.zeros(2)
     hq, hv, ha = np.zeros(2), np.zeros(2), np.zeros(2)
@@ -251,7 +256,7 @@ def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
     c = w.driven.copy()
     for j in range(2):
         q[j] = th[j] = hq[j] = start[j]
-        seen[j] = _read(d, j, start[j])
+        seen[j] = reading(d.offset[j], d.wobble[j], start[j])
     first = -round(LEAD_IN_S / DT) if with_drives else 0
     reference_at(x, first * DT, old_ref)
     tick = d.steps * DT
@@ -265,7 +270,7 @@ def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
         if with_drives and s % d.steps == 0:
             reference_at(x, t, ref)
             for j in range(2):
-                now = _read(d, j, th[j])
+                now = reading(d.offset[j], d.wobble[j], th[j])
                 if d.count[j] > 0.0:
                     now = d.count[j] * np.floor(now / d.count[j])
                 speed[j] += d.speed_share * ((now - seen[j]) / tick - speed[j])
@@ -377,15 +382,14 @@ def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
 @njit()
 def _latch(out, k, j, d, theta, omega, acceleration):
     """Log a motor's angle as its encoder tells it, and what speed and acceleration that is."""
-    told = _read(d, j, theta)
+    told = reading(d.offset[j], d.wobble[j], theta)
     count = d.recorded_count[j]
-    once, twice = theta + d.wobble[j, 1], 2.0 * theta + d.wobble[j, 3]
-    slope = 1.0 + d.wobble[j, 0] * cos(once) + 2.0 * d.wobble[j, 2] * cos(twice)
-    bend = -d.wobble[j, 0] * sin(once) - 4.0 * d.wobble[j, 2] * sin(twice)
     out.angle[k, j] = told
     out.reading[k, j] = count * np.round(told / count) if count > 0.0 else told
-    out.speed[k, j] = omega * slope
-    out.acceleration[k, j] = acceleration * slope + bend * omega * omega
+    factor = slope(d.wobble[j], theta)
+    out.speed[k, j] = omega * factor
+    bend = curvature(d.wobble[j], theta)
+    out.acceleration[k, j] = acceleration * factor + bend * omega * omega
 
 
 def record(
@@ -428,18 +432,34 @@ def move(
     sample_steps = STEPS_PER_MS * conditions.ticks
     tick = round(1.0 / (DT * m.drive_rate_hz))
     drives = Drives(
-        m.position_gain, m.velocity_gain, m.velocity_gain / m.integral_time, m.feedforward, m.limit,
-        2 * np.pi / m.drive_counts, 2 * np.pi / m.counts, plan.encoder_offset, plan.wobble,
+        m.position_gain,
+        m.velocity_gain,
+        m.velocity_gain / m.integral_time,
+        m.feedforward,
+        m.limit,
+        2 * np.pi / m.drive_counts,
+        2 * np.pi / m.counts,
+        plan.encoder_offset,
+        plan.wobble,
         float(1.0 - np.exp(-2 * np.pi * m.velocity_cutoff_hz / m.drive_rate_hz)),
-        float(1.0 - np.exp(-DT / m.current_lag_s)), tick,
-    )  # fmt: skip
+        float(1.0 - np.exp(-DT / m.current_lag_s)),
+        tick,
+    )
     log = empty_log(samples, conditions.ticks)
     none = np.zeros((2, 1))
     excited = Excited(motion.middle, none, none, 1.0, motion.table(samples * conditions.sample_s))
     simulate(
-        excited, drives, _joints(rig, plan), links_of(rig, plan, run), plan.hidden(), motion.middle, samples,
-        sample_steps, True, log,
-    )  # fmt: skip
+        excited,
+        drives,
+        _joints(rig, plan),
+        links_of(rig, plan, run),
+        plan.hidden(),
+        motion.middle,
+        samples,
+        sample_steps,
+        True,
+        log,
+    )
     check(log.angle, log.torque)
     return log
 
@@ -462,15 +482,24 @@ def _joints(rig: Rig, plan: Plan) -> Joints:
     levers = np.array([*m.cuff_distance, m.leg.length])
     cuffs = np.zeros((2, 6)) if plan.cuffs is None else per_metre(plan.cuffs, levers)
     return Joints(
-        m.coulomb, m.viscous, m.coulomb / m.presliding, m.bristle_damping, mass, plan.transmission, m.rotors,
-        plan.spring, cuffs, levers,
-    )  # fmt: skip
+        m.coulomb,
+        m.viscous,
+        m.coulomb / m.presliding,
+        m.bristle_damping,
+        mass,
+        plan.transmission,
+        m.rotors,
+        plan.spring,
+        cuffs,
+        levers,
+    )
 
 
 def _error(
     m: PlanarMachine, clean: NDArray, angle: NDArray, noise: Generator, conditions: Conditions
 ) -> NDArray:
-    """Return the error of the measured torque: its constant, white and coloured noise, lines, and a slow walk."""
+    """Return the error of the measured torque: its constant, white and coloured noise, lines, and a
+    slow walk."""
     n = len(clean)
     out = m.torque_constant * clean
     for j in range(2):

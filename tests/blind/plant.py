@@ -56,7 +56,8 @@ def record(
 
 
 def _needed(rig: Rig, plan: Plan, run: Run, log: loop.Log, conditions: Conditions) -> NDArray:
-    """Torque that the faultless machine needs for the reported motion, encoder's errors and all, (n, 2) N·m."""
+    """Torque that the faultless machine needs for the reported motion, encoder's errors and all,
+    (n, 2) N·m."""
     machine = rig.machine
     acceleration = log.acceleration.copy()
     soft = plan.transmission != RIGID
@@ -104,14 +105,30 @@ def move(
     world = loop.World(leg.gravity, plan.tilt, np.array([body.payload, *plan.load], dtype=float))
     drive_counts = machine.counts if machine.drive_counts is None else machine.drive_counts
     drives = loop.Drives(
-        machine.kp, machine.kd, machine.limit, 2 * np.pi / drive_counts, plan.encoder_offset, plan.wobble,
-        float(1.0 - np.exp(-2 * np.pi * SPEED_CUTOFF_HZ / DRIVE_RATE_HZ)), 2 * np.pi / machine.counts,
-    )  # fmt: skip
+        machine.kp,
+        machine.kd,
+        machine.limit,
+        2 * np.pi / drive_counts,
+        plan.encoder_offset,
+        plan.wobble,
+        float(1.0 - np.exp(-2 * np.pi * SPEED_CUTOFF_HZ / DRIVE_RATE_HZ)),
+        2 * np.pi / machine.counts,
+    )
     excited = _excited(motion, samples * conditions.sample_s)
     log = empty_log(samples, conditions.ticks)
     loop.simulate(
-        body.handles, excited, drives, joints, world, plan.hidden(), excited.theta0, samples, conditions.ticks, True, log
-    )  # fmt: skip
+        body.handles,
+        excited,
+        drives,
+        joints,
+        world,
+        plan.hidden(),
+        excited.theta0,
+        samples,
+        conditions.ticks,
+        True,
+        log,
+    )
     if not np.isfinite(log.angle).all():
         raise FloatingPointError("the simulated leg became unstable")
     return log
@@ -134,7 +151,8 @@ def empty_log(samples: int, ticks: int = loop.TICKS_PER_SAMPLE) -> loop.Log:
 
 
 def _reported(log: loop.Log, time: NDArray, plan: Plan, conditions: Conditions) -> NDArray:
-    """Pass the torque of each millisecond through the channel and average it over the samples (n, 2)."""
+    """Pass the torque of each millisecond through the channel and average it over the samples (n,
+    2)."""
     period = loop.DT * loop.STEPS_PER_TICK
     angle = None
     if plan.channel.needs_angle:
@@ -145,7 +163,8 @@ def _reported(log: loop.Log, time: NDArray, plan: Plan, conditions: Conditions) 
 
 
 def _ripple(machine: Machine, angle: NDArray, noise: Generator, conditions: Conditions) -> NDArray:
-    """Error of the measured torque: coloured noise, and in some machines a part that goes with the motor's angle."""
+    """Error of the measured torque: coloured noise, and in some machines a part that goes with the
+    motor's angle."""
     n = len(angle)
     out = np.empty((n, 2))
     for j in range(2):
@@ -173,7 +192,8 @@ def _cuff_forces(
 def _firmly_strapped(
     rig: Rig, plan: Plan, log: loop.Log, conditions: Conditions
 ) -> tuple[NDArray, NDArray]:
-    """Return forces along and across thigh and shank: MuJoCo says what torque the wearer's own leg takes."""
+    """Return forces along and across thigh and shank: MuJoCo says what torque the wearer's own leg
+    takes."""
     q, dq, ddq = (log.link[:, 2 * i : 2 * i + 2].copy() for i in range(3))
     base, sway, frequency = plan.tilt
     # Inertia does not depend on the hip's angle: gravity from elsewhere is a hip turned otherwise.

@@ -1,4 +1,5 @@
-"""What every world simulates, and what it hands back: the rig, and one run with all that was true in it."""
+"""What every world simulates, and what it hands back: the rig, and one run with all that was true
+in it."""
 
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -31,7 +32,8 @@ class PoweredLeg(Protocol):
     cuff_distance: tuple[float, float]
 
     def tuned_for_soft(self, joint: int) -> "PoweredLeg":
-        """Return the machine with a drive tuned as a lab would tune it behind a soft transmission."""
+        """Return the machine with a drive tuned as a lab would tune it behind a soft
+        transmission."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,8 @@ class Recorded:
     clean_torque: NDArray
     """As the channel would report it without ripple."""
     effect: NDArray
-    """(n, 2) what is hidden, as torque: reported less what the faultless machine needs for the reported motion."""
+    """(n, 2) what is hidden, as torque: reported less what the faultless machine needs for the
+    reported motion."""
     true_speed: NDArray
     link: NDArray
     """(n, 6) q, dq, ddq of hip and knee of the links."""
@@ -94,7 +97,8 @@ class Recorded:
         return x[: n * block].reshape(n, block, *x.shape[1:]).mean(axis=1)
 
     def moving(self) -> NDArray:
-        """Tell for each block and joint whether it is away from reversals and from the run's ends, (m, 2) bool."""
+        """Tell for each block and joint whether it is away from reversals and from the run's ends,
+        (m, 2) bool."""
         return self.blocks(self.moving_samples().astype(float)) == 1.0
 
     def moving_samples(self) -> NDArray:

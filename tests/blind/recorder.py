@@ -1,4 +1,5 @@
-"""What a lab's recorder makes of a run: columns, stamps, lost samples, temperatures, and what the file says."""
+"""What a lab's recorder makes of a run: columns, stamps, lost samples, temperatures, and what the
+file says."""
 
 from typing import Any
 

@@ -1,4 +1,5 @@
-"""Reliability diagram: the probability that was said against how often it was so (Murphy and Winkler, 1977)."""
+"""Reliability diagram: the probability that was said against how often it was so (Murphy and
+Winkler, 1977)."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -30,7 +31,8 @@ def figure(curve: Sequence[Bin]) -> Figure:
     said = [b.mean for b in curve]
     was = [b.happened.value for b in curve]
     low, high = zip(*(b.happened.interval for b in curve), strict=True) if curve else ((), ())
-    # Rounding may put an interval's end a hair inside its point; a bar cannot be shorter than nothing.
+    # Rounding may put an interval's end a hair inside its point; a bar cannot be shorter than
+    # nothing.
     below = [max(0.0, w - end) for w, end in zip(was, low, strict=True)]
     above = [max(0.0, end - w) for w, end in zip(was, high, strict=True)]
     axis.errorbar(

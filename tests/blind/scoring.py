@@ -29,7 +29,8 @@ class Score:
     magnitude: float | None
     """Of a single effect."""
     visibility: float
-    """What rigid body and friction cannot imitate of it, over the noise floor, at the joint where that is most."""
+    """What rigid body and friction cannot imitate of it, over the noise floor, at the joint where
+    that is most."""
     kinds: tuple[str, ...]
     status: str
     """The verdict's, or ``refused``, ``crashed``, ``fault`` where a data fault was named."""
@@ -49,10 +50,11 @@ class Score:
     held_back: bool = False
     """Is it of a kind that is never shown to what learns?"""
     family_right: bool | None = None
-    """Is a finding of an acceptable family, at the right joint, at least as likely as not? None where
-    nothing is hidden, or the verdict has no findings."""
+    """Is a finding of an acceptable family, at the right joint, at least as likely as not? None
+    where nothing is hidden, or the verdict has no findings."""
     log_probability: float | None = None
-    """Natural logarithm of the probability given to the truth; None where the verdict tells none."""
+    """Natural logarithm of the probability given to the truth; None where the verdict tells
+    none."""
 
     @property
     def first(self) -> str:
@@ -72,9 +74,11 @@ def score(
     truth : mapping
         A truth file.
     answer : mapping
-        ``exit_code``, ``message`` (what the command said), ``seconds``, and ``verdict`` (``verdict/1``, or None).
+        ``exit_code``, ``message`` (what the command said), ``seconds``, and ``verdict``
+        (``verdict/1``, or None).
     smallest : mapping, optional
-        Smallest visible size of each cause, rms N·m; without it silence about an effect is always wrong.
+        Smallest visible size of each cause, rms N·m; without it silence about an effect is always
+        wrong.
     """
     category = truth["case"]["category"]
     verdict = answer["verdict"] or {
@@ -129,7 +133,8 @@ def score(
 
 
 def _is_called_unlisted(verdict: Mapping[str, Any], kin: set[Named]) -> bool:
-    """Tell whether something was found missing and no listed cause called likely, but for its kin."""
+    """Tell whether something was found missing and no listed cause called likely, but for its
+    kin."""
     if verdict["status"] not in ("unknown_cause", "partly_explained", "explained"):
         return False
     likely = [c for c in verdict["causes"] if float(c["probability"]) >= LIKELY]
@@ -161,7 +166,8 @@ def _is_of_family(finding: Mapping[str, Any], hidden: Mapping[str, Any]) -> bool
 
 
 def _log_probability(truth: Mapping[str, Any], posterior: Mapping[str, Any] | None) -> float | None:
-    """Return the mean logarithm of the probabilities of all that is true, each at least ``LEAST``."""
+    """Return the mean logarithm of the probabilities of all that is true, each at least
+    ``LEAST``."""
     category = truth["case"]["category"]
     if posterior is None or category == "fault":
         return None
@@ -190,9 +196,11 @@ def names_of(cause: Mapping[str, Any]) -> set[Named]:
 def fault_is_named(
     fault: Mapping[str, Any], found: Iterable[Mapping[str, Any]], message: str
 ) -> bool:
-    """Tell whether a data fault was said, in the verdict or in the line with which the command refused the files.
+    """Tell whether a data fault was said, in the verdict or in the line with which the command
+    refused the files.
 
-    Right are a file that has the fault and a word for what it is; where one channel has it, that channel or joint.
+    Right are a file that has the fault and a word for what it is; where one channel has it, that
+    channel or joint.
     """
     sentences = [f"{f['file']} {f['channel']} {f['what']}" for f in found] + [message]
     joint = (fault["channel"] or "").split("_")[0]
@@ -228,7 +236,8 @@ def _ratio(
 
 
 def _covered(hidden: Iterable[Mapping[str, Any]], causes: Iterable[Mapping[str, Any]]):
-    """Yield whether intervals hold the truth, for causes named rightly, parameters that the plant's form has too."""
+    """Yield whether intervals hold the truth, for causes named rightly, parameters that the plant's
+    form has too."""
     for h in hidden:
         for cause in causes:
             if (cause["effect"], cause["joint"]) != (h["effect"], h["joint"]):

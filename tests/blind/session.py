@@ -47,10 +47,11 @@ LONGEST_PILOT_S = 20.0
 SHORT_PILOT_S = 7.0
 ATTEMPTS = 6
 LEAST_MOVING, LEAST_MOVING_ANYHOW = 0.4, 0.15
-"""Share of a run in which each joint has to be away from reversals; the latter where a motion may hold still."""
+"""Share of a run in which each joint has to be away from reversals; the latter where a motion may
+hold still."""
 OF_FLOOR, OF_TORQUE = 0.35, 0.006
-"""How much rigid body and friction may leave of a good rig's small effects: of the noise floor, of the
-torque's rms, whichever is larger."""
+"""How much rigid body and friction may leave of a good rig's small effects: of the noise floor, of
+the torque's rms, whichever is larger."""
 LATER = np.arange(0.0, 20.0, 0.05)
 """Instants at which motions are looked at."""
 RUNS = 4
@@ -85,7 +86,8 @@ class Session:
 
 
 def simulate(case: Case) -> Session:
-    """Draw a rig, a person and what is hidden, and simulate all runs; the case's seed decides everything.
+    """Draw a rig, a person and what is hidden, and simulate all runs; the case's seed decides
+    everything.
 
     A leg that what is hidden makes unstable or stuck is drawn anew: no lab would record it.
     """
@@ -197,7 +199,8 @@ class _Draw:
         periods = [motion.period_s or LONGEST_PILOT_S for motion in self.motion.values()]
         pilot_s = float(np.clip(max(periods), PILOT_S, LONGEST_PILOT_S))
         duration = self.duration if cause.slow else min(pilot_s, self.duration)
-        purposes = PURPOSES[:1] if cause.slow else PURPOSES
+        each = cause.follows_temperature or not cause.slow
+        purposes = PURPOSES if each else PURPOSES[:1]
 
         def pilot(size: float) -> list[Recorded]:
             return [
@@ -331,9 +334,14 @@ def _header(session: Session, r: Recorded, label: str) -> dict[str, Any]:
         period = session.trajectories[r.run.purpose].period_s
         return about | recorder.header(told, session.conditions, period)
     return {
-        "contract": "recording/1", "run": r.run.kind, "purpose": r.run.purpose, "sample_rate_hz": 200.0,
-        "period_s": PERIOD_S, "session": label, **told,
-    }  # fmt: skip
+        "contract": "recording/1",
+        "run": r.run.kind,
+        "purpose": r.run.purpose,
+        "sample_rate_hz": 200.0,
+        "period_s": PERIOD_S,
+        "session": label,
+        **told,
+    }
 
 
 def _spoil(
@@ -396,7 +404,8 @@ def _truth(
 
 
 def _hidden(session: Session, cause: Cause, size: float, wanted: float) -> dict[str, Any]:
-    # In company an effect cannot be measured by itself; what its own pilot was set to is near enough.
+    # In company an effect cannot be measured by itself; what its own pilot was set to is near
+    # enough.
     effect, torque = rms(cause, session.runs)
     share = effect / torque if len(session.hidden) == 1 else wanted
     return {
@@ -404,7 +413,8 @@ def _hidden(session: Session, cause: Cause, size: float, wanted: float) -> dict[
         "joint": None if cause.joint is None else session.mechanism.joints[cause.joint],
         "form": cause.form,
         "own_form": cause.own,
-        # What the form is drawn and installed with, so the simulated leg's; parameters are the recording's.
+        # What the form is drawn and installed with, so the simulated leg's; parameters are the
+        # recording's.
         "size": size,
         "shape": [float(x) for x in cause.shape],
         "families": list(cause.families),

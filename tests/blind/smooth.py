@@ -1,9 +1,10 @@
 """Hidden torques that are functions of motion, time and a few memories.
 
-Each form is a number, its parameters ``p``, memories ``m``, and a branch below. The sign is that of the
-torque the drive must add. Sources: LuGre after Canudas de Wit, Olsson, Astrom, Lischinsky (1995), IEEE TAC
-40(3); Bouc-Wen after Wen (1976), J. Eng. Mech. 102(2); Maxwell slip after Al-Bender, Lampaert, Swevers (2005),
-IEEE TAC 50(11); passive joint torque after Riener and Edrich (1999), J. Biomech. 32(5).
+Each form is a number, its parameters ``p``, memories ``m``, and a branch below. The sign is that of
+the torque the drive must add. Sources: LuGre after Canudas de Wit, Olsson, Astrom, Lischinsky
+(1995), IEEE TAC 40(3); Bouc-Wen after Wen (1976), J. Eng. Mech. 102(2); Maxwell slip after
+Al-Bender, Lampaert, Swevers (2005), IEEE TAC 50(11); passive joint torque after Riener and Edrich
+(1999), J. Biomech. 32(5).
 """
 
 from math import cos, exp, log, pi, sin, sqrt, tanh
@@ -28,7 +29,8 @@ TABLE_RATE_HZ = 50.0
 
 @njit()
 def smooth_torque(kind, p, m, table, t, dt, j, q, v, a):
-    """Torque at joint ``j`` for angles, speeds and accelerations (2,); memories ``m`` advance by ``dt``."""
+    """Torque at joint ``j`` for angles, speeds and accelerations (2,); memories ``m`` advance by
+    ``dt``."""
     if kind >= FURTHER:
         return further_torque(kind, p, m, table, t, dt, j, q, v, a)
     if kind <= DRAG:
@@ -64,7 +66,8 @@ def _viscous(kind, p, v):
 
 @njit()
 def _presliding(kind, p, m, dt, v):
-    """``p``: friction torque, presliding angle, exponent or damping; memories hold the bristles, in rad."""
+    """``p``: friction torque, presliding angle, exponent or damping; memories hold the bristles, in
+    rad."""
     force, angle = p[0], p[1]
     if kind == MAXWELL_SLIP:
         total = 0.0
@@ -92,7 +95,8 @@ def _presliding(kind, p, m, dt, v):
 
 @njit()
 def _end_range(kind, p, q):
-    """``p``: torque scale, onset, sharpness (1/rad) or power, side (+1: beyond the onset upward)."""
+    """``p``: torque scale, onset, sharpness (1/rad) or power, side (+1: beyond the onset
+    upward)."""
     x = (q - p[1]) * p[3]
     if kind == END_EXPONENTIAL:
         return p[3] * p[0] * exp(p[2] * x)

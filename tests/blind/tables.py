@@ -176,8 +176,8 @@ def kinds_of_miss(scores: Sequence[Score]) -> Page:
 def confusion(scores: Sequence[Score]) -> Page:
     """Count what was hidden (rows) against what was named first (columns, by the rows' numbers).
 
-    A tie that counts as right stands on the diagonal, as does silence about what could not be seen; the right cause at
-    the wrong joint under ``joint``.
+    A tie that counts as right stands on the diagonal, as does silence about what could not be seen;
+    the right cause at the wrong joint under ``joint``.
     """
     singles = of(scores, "single")
     known = sorted({*effects(singles), *(s.named[0][0] for s in singles if s.named)})

@@ -37,7 +37,8 @@ class Measure:
 
     @property
     def met(self) -> bool | None:
-        """Is the measured value within its bounds? None where nothing is asked for, or nothing was measured."""
+        """Is the measured value within its bounds? None where nothing is asked for, or nothing was
+        measured."""
         if self.value is None or not self.target:
             return None
         return (self.low is None or self.value >= self.low) and (
@@ -74,6 +75,8 @@ def measures(scores: Sequence[Score]) -> list[Measure]:
             (s.status == SILENT for s in outside),
             high=0.05,
         ),
+        _rate("outside the catalogue: right family of laws", family(outside), low=0.80),
+        _rate("outside, kinds never learned from", right(s for s in outside if s.held_back)),
         _rate("data fault named", right(of(scores, "fault"))),
         _rate(
             "refused or crashed", (s.status in ("refused", "crashed") for s in physical), high=0.0
@@ -85,6 +88,7 @@ def measures(scores: Sequence[Score]) -> list[Measure]:
         ),
         _number("Brier score", brier(forecasts), high=0.05),
         _number("expected calibration error", calibration_error(forecasts), high=0.05),
+        _number("mean log probability of the truth", log_probability(scores)),
         _rate(
             "95 % intervals that hold the truth",
             (c[2] for s in scores for c in s.covered),
@@ -147,7 +151,8 @@ def right(scores: Iterable[Score]) -> list[bool]:
 
 
 def rmse_over_floor(scores: Iterable[Score]) -> list[float]:
-    """Return the extended model's RMSE over the true noise floor, of each joint where a model could reach it."""
+    """Return the extended model's RMSE over the true noise floor, of each joint where a model could
+    reach it."""
     return [r for s in of(scores, "single", "pair", "none") for r in s.rmse_over_floor.values()]
 
 

@@ -7,12 +7,11 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 RATE_HZ = 50.0
-LEAST_BETWEEN_C = 1.5
-"""By how much runs differ at least."""
 
 
 class Warmth:
-    """How warm both motors are in each run of a session, in the order in which the runs were made."""
+    """How warm both motors are in each run of a session, in the order in which the runs were
+    made."""
 
     def __init__(self, rng: Generator, runs: int) -> None:
         self.room = rng.uniform(18.0, 27.0)

@@ -57,7 +57,8 @@ def away_from_reversals(dq):
 
 
 def terms(session, m):
-    """Return what inertia, gravity or weight, Coulomb and viscous friction take: the rig in these units."""
+    """Return what inertia, gravity or weight, Coulomb and viscous friction take: the rig in these
+    units."""
     rig, machine = session.rig, session.rig.machine
     torque, angle = rig.units.torque, rig.units.angle
     link = machine.leg.thigh
@@ -77,7 +78,7 @@ def rms(x):
 
 @pytest.fixture(scope="module", params=ONE_JOINT)
 def faultless(request, tmp_path_factory):
-    session = simulate(Case(SEED, "none", machine=request.param, kinds=("exo_alone",)))
+    session = simulate(Case(SEED, "none", machine=request.param, kinds=("exo_alone",), plain=True))
     return session, *recorded(session, tmp_path_factory.mktemp(request.param))
 
 
@@ -109,7 +110,14 @@ def test_the_truth_tells_the_rig_in_the_units_of_the_recording(faultless):
 
 def test_a_hidden_linear_spring_has_the_stiffness_that_the_truth_tells(tmp_path):
     session = simulate(
-        Case(SPRUNG, "single", (("parallel_spring", HIP),), machine="slide", kinds=("exo_alone",))
+        Case(
+            SPRUNG,
+            "single",
+            (("parallel_spring", HIP),),
+            machine="slide",
+            kinds=("exo_alone",),
+            plain=True,
+        )
     )
     m, truth = recorded(session, tmp_path)
     told = truth["hidden"][0]["parameters"]

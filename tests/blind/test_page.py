@@ -11,17 +11,37 @@ from tests.blind.scoring import Score
 
 PLAY, COGGING = ("backlash", "knee"), ("cogging", "hip")
 FOUND = Score(
-    seed=540_000, category="single", truth=(PLAY,), forms=("two_mass",), own_form=False, magnitude=0.1, visibility=0.8,
-    kinds=("exo_alone", "with_human"), status="explained", named=(PLAY,), right=True, probabilities=((0.9, True),),
-    rmse_over_floor={"hip": 1.0, "knee": 1.1}, covered=(("backlash", "play", True),), seconds=4.0,
-)  # fmt: skip
+    seed=540_000,
+    category="single",
+    truth=(PLAY,),
+    forms=("two_mass",),
+    own_form=False,
+    magnitude=0.1,
+    visibility=0.8,
+    kinds=("exo_alone", "with_human"),
+    status="explained",
+    named=(PLAY,),
+    right=True,
+    probabilities=((0.9, True),),
+    rmse_over_floor={"hip": 1.0, "knee": 1.1},
+    covered=(("backlash", "play", True),),
+    seconds=4.0,
+)
 MISTAKEN = replace(
     FOUND, seed=540_001, named=(COGGING,), right=False, probabilities=((0.6, False),), covered=()
 )
 SILENT = replace(
-    FOUND, seed=540_002, category="none", truth=(), forms=(), magnitude=None, status="nothing_missing", named=(),
-    probabilities=(), covered=(),
-)  # fmt: skip
+    FOUND,
+    seed=540_002,
+    category="none",
+    truth=(),
+    forms=(),
+    magnitude=None,
+    status="nothing_missing",
+    named=(),
+    probabilities=(),
+    covered=(),
+)
 HALF = replace(
     FOUND,
     seed=540_003,
@@ -32,8 +52,17 @@ HALF = replace(
     named=(PLAY,),
     covered=(),
 )
-STRANGE = replace(FOUND, seed=540_004, category="outside", truth=(("outside:tone", "hip"),), forms=("tone",),
-                  status="unknown_cause", named=(), probabilities=(), covered=())  # fmt: skip
+STRANGE = replace(
+    FOUND,
+    seed=540_004,
+    category="outside",
+    truth=(("outside:tone", "hip"),),
+    forms=("tone",),
+    status="unknown_cause",
+    named=(),
+    probabilities=(),
+    covered=(),
+)
 MIXED = Examination(
     "python -m tests.blind --seeds reporting", [FOUND, MISTAKEN, SILENT, HALF, STRANGE]
 )

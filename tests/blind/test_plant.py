@@ -1,4 +1,5 @@
-"""The rig of the blind examination obeys mechanics, and agrees with exoid where nothing is hidden."""
+"""The rig of the blind examination obeys mechanics, and agrees with exoid where nothing is
+hidden."""
 
 import numpy as np
 import pytest
@@ -44,7 +45,7 @@ def free_swing(start, samples):
     joints = loop.Joints(
         none, none, pair, np.zeros(2, int), none, np.zeros((2, 5)), np.zeros((2, 6)), np.ones(3)
     )
-    drives = loop.Drives(none, none, none, none, none, np.zeros((2, 4)), 1.0, none)
+    drives = loop.Drives(none, none, none, none, none, np.zeros((2, 6)), 1.0, none)
     world = loop.World(PERSON.leg.gravity, np.zeros(3), np.array([-1.0, 0.0, 0.0, 1.0, 1.0]))
     still = loop.Excited(np.array(start), pair, pair, 1.0, np.zeros((0, 4)))
     log = empty_log(samples)

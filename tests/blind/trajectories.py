@@ -1,7 +1,7 @@
 """Motions that labs use: multisines, the paper's two harmonics, ramps between holds, and a gait.
 
-All stay within the paper's Table 2 (``excitation.py``). A motion is a sum of sines of a phase, or a course between
-points; either repeats with a period, or does not.
+All stay within the paper's Table 2 (``excitation.py``). A motion is a sum of sines of a phase, or a
+course between points; either repeats with a period, or does not.
 """
 
 import tomllib
@@ -63,11 +63,15 @@ def random_trajectory(
 ) -> Trajectory:
     """Draw a motion for runs of this length, of this family or of any."""
     family = family or random_family(rng)
-    longest = min(PERIODS_S[1], duration_s / FEWEST_PERIODS)
+    longest = max(PERIODS_S[0], min(PERIODS_S[1], duration_s / FEWEST_PERIODS))
     period = float(rng.uniform(PERIODS_S[0], longest))
     draw = {
-        "optimal": _optimal, "multisine": _multisine, "paper": _paper, "ramps": _ramps, "gait": _gait,
-    }[family]  # fmt: skip
+        "optimal": _optimal,
+        "multisine": _multisine,
+        "paper": _paper,
+        "ramps": _ramps,
+        "gait": _gait,
+    }[family]
     middle, repeats_after, motion = draw(rng, period, duration_s, periodic)
     return Trajectory(family, repeats_after if periodic else None, middle, motion)
 
@@ -159,7 +163,8 @@ def _printed() -> dict:
 
 
 def _paper(rng: Generator, period: float, duration_s: float, periodic: bool):
-    """Return the paper's motion, whose hip is one sine; not as printed but for its phases and its pace."""
+    """Return the paper's motion, whose hip is one sine; not as printed but for its phases and its
+    pace."""
     told = _printed()
     a, b = np.radians(told["a"]), np.radians(told["b"])
     middle = np.array(told["theta0_rad"])
@@ -187,7 +192,8 @@ def _ramps(rng: Generator, period: float, duration_s: float, periodic: bool):
 
 
 def _course(rng: Generator, length: float, closed: bool) -> tuple[NDArray, NDArray, float]:
-    """Draw instants and angles between which a joint moves, and what share of a move speeds up or down."""
+    """Draw instants and angles between which a joint moves, and what share of a move speeds up or
+    down."""
     moves = max(3, round(length / rng.uniform(1.3, 3.0)))
     durations = rng.uniform(0.5, 1.5, moves)
     holds = np.where(rng.random(moves) < 0.5, rng.uniform(0.05, 0.6, moves), 0.0)
@@ -219,7 +225,8 @@ def _along(course: tuple[NDArray, NDArray, float], t: NDArray) -> tuple[NDArray,
 
 
 def _smooth_trapezoid(u: NDArray, blend: float) -> tuple[NDArray, NDArray, NDArray]:
-    """Return a rise from 0 to 1, its slope and curvature: speed goes up and down as half a cosine."""
+    """Return a rise from 0 to 1, its slope and curvature: speed goes up and down as half a
+    cosine."""
     top = 1.0 / (1.0 - blend)
     late = np.minimum(u, 1.0 - u)
     ramp = np.clip(late / blend, 0.0, 1.0)
@@ -232,7 +239,8 @@ def _smooth_trapezoid(u: NDArray, blend: float) -> tuple[NDArray, NDArray, NDArr
 
 
 def _gait(rng: Generator, period: float, duration_s: float, periodic: bool):
-    """Return slow steps: the hip swings about once a stride, the knee bends little in stance and much in swing."""
+    """Return slow steps: the hip swings about once a stride, the knee bends little in stance and
+    much in swing."""
     middle = np.array([0.55, -0.85])
     stride = rng.uniform(2.4, 5.5)
     hip = np.array([1.0, rng.uniform(0.1, 0.25), rng.uniform(0.0, 0.06), 0.0])

@@ -1,4 +1,5 @@
-"""What is between a motor and its link, and between the machine and its wearer: springs, plays, cuffs."""
+"""What is between a motor and its link, and between the machine and its wearer: springs, plays,
+cuffs."""
 
 from math import cos, exp
 
@@ -52,7 +53,8 @@ def _soft_plus(x):
 
 
 def per_metre(cuffs: NDArray, levers: NDArray) -> NDArray:
-    """Return cuffs told by angles about their joints, (2, 6) as ``Plan.cuffs``, by the metre of a cuff's way.
+    """Return cuffs told by angles about their joints, (2, 6) as ``Plan.cuffs``, by the metre of a
+    cuff's way.
 
     Columns: stiffness, damping, hardening, slack, relaxing share, relaxation time.
     """

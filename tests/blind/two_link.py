@@ -1,14 +1,16 @@
 """Closed-form dynamics of a leg of two links in a plane, from its Lagrangian.
 
-With the links' angles from the vertical, f1 = q1 and f2 = q1 + q2, forward and down as axes, and each centre of mass
+With the links' angles from the vertical, f1 = q1 and f2 = q1 + q2, forward and down as axes, and
+each centre of mass
 ``along`` and ``forward`` of its link::
 
-    T = A f1'^2 / 2 + B f2'^2 / 2 + h(f2 - f1) f1' f2',      h(d) = C cos d - D sin d
-    V = -g (m1 cos f1 - n1 sin f1 + m2 cos f2 - n2 sin f2)
+    T = A f1'^2 / 2 + B f2'^2 / 2 + h(f2 - f1) f1' f2',      h(d) = C cos d - D sin d V = -g (m1 cos
+    f1 - n1 sin f1 + m2 cos f2 - n2 sin f2)
 
-A and B are the inertias about the hip (of all that the thigh carries) and the knee, C and D the shank's moments times
-the thigh's length, m and n the moments along and in front of the axes. The equations of motion are those of Lagrange
-in q. Legs that move as one have the sums of their coefficients.
+A and B are the inertias about the hip (of all that the thigh carries) and the knee, C and D the
+shank's moments times the thigh's length, m and n the moments along and in front of the axes. The
+equations of motion are those of Lagrange in q. Legs that move as one have the sums of their
+coefficients.
 """
 
 from math import cos, sin
@@ -41,7 +43,8 @@ def coefficients(leg: Leg) -> NDArray:
 
 @njit()
 def add_lump(c, joint, mass, distance, length, out):
-    """Write coefficients ``c`` with a lump of mass down a segment's axis (0 thigh, 1 shank) into ``out``."""
+    """Write coefficients ``c`` with a lump of mass down a segment's axis (0 thigh, 1 shank) into
+    ``out``."""
     out[:] = c
     turned = mass * (distance * distance + PAYLOAD_INERTIA)
     if joint == 0:
@@ -57,7 +60,8 @@ def add_lump(c, joint, mass, distance, length, out):
 
 @njit()
 def mass_and_bias(c, gravity, tilt, q1, q2, v1, v2, M, bias):
-    """Write mass matrix (2, 2) and Coriolis, centrifugal and gravity torque (2,) for a base tilted by ``tilt``."""
+    """Write mass matrix (2, 2) and Coriolis, centrifugal and gravity torque (2,) for a base tilted
+    by ``tilt``."""
     h = c[C] * cos(q2) - c[D] * sin(q2)
     slope = -c[C] * sin(q2) - c[D] * cos(q2)
     M[0, 0] = c[A] + c[B] + 2.0 * h

@@ -1,13 +1,15 @@
-"""World *two_mass*: motors and links are masses of their own, joined by stiff springs at both joints.
+"""World *two_mass*: motors and links are masses of their own, joined by stiff springs at both
+joints.
 
 Friction acts on the motors: regularised Coulomb friction whose level rises a little with the load
-over a preload, and a gear that loses a share of what it transmits. Cuffs are always firm but finite,
-so the wearer's leg is one of its own. Drives follow a model of the leg (computed torque, or position
-control with gravity) that is a little wrong. The measured torque is a mean over the sample.
+over a preload, and a gear that loses a share of what it transmits. Cuffs are always firm but
+finite, so the wearer's leg is one of its own. Drives follow a model of the leg (computed torque, or
+position control with gravity) that is a little wrong. The measured torque is a mean over the
+sample.
 """
 
 from dataclasses import dataclass, replace
-from math import cos, sin, sqrt, tanh
+from math import sin, sqrt, tanh
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +23,7 @@ from tests.blind.channel import through
 from tests.blind.compiled import njit
 from tests.blind.conditions import Conditions
 from tests.blind.dry import dry_levels, is_dry
+from tests.blind.encoders import curvature, reading, slope
 from tests.blind.legs import Reported, check, cuff_forces, links_of, needed
 from tests.blind.loop import LEAD_IN_S, Excited, reference_at
 from tests.blind.plan import Plan, Run
@@ -182,7 +185,7 @@ def _mass(c: NDArray, knee: float) -> NDArray:
 
 
 class Drives(NamedTuple):
-    """Model-based position control and encoders; arrays (2,), ``wobble`` (2, 4)."""
+    """Model-based position control and encoders; arrays (2,), ``wobble`` (2, 6)."""
 
     model: np.ndarray
     """(8,) coefficients of the leg as the drives believe it."""
@@ -236,12 +239,6 @@ class Log(NamedTuple):
 
 
 @njit()
-def _read(d, j, theta):
-    once = theta + d.offset[j] + d.wobble[j, 0] * sin(theta + d.wobble[j, 1])
-    return once + d.wobble[j, 2] * sin(2.0 * theta + d.wobble[j, 3])
-
-
-@njit()
 def _command(d, ref, old_ref, older_ref, seen, speed, tick, M, bias, wanted):
     """Write the torques (2,) that the drives ask for."""
     pull = np.zeros(2)
@@ -252,7 +249,8 @@ def _command(d, ref, old_ref, older_ref, seen, speed, tick, M, bias, wanted):
     for j in range(2):
         rate = (ref[j] - old_ref[j]) / tick
         error = d.kp[j] * (ref[j] - seen[j]) + d.kd[j] * (rate - speed[j])
-        # Here kp and kd are torques; a computed torque wants accelerations of the diagonal's inertia.
+        # Here kp and kd are torques; a computed torque wants accelerations of the diagonal's
+        # inertia.
         pull[j] = error / M[j, j] if d.computed_torque else error
         if d.computed_torque:
             pull[j] += (ref[j] - 2.0 * old_ref[j] + older_ref[j]) / (tick * tick)
@@ -279,7 +277,7 @@ def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
     hM, hbias, hforce = np.zeros((2, 2)), np.zeros(2), np.zeros(2)
     c = w.driven.copy()
     for j in range(2):
-        seen[j] = _read(d, j, start[j])
+        seen[j] = reading(d.offset[j], d.wobble[j], start[j])
     first = -round(LEAD_IN_S / DT) if with_drives else 0
     reference_at(x, first * DT, old_ref)
     older_ref[:] = old_ref
@@ -294,7 +292,7 @@ def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
         if with_drives and s % d.steps == 0:
             reference_at(x, t, ref)
             for j in range(2):
-                now = _read(d, j, th[j])
+                now = reading(d.offset[j], d.wobble[j], th[j])
                 if d.count[j] > 0.0:
                     now = d.count[j] * np.round(now / d.count[j])
                 # An observer that follows the counts: its speed is what it had to be moved by.
@@ -342,10 +340,10 @@ def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
         for j in range(2):
             level = max(0.0, up[j] if om[j] > 0.0 else down[j])
             slide = tanh(om[j] / jt.creep_speed[j])
-            slope = level * (1.0 - slide * slide) / jt.creep_speed[j] + jt.viscous[j]
+            steep = level * (1.0 - slide * slide) / jt.creep_speed[j] + jt.viscous[j]
             rest = drive[j] - load[j] - smooth[j] - jt.viscous[j] * om[j] - level * slide
             # Friction is as steep as a wall near rest: linearised and implicit.
-            motor_a[j] = rest / (jt.inertia[j] + DT * slope)
+            motor_a[j] = rest / (jt.inertia[j] + DT * steep)
         if s >= 0:
             k = s // STEPS_PER_MS
             for j in range(2):
@@ -356,8 +354,8 @@ def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
             for j in range(2):
                 out.link_acceleration[k, j] += a[j] / sample_steps
                 out.wound[k, j] += (th[j] - q[j]) / sample_steps
-                slope, bend = _told(d, j, th[j])
-                told = motor_a[j] * slope + bend * om[j] * om[j]
+                told = motor_a[j] * slope(d.wobble[j], th[j])
+                told += curvature(d.wobble[j], th[j]) * om[j] * om[j]
                 out.acceleration[k, j] += told / sample_steps
             if s % sample_steps == sample_steps // 2:
                 k = s // sample_steps
@@ -379,23 +377,13 @@ def simulate(x, d, jt, w, hid, start, samples, sample_steps, with_drives, out):
 
 
 @njit()
-def _told(d, j, theta):
-    """Return by what factor an encoder tells a speed, and how that changes with the angle."""
-    if d.wobble[j, 0] == 0.0 and d.wobble[j, 2] == 0.0:
-        return 1.0, 0.0
-    once, twice = theta + d.wobble[j, 1], 2.0 * theta + d.wobble[j, 3]
-    slope = 1.0 + d.wobble[j, 0] * cos(once) + 2.0 * d.wobble[j, 2] * cos(twice)
-    return slope, -d.wobble[j, 0] * sin(once) - 4.0 * d.wobble[j, 2] * sin(twice)
-
-
-@njit()
 def _latch(out, k, j, d, theta, omega):
     """Log a motor's angle and speed as its encoder tells them."""
-    told = _read(d, j, theta)
+    told = reading(d.offset[j], d.wobble[j], theta)
     count = d.recorded_count[j]
     out.angle[k, j] = told
     out.reading[k, j] = count * np.round(told / count) if count > 0.0 else told
-    out.speed[k, j] = omega * _told(d, j, theta)[0]
+    out.speed[k, j] = omega * slope(d.wobble[j], theta)
 
 
 def record(

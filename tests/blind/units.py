@@ -44,12 +44,14 @@ POWERS: dict[tuple[str, str], tuple[int, int]] = {
     ("encoder_eccentricity", "amplitude_twice"): (0, 1),
     ("torque_cross_talk", "coupling"): (0, 0),
 }
-"""Powers of torque and of angle of every parameter that a cause tells; a missing one is refused, not taken as it is."""
+"""Powers of torque and of angle of every parameter that a cause tells; a missing one is refused,
+not taken as it is."""
 
 
 @dataclass(frozen=True)
 class Units:
-    """What a simulated newton metre and a simulated radian are in the recording: N·m and rad, or N and m."""
+    """What a simulated newton metre and a simulated radian are in the recording: N·m and rad, or N
+    and m."""
 
     torque: float = 1.0
     angle: float = 1.0
@@ -61,5 +63,6 @@ class Units:
         }
 
     def factor(self, torque: int, angle: int) -> float:
-        """Return what turns a simulated value into a recorded one whose unit has these powers of torque and angle."""
+        """Return what turns a simulated value into a recorded one whose unit has these powers of
+        torque and angle."""
         return self.torque**torque * self.angle**angle
