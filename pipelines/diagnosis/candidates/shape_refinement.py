@@ -31,8 +31,10 @@ WIDE = 4.0
 """Ratio of the ends of a positive range from which a shape changes by factors."""
 MARGIN, BEYOND = 0.5, 2.0
 """Share of its typical range, and factor, by which a shape may leave that range."""
-ONSETS, WORTH = 40, 0.1
-"""Instants tried in a run, twice; and the share of the best run's gain from which one is taken."""
+ROUNDING = 1e-5
+"""Share of a column that is left by a projection where the column lies in what is projected out."""
+ONSETS, SWEEPS = 40, 3
+"""Instants tried in a run at a time, and times that all runs are gone through."""
 TONE_STEP_HZ = 0.01
 """Unit of change of a rhythm's frequency: that of a line over 100 s, Hz."""
 
@@ -78,8 +80,11 @@ class ShapeRefinement:
         self._measured = measured - basis @ (basis.T @ measured)
 
     def _project(self, rows: NDArray) -> NDArray:
+        """Return rows (N, k) less what is fitted beside; nought where nothing but rounding is left."""
         plain = self._regression.project(rows)
-        return plain - self._basis @ (self._basis.T @ plain)
+        plain -= self._basis @ (self._basis.T @ plain)
+        size = np.linalg.norm(rows, axis=0)
+        return np.where(np.linalg.norm(plain, axis=0) > ROUNDING * size, plain, 0.0)
 
     def fit(self, candidate: Candidate, *, rough: bool = False) -> Fitted | None:
         """Fit a candidate's amplitudes; None where its rows are not finite."""
@@ -126,35 +131,43 @@ class ShapeRefinement:
     def _with_onsets(self, candidate: Candidate) -> Fitted | None:
         """Return a candidate that begins in each run at the instant at which it explains most.
 
-        It never begins in a run in which it explains next to nothing. What has begun acts as if it
-        had always been there: the column of an instant is that of all the run, zero before it.
+        It never begins in a run where that explains as much. Its amplitude is the same in all runs.
+        What has begun acts as if it had always been there: the column of an instant is that of all
+        the run, zero before it.
         """
-        regression, at, runs = self._regression, candidate.onset, len(candidate.shapes)
+        at, runs = candidate.onset, range(len(candidate.shapes))
         assert at is not None
-        onsets, gains = [NEVER] * runs, np.zeros(runs)
-        for r in range(runs):
-            alone = candidate.with_own(at, [ALWAYS if k == r else NEVER for k in range(runs)])
-            rows = self._rows(alone, self._beside)
-            if rows is None or not rows.any():
-                continue
-            onsets[r], gains[r] = self._best_onset(rows[:, 0], regression.run == r)
-        worth = WORTH * gains.max()
-        chosen = [t if g > worth else NEVER for t, g in zip(onsets, gains, strict=True)]
-        return self.fit(candidate.with_own(at, chosen))
+        whole = [self._only_in(candidate, r) for r in runs]
+        times = [self._regression.time[self._regression.run == r] for r in runs]
+        steps = [(t.max() - t.min()) / ONSETS for t in times]
+        tried = [t.min() + step * np.arange(ONSETS) for t, step in zip(times, steps, strict=True)]
+        onsets, own = [NEVER for _ in runs], [np.zeros(len(self._measured)) for _ in runs]
+        for sweep in range(SWEEPS):
+            for r in runs:
+                fine = sweep and onsets[r] != NEVER
+                instants = np.linspace(onsets[r] - steps[r], onsets[r] + steps[r], ONSETS + 1) if fine else tried[r]
+                others = np.sum([own[k] for k in runs if k != r], axis=0) if len(runs) > 1 else np.zeros_like(own[r])
+                begun = whole[r][:, np.newaxis] * (self._regression.time[:, np.newaxis] >= instants)
+                columns = self._project(begun)
+                gains = self._gains(others[:, np.newaxis] + columns)
+                best = int(np.argmax(gains))
+                worth = gains[best] > self._gains(others[:, np.newaxis])[0] + np.log(ONSETS)
+                onsets[r] = float(instants[best]) if worth else NEVER
+                own[r] = columns[:, best] * worth
+        return self.fit(candidate.with_own(at, onsets))
 
-    def _best_onset(self, column: NDArray, here: NDArray) -> tuple[float, float]:
-        """Return the instant in one run's rows at which a column explains most, and its gain."""
-        time = self._regression.time
-        first, last = time[here].min(), time[here].max()
-        best, gain, step = first, -np.inf, (last - first) / ONSETS
-        tried = np.linspace(first, last, ONSETS + 1)[:-1]
-        for _ in range(2):
-            columns = self._project(column[:, np.newaxis] * (time[:, np.newaxis] >= tried))
-            square = np.maximum(np.sum(columns**2, axis=0), np.finfo(float).tiny)
-            gains = 0.5 * (columns.T @ self._measured) ** 2 / square
-            best, gain = float(tried[np.argmax(gains)]), float(gains.max())
-            tried = np.linspace(best - step, best + step, ONSETS + 1)
-        return best, gain
+    def _only_in(self, candidate: Candidate, number: int) -> NDArray:
+        """Return the rows (N,) of a candidate that is there in one run only, from its begin on."""
+        at, runs = candidate.onset, range(len(candidate.shapes))
+        assert at is not None
+        alone = candidate.with_own(at, [ALWAYS if k == number else NEVER for k in runs])
+        rows = self._rows(alone, self._beside)
+        return np.zeros(len(self._measured)) if rows is None else rows[:, 0]
+
+    def _gains(self, plain: NDArray) -> NDArray:
+        """Return the log likelihood that each of some projected columns (N, k) gains alone, (k,)."""
+        square = np.sum(plain**2, axis=0)
+        return 0.5 * (plain.T @ self._measured) ** 2 / np.where(square > 0.0, square, np.inf)
 
     def _scaled(self, start: Fitted) -> Fitted:
         """Return a candidate that transforms the motion at the shape that its amplitude asks for."""

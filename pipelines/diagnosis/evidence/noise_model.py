@@ -25,6 +25,8 @@ WITHOUT_PERIODS_HZ = (4.0, 8.0)
 """Without periods: where the band begins at the latest, and where it ends, Hz."""
 CORRELATION_S = np.concatenate([[0.0], np.geomspace(0.005, 0.25, 24)])
 """Correlation times tried, s. Noise of sensors and drives is no slower; what is slower wanders."""
+PIECE_S = 20.0
+"""Length of the pieces of a series whose spectra are taken, s."""
 SHORTEST = 64
 """Blocks that a series must have for its spectrum to count."""
 
@@ -84,11 +86,26 @@ def _first_order(series: Sequence[NDArray], rate_hz: float, band: tuple[float, f
 
 def _periodogram(x: NDArray, rate_hz: float, band: tuple[float, float]) -> tuple[NDArray, NDArray]:
     """Return frequencies (Hz) and two-sided densities of a series (n,) within a band."""
-    known = np.isfinite(x)
-    if known.sum() < SHORTEST:
+    pieces = np.array_split(x, max(1, round(len(x) / (PIECE_S * rate_hz))))
+    found = [_of_piece(piece, rate_hz, band) for piece in pieces]
+    return np.concatenate([f for f, _ in found]), np.concatenate([p for _, p in found])
+
+
+def _of_piece(x: NDArray, rate_hz: float, band: tuple[float, float]) -> tuple[NDArray, NDArray]:
+    known, n = np.isfinite(x), len(x)
+    slow = _cosines(n, int(2.0 * band[0] * n / rate_hz) + 1)
+    if known.sum() < max(SHORTEST, 2 * slow.shape[1]):
         return np.zeros(0), np.zeros(0)
-    window = np.hanning(len(x)) * known
-    power = np.abs(np.fft.rfft(np.where(known, x, 0.0) * window)) ** 2
-    frequency = np.fft.rfftfreq(len(x), 1.0 / rate_hz)
+    # What is slow would leak into the band through the gaps.
+    wanders, *_ = np.linalg.lstsq(slow[known], x[known], rcond=None)
+    window = np.hanning(n) * known
+    left = np.where(known, x - slow @ wanders, 0.0)
+    power = np.abs(np.fft.rfft(left * window)) ** 2
+    frequency = np.fft.rfftfreq(n, 1.0 / rate_hz)
     inside = (frequency > band[0]) & (frequency < min(band[1], 0.45 * rate_hz))
     return frequency[inside], power[inside] / (np.sum(window**2) * rate_hz)
+
+
+def _cosines(n: int, count: int) -> NDArray:
+    """Return the slowest cosines over n samples, (n, count)."""
+    return np.cos(np.pi * np.outer(np.arange(n) + 0.5, np.arange(count)) / n)
