@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates import Candidate, expanded, gram_of_runs, proposals, signatures
 from pipelines.diagnosis.gram import Gram, error, gram_of, solve
-from pipelines.diagnosis.observations import FOLDS, Baseline, Run, with_load
+from pipelines.diagnosis.observations import FOLDS, Baseline, Run, residuals_at_full_rate, with_load
+from pipelines.diagnosis.order_tracking import lines_in
 from pipelines.diagnosis.scan import Scan, worth_a_look
 from pipelines.mechanics.geometry import Geometry
 
@@ -63,21 +64,23 @@ def fill(
     runs: Sequence[Run], baseline: Baseline, report: Callable[[float, str], None] = lambda share, what: None
 ) -> Bank:
     """Compute every candidate's columns; ``report`` is told the share done and the effect at hand."""
+    motions = [run.motion for run in runs]
     untouched = [run.average(baseline.columns(run.motion, run.motion, run.motion)) for run in runs]
     plain = gram_of_runs(runs, untouched)
     weights = weights_under(plain)
-    runs = [with_load(run, baseline, solve(plain, weights)) for run in runs]
-    scan = Scan.of(runs, untouched, weights)
+    values = solve(plain, weights)
+    runs = [with_load(run, baseline, values) for run in runs]
+    scan = Scan.of(runs, untouched, weights, lines_in(motions, residuals_at_full_rate(runs, baseline, values)))
     candidates: list[Candidate] = []
     where: list[slice] = []
     columns = [untouched]
     at = baseline.size
-    motions = [run.motion for run in runs]
     effects = [e for e in proposals(baseline, [m.run for m in motions]) if e.shows_in(motions)]
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
+        known: dict[tuple[float, ...], list[NDArray]] = {}
         for candidate in worth_a_look(effect, scan):
-            shared = signatures(candidate, runs, baseline, untouched, weights)
+            shared = signatures(candidate, runs, baseline, untouched, weights, known)
             made = expanded(shared, effect, candidate.signature_apart, runs)
             if not all(np.isfinite(column).all() for column in made):  # a shape that tears the motion apart
                 continue

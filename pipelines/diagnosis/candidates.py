@@ -159,7 +159,12 @@ def gram_of_runs(runs: Sequence[Run], columns: Sequence[NDArray], measured: Sequ
 
 
 def signatures(
-    candidate: Candidate, runs: Sequence[Run], baseline: Baseline, untouched: Sequence[NDArray], weights: NDArray
+    candidate: Candidate,
+    runs: Sequence[Run],
+    baseline: Baseline,
+    untouched: Sequence[NDArray],
+    weights: NDArray,
+    known: dict[tuple[float, ...], list[NDArray]] | None = None,
 ) -> list[NDArray]:
     """Return the candidate's columns in each run, (m, O, k).
 
@@ -167,14 +172,17 @@ def signatures(
     ----------
     untouched : the baseline's columns in each run
     weights : (O,) inverse variances, for the refit of effects that bend the motion
+    known : the effect's columns along directions that were asked for before; those of new ones are added
     """
     if not candidate.bends:
         return [torque_columns(candidate, r, run) for r, run in enumerate(runs)]
     if candidate.directions:
-        parts = [
-            signatures(Candidate(candidate.effect, (shape,) * len(runs)), runs, baseline, untouched, weights)
-            for shape in candidate.directions
-        ]
+        known = {} if known is None else known
+        for shape in candidate.directions:
+            if shape not in known:
+                along = Candidate(candidate.effect, (shape,) * len(runs))
+                known[shape] = signatures(along, runs, baseline, untouched, weights)
+        parts = [known[shape] for shape in candidate.directions]
         return [np.concatenate(columns, axis=2) for columns in zip(*parts, strict=True)]
     under = [
         columns_under([candidate.term(r)], run, baseline) if candidate.effect.explains(run.motion)

@@ -226,6 +226,16 @@ def like_trained(run: Run, baseline: Baseline) -> Run:
     return replace(run, usable=usable)
 
 
+def residuals_at_full_rate(
+    runs: Sequence[Run],
+    baseline: Baseline,
+    values: NDArray,
+) -> list[NDArray]:
+    """Return what the baseline with some values (b,) leaves of each run's torque, (n, J) N·m."""
+    joints = len(baseline.joints)
+    return [run.motion.torque - baseline.columns(run.motion, run.motion)[:, :joints] @ values for run in runs]
+
+
 def with_load(run: Run, baseline: Baseline, values: NDArray) -> Run:
     """Return the run with the loads of links and limb estimated from the baseline's rigid bodies in ``values`` (b,)."""
     bodies = values[: baseline.body * len(baseline.bodies)].reshape(-1, baseline.body)

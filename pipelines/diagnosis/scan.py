@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates import TURNS, Candidate, bends_motion, expanded_columns, lowest
+from pipelines.diagnosis.line_spectrum import Kind
 from pipelines.diagnosis.observations import Run
 from pipelines.diagnosis.onset import NEVER
-from pipelines.effects import Effect, Parameter
+from pipelines.diagnosis.order_tracking import JointLines
+from pipelines.effects import Cogging, Effect, Parameter
 from pipelines.mechanics.motion import Motion
 
 KEPT = 3
@@ -26,6 +28,8 @@ HARDENING = ("1/rad²", "1/m²")
 """Units of a form that only bends a spring."""
 ONSETS = 40
 """Instants tried for what begins at a time of its own in each run."""
+SLOW_WAVES = 4.0
+"""Times the fewest waves of a ripple, up to which block averages are searched for one."""
 OSCILLATING = {"Hz", *TURNS}
 """Units of parameters whose effect has many maxima along them."""
 
@@ -42,9 +46,17 @@ class Scan:
     """(m * O, size) orthonormal basis of the weighted baseline, cut by run."""
     left: tuple[NDArray, ...]
     """(m * O,) weighted residual of the baseline, cut by run."""
+    lines: tuple[JointLines, ...] = ()
+    """Of each joint's residual at the full sampling rate."""
 
     @classmethod
-    def of(cls, runs: Sequence[Run], untouched: Sequence[NDArray], weights: NDArray) -> "Scan":
+    def of(
+        cls,
+        runs: Sequence[Run],
+        untouched: Sequence[NDArray],
+        weights: NDArray,
+        lines: Sequence[JointLines] = (),
+    ) -> "Scan":
         """Prepare a scan of runs with baseline columns ``untouched`` (m, O, b), outputs weighed by ``weights`` (O,)."""
         roots = [np.sqrt(weights) * run.usable for run in runs]
         weighted = [(c * r[:, :, np.newaxis]).reshape(-1, c.shape[2]) for c, r in zip(untouched, roots, strict=True)]
@@ -54,7 +66,7 @@ class Scan:
         left = y - basis @ (basis.T @ y)
         return cls(
             tuple(runs), tuple(_coarse(run) for run in runs), tuple(roots),
-            tuple(np.split(basis, lengths)), tuple(np.split(left, lengths)),
+            tuple(np.split(basis, lengths)), tuple(np.split(left, lengths)), tuple(lines),
         )  # fmt: skip
 
     def columns(self, effect: Effect, shape: Sequence[float], r: int) -> NDArray:
@@ -102,6 +114,8 @@ def worth_a_look(effect: Effect, scan: Scan) -> list[Candidate]:
     bends = bends_motion(effect)
     if chosen := effect.directions([run.motion for run in scan.runs]):
         return [_along(effect, directions, len(scan.runs)) for directions in chosen]
+    if isinstance(effect, Cogging):
+        return ripples(effect, scan)
     shapes = list(_grid(effect, bends, scan.runs))
     runs = len(scan.runs)
     if bends or len(shapes) == 1:
@@ -111,6 +125,27 @@ def worth_a_look(effect: Effect, scan: Scan) -> list[Candidate]:
     else:
         gains = np.array([scan.gain(effect, shape) for shape in shapes])
         made = [Candidate(effect, (shapes[i],) * runs) for i in _peaks(gains, shapes, effect)]
+    return made
+
+
+def ripples(effect: Cogging, scan: Scan) -> list[Candidate]:
+    """Return the ripples of a joint worth a closer look: each line of its residual, and all of them.
+
+    Lines are known from the residual at the full sampling rate. Those of so few waves that they are
+    no lines there, for want of resolution, are looked for in block averages as other shapes are.
+    """
+    runs, joint = len(scan.runs), effect.column(scan.coarse[0])
+    found = scan.lines[joint].of_kind(Kind.ANGLE) if scan.lines else ()
+    tried = values_in(effect, effect.shape[0], FEW, scan.runs)
+    least = lowest(effect, effect.shape[0], scan.runs)
+    slow = tried[(tried >= least) & (tried <= SLOW_WAVES * least)]
+    gains = np.array([scan.gain(effect, (order,)) for order in slow])
+    orders = [float(slow[i]) for i in _peaks(gains, [(order,) for order in slow], effect)]
+    orders += [line.cycles for line in found]
+    made = [Candidate(effect, ((order,),) * runs) for order in orders]
+    if len(found) > 1:
+        several = replace(effect, lines=len(found))
+        made.append(Candidate(several, (tuple(line.cycles for line in found),) * runs))
     return made
 
 
