@@ -31,6 +31,8 @@ AROUND_IN_ANGLE, AROUND_IN_TIME = 20, 120
 """Widths of a line that its local level is the median of."""
 STEEP = 6
 """Widths of the same where the level may be steep; a line itself would raise so narrow a median."""
+LEAST_INFORMED = 1e-3
+"""Of what is told of the best known order: less is no knowledge of a line."""
 HARMONICS = 8
 """Of the motion, on each side of one."""
 
@@ -122,7 +124,8 @@ def spectrum_over_angle(channels: Sequence[Channel], searched: Orders) -> Spectr
     # What was dealt so is damped by the square of a sinc.
     power = np.abs(transform[kept]) ** 2 / np.sinc(orders * step / (2.0 * np.pi)) ** 4
     some = orders[:: max(1, len(orders) // 256)]
-    told = sum(information_at(channel, some) for channel in channels)
+    told = np.sum([information_at(channel, some) for channel in channels], axis=0)
+    told = np.maximum(told, LEAST_INFORMED * np.max(told))
     ratio = power / np.interp(orders, some, told)
     level = _level(ratio, OVERSAMPLED * AROUND_IN_ANGLE, 1)
     return Spectrum(Kind.ANGLE, orders, ratio / level, level, searched.width, 1)
@@ -139,18 +142,17 @@ def spectrum_over_time(channels: Sequence[Channel], least_hz: float) -> Spectrum
     """Return the spectrum over time, of lines that have a phase of their own in each channel."""
     longest = max(len(channel.grid.mask) / channel.grid.rate_hz for channel in channels)
     step = 0.5 / longest
-    hz = step * np.arange(int(0.5 * min(channel.grid.rate_hz for channel in channels) / step))
-    ratio = np.zeros(len(hz))
+    count = int(0.5 * min(channel.grid.rate_hz for channel in channels) / step)
+    kept = np.arange(int(np.ceil(least_hz / step)), count)
+    if len(kept) < 2:
+        return nothing(Kind.TIME)
+    hz, ratio = step * kept, np.zeros(len(kept))
     for channel in channels:
         grid = channel.grid
         x = np.zeros(round(grid.rate_hz / step))
         x[grid.place] = channel.score
-        power = np.abs(fft.rfft(x)[: len(hz)]) ** 2
-        ratio += power / np.maximum(len(channel.score) * channel.weight(hz), TINY)
-    kept = hz >= least_hz
-    hz, ratio = hz[kept], ratio[kept]
-    if len(hz) < 2:
-        return nothing(Kind.TIME)
+        told = np.maximum(len(channel.score) * channel.weight(hz), TINY)
+        ratio += np.abs(fft.rfft(x)[kept]) ** 2 / told
     level = _level(ratio, 2 * AROUND_IN_TIME, len(channels))
     if channels[0].grid.period_s:
         level = _with_harmonics(hz, ratio, level, channels[0].grid.period_s, len(channels))

@@ -151,7 +151,7 @@ class Channel:
         return filtered(self.grid.fast(torque), self.gain)[self.grid.place]
 
     def weight(self, hz: NDArray) -> NDArray:
-        """Return the weight of a sample of a line at any frequencies.
+        """Return the weight of a sample of a line at frequencies (m,) Hz, (m,) 1/(N·m)^2.
 
         Above half of the sampling rate a line is sampled as one below.
         """
