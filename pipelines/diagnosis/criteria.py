@@ -44,6 +44,8 @@ class Criteria:
     """Log odds of a mass that the person carries, against the machine."""
     impacts: float = 0.3
     """Share of the bursts' log likelihood that counts for backlash."""
+    lines: float = 0.3
+    """Share of a line's log likelihood ratio that counts for a ripple or a tone."""
     coherence: float = 0.3
     """Share of the cuffs' and drive's common scatter that counts for a voluntary torque."""
 

@@ -9,9 +9,9 @@
 
 from collections.abc import Callable, Sequence
 
+from pipelines.diagnosis.candidates.auxiliary_evidence import auxiliary_evidence
 from pipelines.diagnosis.candidates.library import Library, build_library, silent
 from pipelines.diagnosis.diagnosis import Diagnosis, Selected
-from pipelines.diagnosis.evidence.auxiliary_evidence import felt_in, heard_in
 from pipelines.diagnosis.evidence.baseline import like_trained, with_load
 from pipelines.diagnosis.evidence.model_error import imperfection
 from pipelines.diagnosis.evidence.noise_floor import noise_floor
@@ -89,8 +89,7 @@ def nothing_selected(prepared: Prepared) -> Selected:
 def _evidence(prepared: Prepared, report: Report) -> tuple[Library, Evidence]:
     """Return the library, causes refined beside the others of likely sets, and its evidence."""
     library = build_library(prepared, lambda share, what: report(LIBRARY_SHARE * share, what))
-    residuals = prepared.residuals
-    heard = heard_in(prepared.runs, residuals) | felt_in(prepared.runs, residuals)
+    heard = auxiliary_evidence(prepared)
     weighed = posterior(Evidence.of(library, heard))
     for number in strongest(weighed):
         library = library.with_partners(number, PARTNERS)

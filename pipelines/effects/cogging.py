@@ -1,5 +1,7 @@
 """Torque that repeats with the angle."""
 
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from math import cos, sin
 
 import numpy as np
@@ -8,9 +10,48 @@ from numpy.typing import NDArray
 from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
 from pipelines.effects.kernel import reaction
 
+MOST_LINES = 4
+AMPLITUDE, ORDERS = (-4.0, 4.0), (4.0, 400.0)
 
+
+def _amplitudes(number: str) -> tuple[Parameter, ...]:
+    return (
+        Parameter(f"sine{number}", "N·m", "amplitude of sin(n q)", "A", AMPLITUDE),
+        Parameter(f"cosine{number}", "N·m", "amplitude of cos(n q)", "B", AMPLITUDE),
+    )
+
+
+def _cycles(number: str) -> Parameter:
+    meaning = "waves in a turn of the joint"
+    return Parameter(f"cycles_per_turn{number}", "1/turn", meaning, "n", ORDERS)
+
+
+def _reported(number: str) -> tuple[Parameter, ...]:
+    turn = (-np.pi, np.pi)
+    return (
+        Parameter(f"amplitude{number}", "N·m", "half of peak to peak", "A", (0.3, 4.0)),
+        _cycles(number),
+        Parameter(
+            f"phase{number}",
+            "rad",
+            "of the wave at angle zero",
+            "phi",
+            turn,
+            of_joint=False,
+        ),
+    )
+
+
+@dataclass(frozen=True)
 class Cogging(Effect):
-    """Magnets against slots, teeth against teeth: a ripple fixed to the joint's angle."""
+    """Magnets against slots, teeth against teeth: a ripple fixed to the joint's angle.
+
+    A gear may ripple at up to four unrelated numbers of cycles a turn. Further lines have the
+    parameters ``amplitude_2``, ``cycles_per_turn_2``, ``phase_2``, and so on up to ``_4``.
+    """
+
+    lines: int = 1
+    """How many lines it has."""
 
     name = "cogging"
     title = "Cogging"
@@ -18,34 +59,49 @@ class Cogging(Effect):
     family = Family.ANGLE
     resembles = ("angle",)
     forms_differ = "a real ripple may differ forward and back, and grow with the load"
-    equation = "tau = A sin(n q) + B cos(n q)"
-    source = "Holtz, Springob (1996), IEEE Trans. Industrial Electronics 43(2); Tuttle, Seering (1996), T-RA 12(3)"
+    equation = "tau = A sin(n q) + B cos(n q), one such term for each line"
+    source = "Holtz, Springob (1996), IEEE TIE 43(2); Tuttle, Seering (1996), IEEE T-RA 12(3)"
     looks_like = "residual against angle: a wave that is the same forward and backward"
-    confirm = "move the joint slowly and evenly, plot torque against where it is, and count the waves"
-    linear = (
-        Parameter("sine", "N·m", "amplitude of sin(n q)", "A", (-4.0, 4.0)),
-        Parameter("cosine", "N·m", "amplitude of cos(n q)", "B", (-4.0, 4.0)),
-    )
-    shape = (Parameter("cycles_per_turn", "1/turn", "waves in a turn of the joint", "n", (4.0, 120.0)),)
-    reported = (
-        Parameter("amplitude", "N·m", "half of peak to peak", "A", (0.3, 4.0)),
-        *shape,
-        Parameter("phase", "rad", "of the wave at angle zero", "phi", (-np.pi, np.pi), of_joint=False),
-    )
+    confirm = "move the joint slowly and evenly, plot torque against the way, and count the waves"
+    linear = _amplitudes("")
+    shape = (_cycles(""),)
+    reported = _reported("")
     parity = Parity.EVEN
+
+    def __post_init__(self) -> None:
+        """Take the parameters of all lines."""
+        numbers = ["", *(f"_{k}" for k in range(2, self.lines + 1))]
+        if len(numbers) > 1:
+            linear = tuple(p for number in numbers for p in _amplitudes(number))
+            reported = tuple(p for number in numbers for p in _reported(number))
+            object.__setattr__(self, "linear", linear)
+            object.__setattr__(self, "shape", tuple(_cycles(number) for number in numbers))
+            object.__setattr__(self, "reported", reported)
+        super().__post_init__()
 
     @reaction
     def reaction(at, state, values, geometry, joint, out):
-        """Add A sin(n q) + B cos(n q) at the joint."""
-        angle = values[2] * at.q[joint]
-        out[joint] += values[0] * sin(angle) + values[1] * cos(angle)
+        """Add A sin(n q) + B cos(n q) of each line at the joint."""
+        lines = len(values) // 3
+        for i in range(lines):
+            angle = values[2 * lines + i] * at.q[joint]
+            out[joint] += values[2 * i] * sin(angle) + values[2 * i + 1] * cos(angle)
+
+    def told_by(self, names: Collection[str]) -> "Cogging":
+        """Return the effect with as many lines as the names of values tell of."""
+        numbers = range(2, MOST_LINES + 1)
+        told = [k for k in numbers if {p.name for p in _reported(f"_{k}")} & set(names)]
+        return replace(self, lines=max(told, default=1))
 
     def physical(self, values: NDArray) -> NDArray:
-        """Return amplitude, cycles per turn and phase of amplitude sin(n q + phase)."""
-        sine, cosine, cycles = values
-        return np.array([np.hypot(sine, cosine), cycles, np.arctan2(cosine, sine)])
+        """Return amplitude, cycles per turn and phase of sin(n q + phase) of each line."""
+        values = np.asarray(values, dtype=float)
+        sine, cosine = values[: 2 * self.lines].reshape(-1, 2).T
+        cycles = values[2 * self.lines :]
+        return np.column_stack([np.hypot(sine, cosine), cycles, np.arctan2(cosine, sine)]).ravel()
 
     def values_from(self, physical: NDArray) -> NDArray:
-        """Return the amplitudes of sine and cosine, and the cycles per turn."""
-        amplitude, cycles, phase = physical
-        return np.array([amplitude * np.cos(phase), amplitude * np.sin(phase), cycles])
+        """Return the amplitudes of sine and cosine of each line, then the cycles per turn."""
+        amplitude, cycles, phase = np.reshape(physical, (-1, 3)).T
+        waves = np.column_stack([amplitude * np.cos(phase), amplitude * np.sin(phase)])
+        return np.concatenate([waves.ravel(), cycles])

@@ -16,7 +16,7 @@ the compiled hooks. ``columns`` and ``observed`` evaluate the same kernels, so t
 """
 
 from abc import ABC
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum, StrEnum
 from typing import Any, ClassVar
@@ -358,6 +358,10 @@ class Effect(ABC):
         ahead = np.array([self.physical(values + step) for step in steps])
         behind = np.array([self.physical(values - step) for step in steps])
         return ((ahead - behind) / (2.0 * np.diag(steps)[:, np.newaxis])).T
+
+    def told_by(self, names: Collection[str]) -> "Effect":
+        """Return the effect with as many parts as the names of some values tell of; of most effects there is one."""
+        return self
 
     def completed(self, values: NDArray | tuple[float, ...]) -> NDArray:
         """Return values of ``fitted``, (p,), with the defaults of those that are left out at the end."""

@@ -213,6 +213,7 @@ def term_from(effect: Effect, values: Mapping[str, float]) -> Term:
     InputError
         Where values are missing, or others than the effect's.
     """
+    effect = effect.told_by(values)
     known = {parameter.name: parameter for parameter in effect.parameters}
     missing = [name for name, parameter in known.items() if name not in values and parameter.default is None]
     if missing or not set(values) <= set(known):

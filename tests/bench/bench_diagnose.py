@@ -47,6 +47,7 @@ def rows() -> Iterator[Row]:
     yield from search_rows(recorded(SECONDS), SAMPLE)
     yield from length_rows((0.5 * SECONDS, SECONDS, 2.0 * SECONDS))
     yield from catalogue_rows(recorded(SECONDS), (4, 2, 1))
+    yield from order_rows(recorded(SECONDS))
 
 
 def recorded(seconds: float) -> list[Motion]:
@@ -149,6 +150,20 @@ def catalogue_rows(motions: Sequence[Motion], every: Sequence[int]) -> Iterator[
         with patch("pipelines.diagnosis.candidates.EFFECTS", some):
             taken, found = seconds_of(lambda: diagnose(motions))
         yield Row(f"  {len(some)} effects to choose from, {len(found.bank.candidates)} shapes", f"{taken:.1f} s")
+
+
+def order_rows(motions: Sequence[Motion]) -> Iterator[Row]:
+    """Order tracking of four runs, without lines and with four at one joint."""
+    runs = [observe(motion) for motion in motions]
+    baseline = baseline_of(runs)
+    values = fit((), runs, baseline, np.ones(2 * len(baseline.joints))).values
+    left = residuals_at_full_rate(runs, baseline, values)
+    ripple = [sum(0.5 * np.sin(n * m.q[:, 1]) for n in (35.0, 88.3, 200.0, 351.0)) for m in motions]
+    rippled = [np.column_stack([x[:, 0], x[:, 1] + r]) for x, r in zip(left, ripple, strict=True)]
+    for name, residuals in (("no line", left), ("four lines at a joint", rippled)):
+        taken, found = seconds_of(lambda residuals=residuals: lines_in(motions, residuals))
+        count = sum(len(joint.lines) for joint in found)
+        yield Row(f"order tracking, {name} ({count} found)", f"{1e3 * taken:.0f} ms", wanted="150 ms")
 
 
 def seconds_of(work: Callable[[], T]) -> tuple[float, T]:

@@ -1,6 +1,12 @@
 """The diagnosis' bench runs, and tells what it is asked."""
 
-from tests.bench.bench_diagnose import catalogue_rows, length_rows, recorded, search_rows
+from tests.bench.bench_diagnose import (
+    catalogue_rows,
+    length_rows,
+    order_rows,
+    recorded,
+    search_rows,
+)
 
 
 def test_the_search_outruns_a_refit_of_every_combination():
@@ -24,3 +30,9 @@ def test_every_length_is_compared_with_the_first():
     first, second = length_rows((12.0, 24.0))
     assert first.value.endswith("1.0 times the first's")
     assert float(second.value.split()[2]) > 0.5
+
+
+def test_order_tracking_is_timed_with_the_lines_that_it_finds():
+    none, four = order_rows(recorded(40.0))
+    assert "0 found" in none.name
+    assert "4 found" in four.name

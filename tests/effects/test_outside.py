@@ -6,7 +6,12 @@ import sys
 from pathlib import Path
 from textwrap import dedent
 
+import numpy as np
 import pytest
+from numpy.testing import assert_allclose
+
+from pipelines.effects import Effect, Parameter, Side
+from pipelines.effects.kernel import torque_reading
 
 PAGE = (Path(__file__).parents[2] / "docs" / "own-effect.md").read_text(encoding="utf-8")
 """A reader copies what it shows."""
@@ -56,3 +61,21 @@ def test_a_broken_effect_is_one_line_that_names_its_package(python_with, module,
     assert message in done.stderr
     assert "uninstall cables" in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+def twice(t, torque, values, joint, state):
+    torque[joint] *= 2.0
+
+
+def twice_when_warm(t, torque, values, joint, state, temperature):
+    if temperature[joint] > 0.0:
+        torque[joint] *= 2.0
+
+
+@pytest.mark.parametrize("sensor", [twice, twice_when_warm], ids=lambda sensor: sensor.__name__)
+def test_a_torque_sensor_may_know_the_temperature_and_need_not(sensor, with_human):
+    parameter = Parameter("gain", "1", "of the sensor", "g", (0.5, 2.0))
+    stated = {"side": Side.SENSOR, "shape": (parameter,), "torque_reading": torque_reading(sensor)}
+    torque = np.ones((*with_human.q.shape, 1))
+    read = type("Twice", (Effect,), stated)("knee").observed(torque, with_human, (2.0,))
+    assert_allclose(read[:, :, 0], [[1.0, 2.0]] * len(torque))

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.candidates.candidate import TURNS, Candidate
 from pipelines.diagnosis.candidates.columns import torque_columns
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.baseline_columns import columns_under
@@ -13,6 +13,8 @@ from pipelines.diagnosis.evidence.block_rate import at_block_rate, needs_full_ra
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.evidence.observed_run import Run
 
+LONGEST_STEP = 0.5
+"""Angle of a wave from block to block, rad, above which block averages do not follow it."""
 RIDGE = 1e-10
 """Relative to a column's square: keeps a refit of nearly dependent columns finite."""
 
@@ -27,6 +29,9 @@ class CandidateRows:
         self._runs = {True: list(runs), False: slow}
         plain = [columns_under((), run, baseline)[0] for run in slow]
         self._plain = regression.rows(plain)
+        names = runs[0].motion.joints
+        steps = np.max([np.quantile(np.abs(np.diff(run.state[0], axis=0)), 0.9, axis=0) for run in runs], axis=0)
+        self._steps = dict(zip(names, steps, strict=True))
         self._kinds = [run.motion.run for run in runs]
 
     def __call__(self, candidate: Candidate, beside: NDArray | None = None, *, rough: bool = False) -> NDArray | None:
@@ -39,7 +44,7 @@ class CandidateRows:
         rough : bool
             At block rate in any case, near enough to choose where to look.
         """
-        full = needs_full_rate(candidate.effect) and not rough
+        full = (needs_full_rate(candidate.effect) and not rough) or self._ripples_within_blocks(candidate)
         if not candidate.bends:
             runs = self._runs[full]
             parts = [torque_columns(candidate, r, run) for r, run in enumerate(runs)]
@@ -51,6 +56,14 @@ class CandidateRows:
         else:
             rows = self._transformed(candidate, full, beside)
         return rows if np.isfinite(rows).all() else None
+
+    def _ripples_within_blocks(self, candidate: Candidate) -> bool:
+        """Tell whether a wave over the angle goes by within a few blocks."""
+        joint, shapes = candidate.effect.joint, candidate.effect.shape
+        if joint is None or not any(parameter.unit in TURNS for parameter in shapes):
+            return False
+        cycles = max(value for p, value in zip(shapes, candidate.shapes[0], strict=True) if p.unit in TURNS)
+        return cycles * self._steps[joint] > LONGEST_STEP
 
     def _expanded(self, candidate: Candidate, parts: Sequence[NDArray]) -> list[NDArray]:
         own = candidate.columns_in(self._kinds)

@@ -1,12 +1,13 @@
 """Rows of the smooth laws and of the curves of time in the decision regression."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates.smooth_laws import (
+    HUM,
     IN_CUFFS,
     LawColumn,
     Spans,
@@ -14,6 +15,7 @@ from pipelines.diagnosis.candidates.smooth_laws import (
     smooth_laws,
 )
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
+from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
 
 
@@ -36,8 +38,24 @@ def law_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list[L
         chosen = [i for i, law in enumerate(laws) if law.kind in IN_CUFFS]
         own = [replace(laws[i], wearer="cuffs") for i in chosen]
         parts.append((own, [x[:, :, chosen] for x in _both(zero, worn)]))
+    parts += _hums(prepared, joints)
     rows = [regression.project(regression.rows(columns)) for _, columns in parts]
     return [law for some, _ in parts for law in some], np.hstack(rows)
+
+
+def _hums(prepared: Prepared, joints: int) -> Iterator[tuple[list[LawColumn], list[NDArray]]]:
+    """Yield the law and the columns of each joint's tones: every run has phases of its own."""
+    for j, found in enumerate(prepared.lines):
+        tones = np.array([line.cycles for line in found.of_kind(Kind.TIME)])
+        if not len(tones):
+            continue
+        width, count = 2 * len(tones), len(prepared.runs)
+        columns = [np.zeros((*run.measured.shape, width * count)) for run in prepared.runs]
+        for r, run in enumerate(prepared.runs):
+            phase = 2.0 * np.pi * np.outer(run.motion.time, tones)
+            waves = run.average(np.hstack([np.sin(phase), np.cos(phase)]))
+            columns[r][:, j, r * width : (r + 1) * width] = waves * prepared.torque[j]
+        yield [LawColumn(HUM, j, "all", 1.0)] * (width * count), columns
 
 
 def _both(drives: Sequence[NDArray], cuffs: Sequence[NDArray]) -> list[NDArray]:

@@ -143,7 +143,7 @@ def build_library(prepared: Prepared, report: Report = silent) -> Library:
     effects = _effects(prepared)
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
-        fits = screened(effect, alone, prepared.runs, regression)
+        fits = screened(effect, alone, prepared, regression)
         shapes = _shapes(fits, alone, regression)
         causes += shapes
         grids += [tuple(fits)] if fits else []

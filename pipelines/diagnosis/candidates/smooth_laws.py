@@ -51,6 +51,8 @@ WANDER_CORNER_HZ = 0.1
 
 TIME = "time"
 """The law whose columns are each run's own curves of time."""
+HUM = "hum"
+"""The law whose columns are tones with a phase in each run."""
 
 
 def law_label(kind: str, joint: int, joints: Sequence[str], wearer: str = "all") -> str:

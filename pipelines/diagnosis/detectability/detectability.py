@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import ncx2
 
-from pipelines.diagnosis.candidates.candidate import Candidate, proposals
+from pipelines.diagnosis.candidates.candidate import TURNS, Candidate, proposals
 from pipelines.diagnosis.candidates.columns import bent_column, torque_columns
 from pipelines.diagnosis.candidates.shape_grid import BENDING, values_in, values_of
 from pipelines.diagnosis.criteria import CRITERIA
@@ -297,9 +297,38 @@ def _shapes(effect: Effect, runs: Sequence[Run]) -> Iterator[Candidate]:
         weak = values_of(effect.shape[0], BENDING)[-1]
         yield Candidate(effect, ((float(weak),),) * len(runs))
         return
-    grids = [ONSETS if p.per_run else _spread(values_in(effect, p, SHAPES, runs)) for p in effect.shape]
+    grids = [ONSETS if p.per_run else _spread(_seen(effect, p, runs)) for p in effect.shape]
     for shape in itertools.product(*grids):
         yield Candidate(effect, tuple(_in_run(effect, shape, run) for run in runs))
+
+
+def _seen(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> NDArray:
+    """Return the values of a shape parameter that stand for its range; of a ripple, those that blocks pass.
+
+    Faster ones are found at the full sampling rate (``order_tracking``), where they show no less.
+    """
+    values = values_in(effect, parameter, SHAPES, runs)
+    if parameter.unit not in TURNS or effect.joint is None:
+        return values
+    j = runs[0].motion.joint_index(effect.joint)
+    speeds = np.concatenate([run.state[1][:, j] for run in runs])
+    fastest = 2.0 * np.pi * runs[0].bandwidth_hz / float(np.sqrt(np.mean(speeds**2)))
+    return values[values <= max(fastest, values[0])]
+
+
+def _seen(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> NDArray:
+    """Return the values of a shape parameter that stand for its range.
+
+    Of a ripple, those that blocks pass: faster ones are found at the full sampling rate
+    (``order_tracking``), where they show no less.
+    """
+    values = values_in(effect, parameter, SHAPES, runs)
+    if parameter.unit not in TURNS or effect.joint is None:
+        return values
+    j = runs[0].motion.joint_index(effect.joint)
+    speeds = np.concatenate([run.state[1][:, j] for run in runs])
+    fastest = 2.0 * np.pi * runs[0].bandwidth_hz / float(np.sqrt(np.mean(speeds**2)))
+    return values[values <= max(fastest, values[0])]
 
 
 def _spread(values: NDArray) -> NDArray:

@@ -13,6 +13,8 @@ from pipelines.diagnosis.evidence.gram import solve, weights_under
 from pipelines.diagnosis.evidence.model_error import telling_torque
 from pipelines.diagnosis.evidence.noise_model import NoiseModel, noise_model
 from pipelines.diagnosis.evidence.observed_run import Run
+from pipelines.diagnosis.evidence.order_tracking import JointLines, lines_in
+from pipelines.model import Model
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,8 @@ class Prepared:
     noise: NoiseModel
     torque: NDArray
     """(O,) N·m rms."""
+    lines: tuple[JointLines, ...]
+    """Of each joint's residual at the full sampling rate."""
 
     @property
     def slow_rms(self) -> NDArray:
@@ -57,4 +61,13 @@ def prepare(runs: Sequence[Run], baseline: Baseline) -> Prepared:
     laden = tuple(with_load(run, baseline, values) for run in runs)
     residuals = [r.measured - c @ values for r, c in zip(runs, columns, strict=True)]
     noise = noise_model(laden, residuals)
-    return Prepared(laden, baseline, columns, values, weights, noise, telling_torque(runs))
+    lines = lines_in([run.motion for run in laden], _at_full_rate(laden, baseline, values))
+    torque = telling_torque(runs)
+    return Prepared(laden, baseline, columns, values, weights, noise, torque, tuple(lines))
+
+
+def _at_full_rate(runs: Sequence[Run], baseline: Baseline, values: NDArray) -> list[NDArray]:
+    """Return what the baseline leaves at the full sampling rate, (n, J) N·m of each run."""
+    joints, model = len(baseline.joints), Model(baseline.terms)
+    regressors = [model.regressor(run.motion, cuffs=True)[:, :joints] for run in runs]
+    return [run.motion.torque - x @ values for run, x in zip(runs, regressors, strict=True)]

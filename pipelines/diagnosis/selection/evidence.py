@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates.cause import Cause
 from pipelines.diagnosis.candidates.library import Library
-from pipelines.diagnosis.candidates.smooth_laws import FAMILIES, TIME, LawColumn, law_label
+from pipelines.diagnosis.candidates.smooth_laws import FAMILIES, HUM, TIME, LawColumn, law_label
 from pipelines.effects import Effect
 
 
@@ -231,6 +231,8 @@ def _resembled(effect: Effect, laws: Laws, names: Sequence[str], two: bool):
 def _background(library: Library, at: _Places):
     """Yield what a good rig has: kind, column and relative variance."""
     for law, place in zip(library.laws, at.laws, strict=True):
+        if law.kind == HUM:
+            continue
         yield "cuff" if law.wearer == "cuffs" else "law", int(place), law.variance
     for (_, _, variance), place in zip(library.curves, at.curves, strict=True):
         yield "wander", int(place), variance

@@ -56,14 +56,19 @@ class MarginalLikelihood:
     def _log_prior(self, element: Element) -> float:
         """Return an element's prior log odds, and what is heard and felt of it."""
         c = self.criteria
+        heard = self._heard(element)
         if element.is_law:
-            return c.law
-        heard = self.evidence.heard.get(element.label, 0.0)
-        share = c.impacts if element.name == "backlash" else c.coherence
+            return c.law + heard
         return (
             c.cause + c.other_shape * (not element.first) + c.each_run * element.each_run
-            + c.worn * element.worn + share * heard
+            + c.worn * element.worn + heard
         )  # fmt: skip
+
+    def _heard(self, element: Element) -> float:
+        """Return how much of what is heard or felt of an element counts."""
+        c = self.criteria
+        share = {"backlash": c.impacts, "voluntary_torque": c.coherence}.get(element.name, c.lines)
+        return share * self.evidence.heard.get(element.label, 0.0)
 
     def prior(self, chosen: Sequence[int]) -> float:
         """Return the prior log odds of a set against the empty one."""

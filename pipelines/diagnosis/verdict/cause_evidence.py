@@ -1,8 +1,8 @@
 """What speaks for a named cause: one sentence each."""
 
 from pipelines.contracts.joints import the
+from pipelines.diagnosis.candidates.auxiliary_evidence import PERCEIVED
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.evidence.auxiliary_evidence import PERCEIVED
 from pipelines.diagnosis.selection.answer import Named
 from pipelines.effects import Effect
 from pipelines.label import amount, effect_labelled, in_words, number

@@ -48,6 +48,18 @@ STRUCTURAL: dict[frozenset[str], Tie] = {
         "direction while the joint always moves",
         "unhook the spring, or let the joint rest: friction holds it, a spring moves it",
     ),
+    frozenset({"friction_temperature", "friction_warmup"}): Tie(
+        "while a run warms steadily, its temperature and its time rise together",
+        "repeat the motion with the drive warm: friction that follows the temperature is low from the start",
+    ),
+    frozenset({"encoder_eccentricity", "encoder_offset"}): Tie(
+        "over less than half a turn an error once a turn is nearly a constant and a scale of the angle",
+        "turn the joint to marks of known angle all the way round, and read the encoder",
+    ),
+    frozenset({"end_stop", "passive_joint_torque"}): Tie(
+        "with the person in every run, a stop of the machine and one of the person's joint are alike",
+        "record the machine with nobody in it through the same range",
+    ),
     frozenset({"torque_drift", "torque_offset"}): Tie(
         "over runs this short a drift is an offset that differs from run to run",
         "record longer, or read the torque at rest before and after each run",

@@ -1,0 +1,200 @@
+"""Spectra of a residual torque: the log likelihood ratio of a line over the angle, or over time.
+
+With the score z and the weight w of ``whitened_residual``, angle q and speed v,
+
+    P(n) = |sum_k z_k exp(-i n q_k)|^2 / D(n),   D(n) = sum_k w(n |v_k| / 2 pi)
+
+is the log likelihood ratio of a line of n cycles a turn against none (Scargle, 1982, Astrophysical
+Journal 263). With noise alone it is exponential with mean one. Real noise is never quite
+stationary, so P is divided by its own level at the orders around, where that is more than one.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+from scipy.stats import f as f_distribution
+from scipy.stats import gamma
+
+from pipelines.diagnosis.evidence.whitened_residual import TINY, Channel
+
+GRID = 8
+"""Points of the angle's grid in a wave of the highest order."""
+OVERSAMPLED = 8
+"""Orders in the width of a line at which the spectrum over angle is known."""
+AROUND_IN_ANGLE, AROUND_IN_TIME = 20, 120
+"""Widths of a line that its local level is the median of."""
+STEEP = 6
+"""Widths of the same where the level may be steep; a line itself would raise so narrow a median."""
+LEAST_INFORMED = 1e-3
+"""Of what is told of the best known order: less is no knowledge of a line."""
+HARMONICS = 8
+"""Of the motion, on each side of one."""
+
+
+class Kind(StrEnum):
+    """What a line is a line over."""
+
+    ANGLE = "angle"
+    TIME = "time"
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Log likelihood ratio of a line at each of m places."""
+
+    kind: Kind
+    cycles: NDArray
+    """(m,) cycles a turn, or Hz."""
+    log_likelihood_ratio: NDArray
+    """(m,) against noise of the same local colour."""
+    level: NDArray
+    """(m,) by which the ratio against stationary noise was divided."""
+    width: float
+    """Of a line, in cycles a turn or Hz: independent places are as far apart."""
+    phases: int
+    """Phases that a line has: one for all runs over angle, one in each run over time."""
+
+    @property
+    def steep_level(self) -> NDArray:
+        """The level where none of its lines is left, (m,): from nearer neighbours too."""
+        places = max(1, round(self.width / (self.cycles[1] - self.cycles[0])))
+        near = _level(self.log_likelihood_ratio * self.level, STEEP * places, self.phases)
+        return np.maximum(self.level, near)
+
+    def false_alarm(self, ratio: float, searches: int) -> float:
+        """Return the chance that noise shows such a ratio anywhere in some spectra like this."""
+        if not len(self.cycles):
+            return 1.0
+        # The level is an estimate, too, so that the ratio is distributed as F; a median of k has
+        # half the efficiency of their mean.
+        around = AROUND_IN_ANGLE if self.kind is Kind.ANGLE else AROUND_IN_TIME
+        tail = f_distribution.sf(ratio / self.phases, 2 * self.phases, around)
+        # A maximum between independent places is higher than those at them.
+        places = 2.5 * (1.0 + (self.cycles[-1] - self.cycles[0]) / self.width)
+        return float(-np.expm1(searches * places * np.log1p(-min(tail, 1.0 - 1e-12))))
+
+
+class Orders(NamedTuple):
+    """The orders of a joint that are searched."""
+
+    swept: float
+    """rad, the range of angles that it moves through."""
+    lowest: float
+    """Cycles a turn."""
+    highest: float
+
+    @property
+    def width(self) -> float:
+        """Of a line, in cycles a turn."""
+        return 2.0 * np.pi / self.swept
+
+
+def nothing(kind: Kind) -> Spectrum:
+    """Return the spectrum of a joint that cannot be searched."""
+    return Spectrum(kind, np.zeros(0), np.zeros(0), np.zeros(0), 1.0, 1)
+
+
+def spectrum_over_angle(channels: Sequence[Channel], searched: Orders) -> Spectrum:
+    """Return the spectrum over a joint's angle, of lines that have one phase in all channels."""
+    finest = GRID * searched.highest
+    step = 2.0 * np.pi / finest
+    first = min(float(channel.grid.angle.min()) for channel in channels)
+    total = np.zeros(int(searched.swept / step) + 3)
+    for channel in channels:
+        # Each score is dealt to its two neighbours on the grid.
+        place = (channel.grid.angle - first) / step
+        left = place.astype(int)
+        share = place - left
+        total += np.bincount(left, channel.score * (1.0 - share), len(total))
+        total += np.bincount(left + 1, channel.score * share, len(total))
+    points = max(len(total), int(OVERSAMPLED * finest / searched.width))
+    length = fft.next_fast_len(points, real=True)
+    transform = fft.rfft(total, length)
+    orders = np.arange(len(transform)) * (finest / length)
+    kept = (orders >= searched.lowest) & (orders <= searched.highest)
+    if not kept.any():
+        return nothing(Kind.ANGLE)
+    orders = orders[kept]
+    # What was dealt so is damped by the square of a sinc.
+    power = np.abs(transform[kept]) ** 2 / np.sinc(orders * step / (2.0 * np.pi)) ** 4
+    some = orders[:: max(1, len(orders) // 256)]
+    told = np.sum([information_at(channel, some) for channel in channels], axis=0)
+    told = np.maximum(told, LEAST_INFORMED * np.max(told))
+    ratio = power / np.interp(orders, some, told)
+    level = _level(ratio, OVERSAMPLED * AROUND_IN_ANGLE, 1)
+    return Spectrum(Kind.ANGLE, orders, ratio / level, level, searched.width, 1)
+
+
+def information_at(channel: Channel, orders: NDArray) -> NDArray:
+    """Return D of the equation above at some orders (m,): from speeds that stand for all."""
+    hz = orders[:, np.newaxis] * channel.grid.usual_hz_per_order
+    weight = channel.weight(hz).mean(axis=1)
+    return np.asarray(len(channel.score) * weight) + TINY
+
+
+def spectrum_over_time(channels: Sequence[Channel], least_hz: float) -> Spectrum:
+    """Return the spectrum over time, of lines that have a phase of their own in each channel."""
+    longest = max(len(channel.grid.mask) / channel.grid.rate_hz for channel in channels)
+    step = 0.5 / longest
+    count = int(0.5 * min(channel.grid.rate_hz for channel in channels) / step)
+    kept = np.arange(int(np.ceil(least_hz / step)), count)
+    if len(kept) < 2:
+        return nothing(Kind.TIME)
+    hz, ratio = step * kept, np.zeros(len(kept))
+    for channel in channels:
+        grid = channel.grid
+        x = np.zeros(round(grid.rate_hz / step))
+        x[grid.place] = channel.score
+        told = np.maximum(len(channel.score) * channel.weight(hz), TINY)
+        ratio += np.abs(fft.rfft(x)[kept]) ** 2 / told
+    level = _level(ratio, 2 * AROUND_IN_TIME, len(channels))
+    if channels[0].grid.period_s:
+        level = _with_harmonics(hz, ratio, level, channels[0].grid.period_s, len(channels))
+    return Spectrum(Kind.TIME, hz, ratio / level, level, 2.0 * step, len(channels))
+
+
+def _level(ratio: NDArray, around: int, phases: int) -> NDArray:
+    """Return how much higher than with stationary noise ratios around each place are, (m,) >= 1."""
+    edges = np.linspace(0, len(ratio), max(1, len(ratio) // around) + 1).astype(int)
+    medians = [np.median(ratio[a:b]) for a, b in pairwise(edges)]
+    middle = 0.5 * (edges[:-1] + edges[1:])
+    level = np.interp(np.arange(len(ratio)), middle, medians) / gamma.median(phases)
+    return np.maximum(level, 1.0)
+
+
+def _with_harmonics(
+    hz: NDArray,
+    ratio: NDArray,
+    level: NDArray,
+    period_s: float,
+    phases: int,
+) -> NDArray:
+    """Return the level; at the motion's harmonics the highest of others around.
+
+    Whatever repeats with the motion has lines there, of very different heights.
+    """
+    step = hz[1] - hz[0]
+    first, last = np.ceil(hz[0] * period_s), np.floor(hz[-1] * period_s)
+    harmonics = np.arange(first, last + 1.0) / period_s
+    place = np.clip(np.round((harmonics - hz[0]) / step).astype(int), 1, len(hz) - 2)
+    at = np.maximum(np.maximum(ratio[place - 1], ratio[place]), ratio[place + 1])
+    padded = np.pad(at, HARMONICS, mode="edge")
+    beside = [np.roll(padded, k) for k in range(-HARMONICS, HARMONICS + 1) if k]
+    highest = np.max(beside, axis=0)[HARMONICS:-HARMONICS] / phases
+    number = np.round(hz * period_s)
+    near = np.abs(hz * period_s - number) < 2.0 * step * period_s
+    raised = highest[np.clip(number - first, 0, len(harmonics) - 1).astype(int)]
+    return np.where(near, np.maximum(level, raised), level)
+
+
+def information(channel: Channel, kind: Kind, cycles: float) -> float:
+    """Return D of the equation above for one line, samples times 1/(N·m)^2."""
+    if kind is Kind.TIME:
+        return len(channel.score) * float(channel.weight(np.array(cycles))) + TINY
+    return float(information_at(channel, np.array([cycles]))[0])

@@ -1,0 +1,475 @@
+"""Order tracking: lines of the residual torque over a joint's angle, and over time.
+
+A gear's ripple is a line over the angle, at so many cycles a turn. Its frequency rises and falls
+with the joint's speed: no spectrum over time shows it, and at 200 cycles a turn it lies above all
+that block averages pass, so that the full sampling rate is needed. A hum is a line over time, which
+no spectrum over the angle shows. Both spectra are on one scale, that of ``line_spectrum`` (Fyfe,
+Munck, 1997, Mechanical Systems and Signal Processing 11(2): computed order tracking).
+
+The strongest line of either kind is subtracted and the search repeated, so that a hum is no ripple
+and a ripple no hum, and no line hides another. All lines together are refined by steps of Gauss and
+Newton, and those stay that are significant beside all others.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.evidence.line_spectrum import (
+    Kind,
+    Orders,
+    Spectrum,
+    information,
+    nothing,
+    spectrum_over_angle,
+    spectrum_over_time,
+)
+from pipelines.diagnosis.evidence.whitened_residual import TINY, Channel, Grid, Trace, traces_of
+from pipelines.effects.cogging import MOST_LINES, Cogging
+from pipelines.mechanics.motion import Motion
+
+LEAST_WAVES = 4.0
+"""Waves within the swept angles: with fewer a line is a smooth law of the angle."""
+FALSE_ALARMS = 0.005
+"""Chance that a session of noise alone shows any line."""
+WORTH_A_TRIAL = 0.3
+"""Such a chance of a line that is tried: what others leave of the noise tells what it is worth."""
+LEAST_HZ, SLOWEST_HZ = 1.0, 0.2
+"""Below the first, wandering is no hum; the second is the least that counts as slow."""
+APART = 1.5
+"""Widths between two lines of one kind."""
+LONGEST_STEP = 1.5
+"""Of a refinement, times that of Gauss and Newton."""
+BESIDE, MUCH_WEAKER = 5.0, 0.05
+"""Widths from a line within which one of so small a share of its likelihood ratio is no other."""
+LEAST_S = 2.0
+"""Of usable motion in a run, without which it is left out."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A sinusoid of the residual torque at one joint."""
+
+    kind: Kind
+    cycles: float
+    """Cycles a turn (rad/m where the joint slides), or Hz."""
+    amplitude: float
+    """N·m, as the torque channel shows it; of a hum, the root mean square over runs."""
+    phase: float
+    """rad, of amplitude sin(n q + phase); NaN for a hum, whose phase each run has for itself."""
+    log_likelihood_ratio: float
+    """Of the line, beside all others, against noise of the same local colour."""
+    of_other_kind: float
+    """The same of the best line of the other kind in its place."""
+    false_alarm: float
+    """Chance that noise alone shows such a line anywhere in the session."""
+
+
+@dataclass(frozen=True)
+class JointLines:
+    """What one joint's residual shows."""
+
+    lines: tuple[Line, ...]
+    """The significant ones of both kinds, the strongest first."""
+    over_angle: Spectrum
+    """Before any line was subtracted."""
+    over_time: Spectrum
+
+    def of_kind(self, kind: Kind) -> tuple[Line, ...]:
+        """Return the lines of one kind, the strongest first."""
+        return tuple(line for line in self.lines if line.kind is kind)
+
+
+@dataclass(frozen=True)
+class Sinusoids:
+    """Lines of one kind as they were fitted to r runs."""
+
+    kind: Kind
+    cycles: NDArray
+    """(l,)."""
+    amplitudes: NDArray
+    """(r, l, 2) N·m of sine and cosine; over angle the same in all runs."""
+
+    @classmethod
+    def none(cls, kind: Kind, runs: int) -> "Sinusoids":
+        """Return no line."""
+        return cls(kind, np.zeros(0), np.zeros((runs, 0, 2)))
+
+    def __len__(self) -> int:
+        """Return the number of lines."""
+        return len(self.cycles)
+
+    def with_one(self, cycles: float, amplitudes: NDArray) -> tuple["Sinusoids", "Sinusoids"]:
+        """Return the lines with one more, of no amplitude and of some, (r, 1, 2) N·m."""
+        more = replace(self, cycles=np.append(self.cycles, cycles))
+        sizes = (np.zeros_like(amplitudes), amplitudes)
+        without, with_it = (np.concatenate([self.amplitudes, size], axis=1) for size in sizes)
+        return replace(more, amplitudes=without), replace(more, amplitudes=with_it)
+
+    def without(self, number: int) -> "Sinusoids":
+        """Return all lines but one."""
+        cycles = np.delete(self.cycles, number)
+        return replace(self, cycles=cycles, amplitudes=np.delete(self.amplitudes, number, axis=1))
+
+    def only(self, number: int) -> "Sinusoids":
+        """Return one line."""
+        amplitudes = self.amplitudes[:, number : number + 1]
+        return replace(self, cycles=self.cycles[number : number + 1], amplitudes=amplitudes)
+
+    def torque(self, waves: "_Waves", run: int) -> NDArray:
+        """Return the torque of all lines in one run, (u,) N·m."""
+        total = np.zeros(len(waves.grid.time))
+        for cycles, (sine, cosine) in zip(self.cycles, self.amplitudes[run], strict=True):
+            s, c = waves(self.kind, cycles)
+            total += sine * s + cosine * c
+        return total
+
+
+def lines_in(motions: Sequence[Motion], residuals: Sequence[NDArray]) -> list[JointLines]:
+    """Return the lines in the residual torque of some runs of one machine.
+
+    Parameters
+    ----------
+    motions : sequence of Motion
+        At the full sampling rate.
+    residuals : sequence of (n, J) arrays
+        Measured less predicted torque of each run, N·m.
+
+    Returns
+    -------
+    list of JointLines
+        One for each joint, as of ``lines_of``.
+    """
+    machine = motions[0].machine
+    each = [traces_of(motion, left) for motion, left in zip(motions, residuals, strict=True)]
+    ripples = [Cogging(joint, on=machine) for joint in machine.names]
+    bounds = [ripple.shape[0].typical for ripple in ripples]
+    return lines_of([list(traces) for traces in zip(*each, strict=True)], bounds)
+
+
+def lines_of(
+    joints: Sequence[Sequence[Trace]],
+    bounds: Sequence[tuple[float, float]] | None = None,
+) -> list[JointLines]:
+    """Return the lines that each joint's residual holds over its angle and over time.
+
+    Parameters
+    ----------
+    joints : sequence of sequences of Trace
+        For each joint its traces, one a run.
+    bounds : sequence of (lowest, highest), optional
+        Cycles a turn between which to look at each joint, rad/m where it slides; unless given,
+        what is typical of cogging on an exoskeleton.
+
+    Returns
+    -------
+    list of JointLines
+        One for each joint. Of sessions of noise alone, a share of ``FALSE_ALARMS`` shows any line.
+    """
+    bounds = bounds or [Cogging.shape[0].typical] * len(joints)
+    searches = len(Kind) * len(joints)
+    every = zip(joints, bounds, strict=True)
+    return [_lines_of_joint(traces, ends, searches) for traces, ends in every]
+
+
+def _lines_of_joint(
+    traces: Sequence[Trace],
+    bounds: tuple[float, float],
+    searches: int,
+) -> JointLines:
+    moving = [trace for trace in traces if trace.usable.sum() >= LEAST_S * trace.rate_hz]
+    swept = _swept(moving)
+    if not swept > 0.0:
+        return JointLines((), nothing(Kind.ANGLE), nothing(Kind.TIME))
+    lowest, highest = bounds
+    orders = Orders(swept, max(lowest, LEAST_WAVES * 2.0 * np.pi / swept), highest)
+    search = _Search(moving, orders)
+    lines = [Sinusoids.none(kind, len(moving)) for kind in Kind]
+    channels = search.left(lines)
+    first = spectra = [search.spectrum(kind, channels) for kind in Kind]
+    tried: list[tuple[Kind, float]] = []
+    while (place := _strongest(spectra, tried, searches)) is not None:
+        tried.append(place)
+        lines = search.refined(search.added(lines, *place, channels))
+        if search.repeats(lines, place[0]):
+            # What is left beside a line whose size or phase changes with speed is no other line.
+            lines = search.refined([lines[0].without(-1), lines[1]])
+        channels = search.left(lines)
+        spectra = [search.spectrum(kind, channels) for kind in Kind]
+    if tried:
+        lines = search.refined(lines)
+        channels = search.left(lines)
+    return JointLines(search.reported(lines, channels, spectra, searches), *first)
+
+
+def _swept(traces: Sequence[Trace]) -> float:
+    """Return the range of angles that a joint moves through, rad."""
+    angles = [trace.angle[trace.usable] for trace in traces]
+    return float(np.ptp(np.concatenate(angles))) if angles else 0.0
+
+
+def _slow_hz(traces: Sequence[Trace], swept: float) -> float:
+    """Return the frequency of ``LEAST_WAVES`` in the swept angles at the joint's usual speed."""
+    speeds = np.concatenate([trace.speed[trace.usable] for trace in traces])
+    usual = float(np.sqrt(np.mean(speeds**2)))
+    return float(np.clip(LEAST_WAVES * usual / swept, SLOWEST_HZ, traces[0].rate_hz / 16.0))
+
+
+class _Waves:
+    """Sine and cosine of lines at a run's samples; the last few are kept, for use again."""
+
+    def __init__(self, grid: Grid) -> None:
+        self.grid = grid
+        self._kept: dict[tuple[Kind, float], tuple[NDArray, NDArray]] = {}
+
+    def __call__(self, kind: Kind, cycles: float) -> tuple[NDArray, NDArray]:
+        """Return sine and cosine of a line, (u,) each."""
+        if (kind, cycles) not in self._kept:
+            grid = self.grid
+            phase = cycles * (grid.angle if kind is Kind.ANGLE else 2.0 * np.pi * grid.time)
+            if len(self._kept) > 2 * MOST_LINES:
+                self._kept.pop(next(iter(self._kept)))
+            self._kept[kind, cycles] = np.sin(phase), np.cos(phase)
+        return self._kept[kind, cycles]
+
+
+def _strongest(
+    spectra: Sequence[Spectrum],
+    tried: Sequence[tuple[Kind, float]],
+    searches: int,
+) -> tuple[Kind, float] | None:
+    """Return kind and place of the strongest line worth a trial, away from those tried before."""
+    best: tuple[float, Kind, float] | None = None
+    for spectrum in spectra:
+        ratio = spectrum.log_likelihood_ratio.copy()
+        before = [cycles for kind, cycles in tried if kind is spectrum.kind]
+        for cycles in before:
+            ratio[np.abs(spectrum.cycles - cycles) < APART * spectrum.width] = 0.0
+        if len(before) >= MOST_LINES or not len(ratio):
+            continue
+        at = int(np.argmax(ratio))
+        if spectrum.false_alarm(ratio[at], searches) > WORTH_A_TRIAL:
+            continue
+        if best is None or ratio[at] > best[0]:
+            best = float(ratio[at]), spectrum.kind, _peak(spectrum, at)
+    return best and best[1:]
+
+
+def _peak(spectrum: Spectrum, at: int) -> float:
+    """Return where a parabola through a maximum and its neighbours is highest."""
+    if not 0 < at < len(spectrum.cycles) - 1:
+        return float(spectrum.cycles[at])
+    shift = _summit(*spectrum.log_likelihood_ratio[at - 1 : at + 2])
+    return float(spectrum.cycles[at] + shift * (spectrum.cycles[1] - spectrum.cycles[0]))
+
+
+def _summit(before: float, here: float, after: float) -> float:
+    """Return where a parabola through three heights is highest, in steps from the middle one."""
+    bend = before - 2.0 * here + after
+    return float(np.clip(0.5 * (before - after) / bend, -1.0, 1.0)) if bend < 0.0 else 0.0
+
+
+class _Search:
+    """The search for lines at one joint."""
+
+    def __init__(self, traces: Sequence[Trace], orders: Orders) -> None:
+        slow_hz = _slow_hz(traces, orders.swept)
+        self.waves = [_Waves(Grid.of(trace, slow_hz)) for trace in traces]
+        self.orders = orders
+        self.longest_s = max(float(np.ptp(waves.grid.time)) for waves in self.waves)
+        self.least_hz = max(LEAST_HZ, 2.0 * slow_hz)
+
+    def left(self, lines: Sequence[Sinusoids]) -> list[Channel]:
+        """Return what lines leave of the residual in each run."""
+        return [
+            waves.grid.channel(waves.grid.residual - sum(kind.torque(waves, r) for kind in lines))
+            for r, waves in enumerate(self.waves)
+        ]
+
+    def spectrum(self, kind: Kind, channels: Sequence[Channel]) -> Spectrum:
+        """Return the spectrum of one kind."""
+        if kind is Kind.TIME:
+            return spectrum_over_time(channels, self.least_hz)
+        return spectrum_over_angle(channels, self.orders)
+
+    def added(
+        self, lines: Sequence[Sinusoids], kind: Kind, cycles: float, channels: Sequence[Channel]
+    ) -> list[Sinusoids]:
+        """Return lines with one more, its amplitudes from the scores of what the others leave."""
+        if kind is Kind.TIME:
+            cycles = self._sharpened(cycles, channels)
+        products = np.array(
+            [
+                [column @ channel.score for column in waves(kind, cycles)]
+                for waves, channel in zip(self.waves, channels, strict=True)
+            ]
+        )
+        told = np.array([0.5 * information(channel, kind, cycles) for channel in channels])
+        if kind is Kind.ANGLE:
+            products, told = np.broadcast_to(products.sum(axis=0), products.shape), told.sum()
+        amplitudes = (products.T / told).T[:, np.newaxis]
+        of_kind = {known.kind: known for known in lines}
+        of_kind[kind] = self._between(*of_kind[kind].with_one(cycles, amplitudes), channels)
+        return list(of_kind.values())
+
+    def _sharpened(self, hz: float, channels: Sequence[Channel]) -> float:
+        """Return the frequency of a hum, from its power a quarter of a width to each side."""
+        beside = 0.25 / self.longest_s
+        powers = [
+            sum(
+                abs(np.exp(2j * np.pi * x * waves.grid.time) @ channel.score) ** 2
+                for waves, channel in zip(self.waves, channels, strict=True)
+            )
+            for x in (hz - beside, hz, hz + beside)
+        ]
+        return hz + beside * _summit(*powers)
+
+    def repeats(self, lines: Sequence[Sinusoids], kind: Kind) -> bool:
+        """Tell whether the last line over angle has come to lie beside another."""
+        if kind is Kind.TIME:
+            return False
+        *others, last = lines[0].cycles
+        return any(abs(last - other) < self.orders.width for other in others)
+
+    def refined(self, lines: Sequence[Sinusoids]) -> list[Sinusoids]:
+        """Return lines after a step of Gauss and Newton, as long as their likelihood asks for."""
+        channels = self.left(lines)
+        over_angle, over_time = lines
+        ahead = (
+            _step_over_angle(over_angle, self.waves, channels, 0.25 * self.orders.width),
+            _step_over_time(over_time, self.waves, channels),
+        )
+        return [
+            self._between(now, then, channels) for now, then in zip(lines, ahead, strict=True)
+        ]  # fmt: skip
+
+    def _between(
+        self,
+        now: Sinusoids,
+        then: Sinusoids,
+        channels: Sequence[Channel],
+    ) -> Sinusoids:
+        """Return the likeliest lines on the way from some to others, however far they overshot."""
+        if not len(now):
+            return now
+        slope = bend = TINY
+        for r, (waves, channel) in enumerate(zip(self.waves, channels, strict=True)):
+            torque = then.torque(waves, r) - now.torque(waves, r)
+            slope += torque @ channel.score
+            bend += torque @ channel.score_of(torque)
+        share = float(np.clip(slope / bend, 0.0, LONGEST_STEP))
+        return replace(
+            now,
+            cycles=now.cycles + share * (then.cycles - now.cycles),
+            amplitudes=now.amplitudes + share * (then.amplitudes - now.amplitudes),
+        )
+
+    def _restored(
+        self,
+        line: Sinusoids,
+        channels: Sequence[Channel],
+    ) -> tuple[float, list[Channel]]:
+        """Return the likelihood ratio of a line that was subtracted, and channels that hold it."""
+        ratio, restored = 0.0, []
+        for r, (waves, channel) in enumerate(zip(self.waves, channels, strict=True)):
+            torque = line.torque(waves, r)
+            score = channel.score_of(torque)
+            ratio += 0.5 * float(torque @ score)
+            restored.append(replace(channel, score=channel.score + score))
+        return ratio, restored
+
+    def reported(
+        self,
+        lines: Sequence[Sinusoids],
+        channels: Sequence[Channel],
+        spectra: Sequence[Spectrum],
+        searches: int,
+    ) -> tuple[Line, ...]:
+        """Return the lines that are significant beside all others, the strongest first."""
+        made = []
+        for k, (known, spectrum) in enumerate(zip(lines, spectra, strict=True)):
+            level = spectrum.steep_level if len(known) else spectrum.level
+            for number, cycles in enumerate(known.cycles):
+                amplitudes = known.amplitudes[:, number]
+                ratio, restored = self._restored(known.only(number), channels)
+                ratio /= float(np.interp(cycles, spectrum.cycles, level))
+                alarm = spectrum.false_alarm(ratio, searches)
+                if alarm > FALSE_ALARMS:
+                    continue
+                other = self.spectrum(spectra[1 - k].kind, restored)
+                rival = float(other.log_likelihood_ratio.max(initial=0.0))
+                size = float(np.sqrt(np.mean(np.sum(amplitudes**2, axis=1))))
+                sine, cosine = amplitudes[0]
+                phase = float(np.arctan2(cosine, sine)) if known.kind is Kind.ANGLE else np.nan
+                made.append(Line(known.kind, float(cycles), size, phase, ratio, rival, alarm))
+        made.sort(key=lambda line: -line.log_likelihood_ratio)
+        widths = {spectrum.kind: spectrum.width for spectrum in spectra}
+        alone = [not _is_trace_of(line, made[:i], widths) for i, line in enumerate(made)]
+        return tuple(line for line, is_alone in zip(made, alone, strict=True) if is_alone)
+
+
+def _is_trace_of(line: Line, stronger: Sequence[Line], widths: dict[Kind, float]) -> bool:
+    """Tell whether a line is what a stronger one leaves beside it when its size changes."""
+    return any(
+        line.kind is other.kind
+        and abs(line.cycles - other.cycles) < BESIDE * widths[line.kind]
+        and line.log_likelihood_ratio < MUCH_WEAKER * other.log_likelihood_ratio
+        for other in stronger
+    )
+
+
+def _step_over_angle(
+    lines: Sinusoids,
+    waves: Sequence[_Waves],
+    channels: Sequence[Channel],
+    reach: float,
+) -> Sinusoids:
+    """Return lines over angle after a step along amplitudes and orders, from what they leave.
+
+    An order moves by ``reach`` at most.
+    """
+    count = len(lines)
+    if not count:
+        return lines
+    normal, right = np.zeros((3 * count, 3 * count)), np.zeros(3 * count)
+    for wave, channel in zip(waves, channels, strict=True):
+        grid = channel.grid
+        columns = np.empty((3 * count, len(grid.angle)))
+        for i, order in enumerate(lines.cycles):
+            sine, cosine = lines.amplitudes[0, i]
+            s, c = wave(Kind.ANGLE, order)
+            columns[3 * i : 3 * i + 3] = s, c, grid.angle * (sine * c - cosine * s)
+        right += columns @ channel.score
+        for i, order in enumerate(lines.cycles):
+            columns[3 * i : 3 * i + 3] *= np.sqrt(channel.weight(order * grid.hz_per_order))
+        normal += columns @ columns.T
+    change = _solved(normal, right).reshape(count, 3)
+    cycles = lines.cycles + np.clip(change[:, 2], -reach, reach)
+    return replace(lines, cycles=cycles, amplitudes=lines.amplitudes + change[:, :2])
+
+
+def _step_over_time(
+    lines: Sinusoids,
+    waves: Sequence[_Waves],
+    channels: Sequence[Channel],
+) -> Sinusoids:
+    """Return lines over time after such a step along their amplitudes in each run."""
+    if not len(lines):
+        return lines
+    amplitudes = lines.amplitudes.copy()
+    for r, (wave, channel) in enumerate(zip(waves, channels, strict=True)):
+        columns = np.array([wave(Kind.TIME, hz) for hz in lines.cycles])
+        weights = np.sqrt(channel.weight(lines.cycles))
+        weighted = (columns * weights[:, np.newaxis, np.newaxis]).reshape(-1, columns.shape[2])
+        right = columns.reshape(-1, columns.shape[2]) @ channel.score
+        amplitudes[r] += _solved(weighted @ weighted.T, right).reshape(-1, 2)
+    return replace(lines, amplitudes=amplitudes)
+
+
+def _solved(normal: NDArray, right: NDArray) -> NDArray:
+    """Return the least-norm solution of normal equations, (p, p) and (p,), columns scaled alike."""
+    size = np.sqrt(np.diag(normal)) + TINY
+    scaled = np.linalg.lstsq(normal / np.outer(size, size), right / size, rcond=1e-9)[0]
+    return np.asarray(scaled / size)

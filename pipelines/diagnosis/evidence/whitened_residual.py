@@ -1,0 +1,186 @@
+"""One joint's residual torque at the full sampling rate, weighted by its noise.
+
+Slow content is removed. With S the spectrum of the noise, the score of a residual r is z = r / S,
+as generalized least squares asks for. The product of a line with z and the weight 1 / S at the
+line's own frequency are all that its likelihood needs, also where that frequency follows the speed.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+from scipy.ndimage import median_filter
+
+from pipelines.estimation.regression import away_from_reversals
+from pipelines.mechanics.motion import Motion
+
+SEGMENT_S = 1.28
+"""Length of the segments whose spectra are averaged for the noise's."""
+SMOOTHED = 9
+"""Frequencies of that spectrum of which the median is taken, so that a hum does not hide itself."""
+SPEEDS = 64
+"""Speeds that stand for all of a joint's: a line's frequency follows them."""
+TINY = 1e-300
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One joint's residual torque in one run; n samples at the full sampling rate."""
+
+    time: NDArray
+    """(n,) s."""
+    angle: NDArray
+    """(n,) rad."""
+    speed: NDArray
+    """(n,) rad/s."""
+    residual: NDArray
+    """(n,) N·m."""
+    usable: NDArray
+    """(n,) bool: valid, and away from the joint's reversals."""
+    rate_hz: float
+    period_s: float | None = None
+    """Of the motion, where it repeats."""
+
+
+def traces_of(motion: Motion, residual: NDArray) -> list[Trace]:
+    """Return each joint's trace in a run whose residual torque is (n, J) N·m."""
+    usable = motion.valid[:, np.newaxis] & away_from_reversals(motion) & np.isfinite(residual)
+    return [
+        Trace(
+            motion.time,
+            motion.q[:, j],
+            motion.dq[:, j],
+            residual[:, j],
+            usable[:, j],
+            motion.sample_rate_hz,
+            motion.period_s,
+        )
+        for j in range(len(motion.joints))
+    ]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A trace's u usable samples on a uniform grid of N instants."""
+
+    rate_hz: float
+    period_s: float | None
+    time: NDArray
+    """(u,) s, from their middle."""
+    angle: NDArray
+    """(u,) rad."""
+    hz_per_order: NDArray
+    """(u,) frequency of a line of one cycle a turn."""
+    usual_hz_per_order: NDArray
+    """(``SPEEDS``,) such frequencies that stand for all."""
+    residual: NDArray
+    """(u,) N·m."""
+    place: NDArray
+    """(u,) where the samples stand on the grid."""
+    mask: NDArray
+    """(N,) 1 where a sample is usable, 0 elsewhere."""
+    around: NDArray
+    """(N,) share of the smoothing window that is usable."""
+    hz: NDArray
+    """(k,) frequencies of a transform."""
+    smooth: NDArray
+    """(k,) share that the smoothing passes: the slow content."""
+    passed: NDArray
+    """(k,) 0 where content is slow, 1 where it is not."""
+
+    @classmethod
+    def of(cls, trace: Trace, slow_hz: float) -> "Grid":
+        """Lay out a trace whose content below a frequency is slow."""
+        used = trace.usable
+        hz_per_order = np.abs(trace.speed[used]) / (2.0 * np.pi)
+        place = np.round((trace.time - trace.time[0]) * trace.rate_hz).astype(int)
+        mask = np.zeros(fft.next_fast_len(int(place[-1]) + 1, real=True))
+        mask[place[used]] = 1.0
+        hz = fft.rfftfreq(len(mask), 1.0 / trace.rate_hz)
+        # A Gaussian window whose width is a quarter of the slow frequency's period.
+        smooth = np.exp(-2.0 * (np.pi * hz * 0.25 / slow_hz) ** 2)
+        return cls(
+            trace.rate_hz,
+            trace.period_s,
+            trace.time[used] - np.mean(trace.time[used]),
+            trace.angle[used],
+            hz_per_order,
+            np.quantile(hz_per_order, (np.arange(SPEEDS) + 0.5) / SPEEDS),
+            trace.residual[used],
+            place[used],
+            mask,
+            np.maximum(filtered(mask, smooth), 1e-3),
+            hz,
+            smooth,
+            np.clip(2.0 * hz / slow_hz - 1.0, 0.0, 1.0),
+        )
+
+    def channel(self, residual: NDArray) -> "Channel":
+        """Return a residual torque (u,) N·m without slow content, and its score."""
+        fast = self.fast(residual)
+        spectrum = np.interp(self.hz, *noise(fast, self.mask, self.rate_hz))
+        gain = self.passed * (1.0 - self.smooth) / spectrum
+        return Channel(self, gain, filtered(fast, gain)[self.place])
+
+    def fast(self, torque: NDArray) -> NDArray:
+        """Return a torque (u,) without slow content on the grid, (N,) N·m."""
+        x = np.zeros_like(self.mask)
+        x[self.place] = torque
+        return (x - filtered(x, self.smooth) / self.around) * self.mask
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What the likelihood of a line needs of a residual."""
+
+    grid: Grid
+    gain: NDArray
+    """(k,) by which torque becomes score at each of the grid's frequencies, 1/(N·m)^2."""
+    score: NDArray
+    """(u,) of the residual, 1/(N·m)."""
+
+    @cached_property
+    def weights(self) -> NDArray:
+        """Weight of a sample of a line at each of the grid's frequencies, (k,) 1/(N·m)^2."""
+        return np.asarray(self.gain * (1.0 - self.grid.smooth))
+
+    def score_of(self, torque: NDArray) -> NDArray:
+        """Return the score of another torque (u,) N·m under the same noise, (u,) 1/(N·m)."""
+        return filtered(self.grid.fast(torque), self.gain)[self.grid.place]
+
+    def weight(self, hz: NDArray) -> NDArray:
+        """Return the weight of a sample of a line at frequencies (m,) Hz, (m,) 1/(N·m)^2.
+
+        Above half of the sampling rate a line is sampled as one below.
+        """
+        rate = self.grid.rate_hz
+        folded = np.abs((hz + 0.5 * rate) % rate - 0.5 * rate)
+        # The frequencies are equidistant, so that none needs to be searched for.
+        place = np.minimum(folded / self.grid.hz[1], len(self.weights) - 1.001)
+        left = place.astype(int)
+        share = place - left
+        return np.asarray((1.0 - share) * self.weights[left] + share * self.weights[left + 1])
+
+
+def filtered(x: NDArray, response: NDArray) -> NDArray:
+    """Return (N,) samples whose transform is multiplied by a response (k,)."""
+    return np.asarray(fft.irfft(fft.rfft(x) * response, len(x)))
+
+
+def noise(x: NDArray, mask: NDArray, rate_hz: float) -> tuple[NDArray, NDArray]:
+    """Return frequencies (k,) Hz, and the power of a sample of noise at them, (k,) (N·m)^2.
+
+    Spectra of half-overlapping segments are averaged (Welch, 1967, IEEE Trans. Audio and
+    Electroacoustics 15(2)), each by what of it is usable.
+    """
+    length = min(len(x), max(32, round(SEGMENT_S * rate_hz)))
+    window = np.hanning(length)
+    starts = np.arange(0, len(x) - length + 1, max(1, length // 2))
+    rows = starts[:, np.newaxis] + np.arange(length)
+    used = max(float(np.sum(mask[rows] * window**2)), 1e-12)
+    power = np.sum(np.abs(fft.rfft(x[rows] * window, axis=1)) ** 2, axis=0) / used
+    # A median over frequencies: a narrow line does not count as noise.
+    around = median_filter(power, SMOOTHED, mode="nearest")
+    return fft.rfftfreq(length, 1.0 / rate_hz), np.maximum(around, 1e-9 * power.max() + TINY)
