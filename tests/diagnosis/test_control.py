@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pipelines.diagnosis.control import CASE, control
 
 from pipelines.contracts import HIP_AND_KNEE
 from pipelines.diagnosis.data_faults import Fault
 from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.verdict.control_benefit import CASE, control
 from pipelines.dynamics.plant import make_plant
 from pipelines.dynamics.tracking import track
 from pipelines.effects.friction import Friction
@@ -18,6 +18,7 @@ from pipelines.mechanics.gait import gait
 from pipelines.mechanics.geometry import Geometry
 from pipelines.model import Model, Term
 from pipelines.settings.plant import PlantSettings
+from tests.diagnosis.naming import missing, naming
 from tests.diagnosis.sessions import session
 
 SPRING = {"stiffness": 12.0, "rest_angle": -0.5}
@@ -25,7 +26,7 @@ SPRING = {"stiffness": 12.0, "rest_angle": -0.5}
 
 @pytest.fixture(scope="module")
 def sprung():
-    return diagnose(session("parallel_spring", "knee", seed=4, **SPRING))
+    return naming(diagnose(session("parallel_spring", "knee", seed=4, **SPRING)), "parallel_spring@knee")
 
 
 def true_loop():
@@ -64,12 +65,13 @@ def test_a_leg_that_cannot_exist_is_not_simulated_and_the_reason_is_told(sprung)
 
 
 def test_where_no_cause_is_named_there_is_nothing_to_compare(sprung):
-    told = control(replace(sprung, status="unknown_cause"))
+    told = control(missing(sprung, 0.9))
     assert (told["with"], told["reason"]) == (None, "no cause is named")
     assert told["without"] is not None
 
 
 def test_no_loop_is_simulated_on_what_faulty_recordings_tell(sprung):
-    told = control(replace(sprung, faults=(Fault("run_0.parquet", "hip_torque_nm", "stuck", None),)))
+    stuck = Fault("run_0.parquet", "hip_torque_nm", "stuck", None)
+    told = control(replace(sprung, data=replace(sprung.data, faults=(stuck,))))
     assert told["without"] is told["with"] is None
     assert told["reason"].startswith("acquisition is at fault")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.diagnose import diagnose
-from pipelines.diagnosis.verdict import verdict
+from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table
 from pipelines.settings.filter import FilterSettings

@@ -17,7 +17,7 @@ from pipelines.diagnosis.fit.change_point import ALWAYS, NEVER, Onset
 from pipelines.diagnosis.fit.held_out import settled
 from pipelines.diagnosis.fit.joint_fit import refined
 from pipelines.diagnosis.fit.uncertainty import uncertainty
-from pipelines.diagnosis.verdict import verdict
+from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.effects import PayloadChange
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table

@@ -8,7 +8,7 @@ import pytest
 from pipelines.diagnosis.candidates.candidate import proposals
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.evidence.baseline import Baseline
-from pipelines.diagnosis.verdict import verdict
+from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.dynamics.replay import replay
 from pipelines.effects import EFFECTS
 from pipelines.identification import identify

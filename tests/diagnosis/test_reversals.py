@@ -12,7 +12,7 @@ from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.fit.fitted_model import model_of_run
 from pipelines.diagnosis.fit.joint_fit import fit
 from pipelines.diagnosis.fit.presliding_test import built_up, dahl
-from pipelines.diagnosis.verdict import verdict
+from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.effects import Backlash
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.read import read_motions

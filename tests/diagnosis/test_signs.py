@@ -8,7 +8,7 @@ import pytest
 
 from pipelines.diagnosis.data_faults import find_faults
 from pipelines.diagnosis.diagnose import diagnose
-from pipelines.diagnosis.verdict import verdict
+from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table
 from pipelines.mechanics.scale import on_one_scale

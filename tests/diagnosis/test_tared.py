@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.diagnose import diagnose
-from pipelines.diagnosis.verdict import verdict
+from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.label import cause_label
 from tests.diagnosis.sessions import session
 from tests.diagnosis.test_each_run import zeroed

@@ -5,19 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from pipelines.diagnosis.bank import fill
 from scipy.optimize import least_squares
 
 from pipelines.contracts import Joint
-from pipelines.diagnosis.evidence.gram import solve
-from pipelines.diagnosis.evidence.baseline import baseline_of
-from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.effects.encoder_eccentricity import EncoderEccentricity
 from pipelines.effects.friction import Friction
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import machine_of
 from pipelines.model import Model, Term
+from tests.diagnosis.screening import Screening
 from tests.diagnosis.sessions import session
 
 BODY = Term(RigidBody(), np.array([2.6, 0.63, 1.78, 5.7]))
@@ -78,18 +75,14 @@ def test_an_eccentricity_is_recovered_from_a_simulated_motion(with_human):
     assert np.sqrt(np.mean(left(np.zeros(4)) ** 2)) > 0.08
 
 
-def test_its_candidates_have_a_column_for_each_sine_and_cosine():
-    """What the columns' amplitudes are, times the errors that the columns were made with."""
+def test_its_candidates_have_a_column_for_each_sine_and_cosine_which_add_up_to_it():
+    """Each column's amplitude times the error that the column was made with is the hidden error's part."""
     hidden = {"amplitude": 0.05, "phase": 0.4}
-    motions = session("encoder_eccentricity", "hip", seconds=20.0, **hidden)
-    runs = [observe(m) for m in motions if m.purpose == "train"]
-    library = fill(runs, baseline_of(runs))
-    labels = [candidate.label for candidate in library.candidates]
-    numbers = [i for i, label in enumerate(labels) if label == "encoder_eccentricity@hip"]
-    assert [library.where[i].stop - library.where[i].start for i in numbers] == [2, 4]
-    chosen = library.gram.select(library.columns_of(numbers[:1]))
-    sine, cosine = 0.01 * solve(chosen, library.weights)[-2:]
-    assert_allclose([sine, cosine], 0.05 * np.array([np.cos(0.4), np.sin(0.4)]), atol=0.01)
+    look = Screening.of(session("encoder_eccentricity", "hip", seconds=20.0, **hidden))
+    fits = look.fits(EncoderEccentricity("hip"))
+    assert sorted(fitted.columns.shape[1] for fitted in fits) == [2, 4]
+    once = next(fitted for fitted in fits if fitted.columns.shape[1] == 2)
+    assert_allclose(look.refined(once), [0.05 * np.cos(0.4), 0.05 * np.sin(0.4), 0.0, 0.0], atol=0.01)
 
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from pipelines.diagnosis.scan import values_in
 
+from pipelines.diagnosis.candidates.shape_grid import values_in
 from pipelines.diagnosis.evidence.baseline import baseline_of
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.effects.end_stop import EndStop

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from pipelines.diagnosis.bank import fill
 
-from pipelines.diagnosis.evidence.gram import solve
+from pipelines.diagnosis.candidates.library import _effects
 from pipelines.diagnosis.evidence.baseline import baseline_of
 from pipelines.diagnosis.evidence.observed_run import observe
+from pipelines.diagnosis.evidence.prepared_runs import prepare
 from pipelines.effects.friction import Friction
 from pipelines.effects.friction_temperature import FrictionTemperature
 from pipelines.effects.gain_drift import GainDrift
@@ -17,6 +17,7 @@ from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
 from pipelines.identification import Extension, identify
 from pipelines.model import Model, Term
+from tests.diagnosis.screening import Screening
 from tests.diagnosis.sessions import session
 
 BODY = Term(RigidBody(), np.array([2.6, 0.63, 1.78, 5.7]))
@@ -27,7 +28,7 @@ AT_REFERENCE = 25.0
 
 def labels(motions):
     runs = [observe(motion) for motion in motions if motion.purpose == "train"]
-    return {candidate.label for candidate in fill(runs, baseline_of(runs)).candidates}
+    return {effect.label for effect in _effects(prepare(runs, baseline_of(runs)))}
 
 
 @pytest.fixture(scope="module")
@@ -116,15 +117,13 @@ def test_a_gain_that_follows_the_temperature_is_recovered_across_runs(warm_and_c
         )
         for m in warm_and_cold
     ]
-    runs = [observe(m) for m in motions if m.purpose == "train"]
-    library = fill(runs, baseline_of(runs))
-    (number,) = (
-        i
-        for i, candidate in enumerate(library.candidates)
-        if candidate.label == "gain_drift@knee" and candidate.directions == ((0.0, 0.0, 0.002),)
+    look = Screening.of(motions)
+    by_temperature = next(
+        fitted
+        for fitted in look.fits(GainDrift("knee"))
+        if fitted.candidate.directions == ((0.0, 0.0, 0.002),)
     )
-    chosen = library.gram.select(library.columns_of([number]))
-    assert_allclose(0.002 * solve(chosen, library.weights)[-1], 0.004, atol=0.001)
+    assert_allclose(look.refined(by_temperature), [0.0, 0.0, 0.004], atol=0.001)
 
 
 def test_an_identification_with_temperature_refuses_runs_without(warm_and_cold):

@@ -5,19 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from pipelines.diagnosis.bank import fill
 from scipy.optimize import minimize_scalar
 
 from pipelines.contracts import Joint
-from pipelines.diagnosis.evidence.gram import solve
-from pipelines.diagnosis.evidence.baseline import baseline_of
-from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.effects.friction import Friction
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.effects.torque_cross_talk import TorqueCrossTalk
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import machine_of
 from pipelines.model import Model, Term
+from tests.diagnosis.screening import Screening
 from tests.diagnosis.sessions import session
 
 BODY = Term(RigidBody(), np.array([2.6, 0.63, 1.78, 5.7]))
@@ -47,11 +44,6 @@ def test_a_coupling_is_recovered_from_the_measured_torques(with_human, joint):
 
 def test_one_column_of_a_small_coupling_stands_for_every_coupling():
     """What the column's amplitude is, times the coupling that the column was made with."""
-    motions = session(effect="torque_cross_talk", joint="hip", coupling=0.15, seconds=20.0)
-    runs = [observe(m) for m in motions if m.purpose == "train"]
-    library = fill(runs, baseline_of(runs))
-    (number,) = (i for i, c in enumerate(library.candidates) if c.label == "torque_cross_talk@hip")
-    candidate = library.candidates[number]
-    columns = library.columns_of([number])
-    amplitude = solve(library.gram.select(columns), library.weights)[-1]
-    assert_allclose(amplitude * candidate.directions[0][0], 0.15, atol=0.03)
+    look = Screening.of(session("torque_cross_talk", "hip", coupling=0.15, seconds=20.0))
+    (fitted,) = look.fits(TorqueCrossTalk("hip"))
+    assert_allclose(look.refined(fitted), [0.15], atol=0.03)

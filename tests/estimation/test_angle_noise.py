@@ -9,7 +9,7 @@ from scipy.signal import butter, sosfilt
 from pipelines.contracts import MOTION, parquet
 from pipelines.contracts.table import Table
 from pipelines.diagnosis.diagnose import diagnose
-from pipelines.diagnosis.verdict import verdict
+from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.estimation.angle_noise import is_loud
 from pipelines.identification.two_step import identify
 from pipelines.mechanics import run

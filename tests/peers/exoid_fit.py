@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.diagnose import diagnose as find
 from pipelines.diagnosis.fit.fitted_model import model_of_run
-from pipelines.diagnosis.verdict import verdict
+from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.estimation.regression import away_from_reversals, block_average
 from pipelines.identification import identify as fit
 from pipelines.mechanics.motion import Motion
