@@ -23,9 +23,9 @@ from pipelines.diagnosis.search import MOST, Scored, Scorer, search
 
 from pipelines.diagnosis.candidates.candidate import BASELINE
 from pipelines.diagnosis.candidates.columns import signatures
-from pipelines.diagnosis.evidence.baseline_columns import columns_under, gram_of_runs
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.evidence.baseline import baseline_of
+from pipelines.diagnosis.evidence.baseline_columns import columns_under, gram_of_runs
 from pipelines.diagnosis.evidence.noise_floor import MOST_INDEPENDENT
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.effects import EFFECTS

@@ -7,13 +7,13 @@ import pytest
 
 from pipelines.diagnosis.candidates.candidate import Candidate, proposals
 from pipelines.diagnosis.candidates.columns import signatures
-from pipelines.diagnosis.evidence.baseline_columns import columns_under
-from pipelines.diagnosis.evidence.prepared_runs import prepare
 from pipelines.diagnosis.candidates.shape_grid import values_in
 from pipelines.diagnosis.evidence.baseline import baseline_of
+from pipelines.diagnosis.evidence.baseline_columns import columns_under
 from pipelines.diagnosis.evidence.block_rate import at_block_rate, needs_full_rate
 from pipelines.diagnosis.evidence.decision_band import LENGTH_S, DecisionBand
 from pipelines.diagnosis.evidence.observed_run import observe
+from pipelines.diagnosis.evidence.prepared_runs import prepare
 from tests.diagnosis.sessions import session
 
 

@@ -9,10 +9,10 @@ from scipy.signal import lfilter
 
 from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.candidates.columns import torque_columns
-from pipelines.diagnosis.evidence.baseline_columns import columns_under
 from pipelines.diagnosis.detectability.detectability import POWER, Look, _alike, detectability, needed_noncentrality
 from pipelines.diagnosis.detectability.planned_runs import planned_motions, planned_noise
 from pipelines.diagnosis.evidence.baseline import baseline_of
+from pipelines.diagnosis.evidence.baseline_columns import columns_under
 from pipelines.diagnosis.evidence.model_error import IMPERFECTION
 from pipelines.diagnosis.evidence.noise_floor import Floor
 from pipelines.diagnosis.evidence.observed_run import observe

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pipelines.diagnosis.verdict.candidate_table import candidates
 
 from pipelines.contracts import CANDIDATES, PARAMETERS, RECORDING, RESIDUALS
 from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.verdict.candidate_table import candidates
 from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.errors import InputError
 from tests.diagnosis.sessions import SLOW, recordings, session

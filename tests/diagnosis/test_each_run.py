@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pipelines.diagnosis.verdict.figures.budget import words_of
 
 from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.diagnose import diagnose
@@ -17,6 +16,7 @@ from pipelines.diagnosis.fit.fitted_model import values_of_each_run
 from pipelines.diagnosis.fit.held_out import settled
 from pipelines.diagnosis.fit.joint_fit import fit
 from pipelines.diagnosis.fit.uncertainty import Uncertainty
+from pipelines.diagnosis.verdict.figures.budget import words_of
 from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.effects import TorqueDrift, VoluntaryTorque
 from tests.diagnosis.sessions import session

@@ -11,9 +11,9 @@ from scipy.signal import butter, lfilter
 
 from pipelines.diagnosis import impacts
 from pipelines.diagnosis.candidates.candidate import Candidate, lowest
-from pipelines.diagnosis.evidence.baseline_columns import columns_under
 from pipelines.diagnosis.dependence.spectral_lines import strongest_tone
 from pipelines.diagnosis.evidence.baseline import baseline_of, with_load
+from pipelines.diagnosis.evidence.baseline_columns import columns_under
 from pipelines.diagnosis.evidence.cuff_coherence import evidence_of_will
 from pipelines.diagnosis.evidence.impact_bursts import evidence_of_play
 from pipelines.diagnosis.evidence.noise_floor import slow_scatter

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
-from pipelines.diagnosis.verdict.error_budget import scatter_between_periods, shares_of_causes
-from pipelines.diagnosis.verdict.figures.against import against
 
 from pipelines.diagnosis import figures, replayed
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.diagnosis.fit.fitted_model import model_of_run
+from pipelines.diagnosis.verdict.error_budget import scatter_between_periods, shares_of_causes
+from pipelines.diagnosis.verdict.figures.against import against
 from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.dynamics.replay import replay
 from pipelines.errors import InputError

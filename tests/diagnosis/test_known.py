@@ -1,9 +1,9 @@
 """What drawings show of a machine is part of the model that everything is held against, and is searched for no more."""
 
 import pytest
-from pipelines.diagnosis.verdict.candidate_table import candidates
 
 from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.verdict.candidate_table import candidates
 from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.errors import InputError
 from pipelines.model import model_from_parameters

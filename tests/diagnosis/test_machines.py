@@ -6,13 +6,13 @@ from functools import cache
 
 import numpy as np
 import pytest
-from pipelines.diagnosis.verdict.candidate_table import candidates
 from pipelines.diagnosis.choice import choose
 
 from pipelines.contracts.joints import Joint
 from pipelines.diagnosis.candidates.candidate import proposals
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.evidence.baseline import Baseline
+from pipelines.diagnosis.verdict.candidate_table import candidates
 from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.dynamics.assembly import assemble
 from pipelines.effects.backlash import Backlash

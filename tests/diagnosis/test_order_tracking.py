@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pipelines.diagnosis.bank import fill
 from pipelines.diagnosis.evidence.line_spectrum import Kind
-from pipelines.diagnosis.observations import baseline_of, observe
 from pipelines.diagnosis.evidence.order_tracking import FALSE_ALARMS, lines_of
 from pipelines.diagnosis.evidence.whitened_residual import Trace
+from pipelines.effects import Cogging
 from pipelines.signals.blocks import BlockAverage
+from tests.diagnosis.screening import Screening
 from tests.diagnosis.sessions import RICH, session
 
 COLOURS = {
@@ -158,14 +158,12 @@ def test_gaps_and_samples_that_cannot_be_used_are_left_out():
     assert line == (Kind.ANGLE, pytest.approx(88.3, abs=0.5))
 
 
-def test_lines_that_a_leg_hides_behind_its_position_loops_become_candidates():
-    """Each line for itself, and a ripple of both."""
+def test_lines_that_a_leg_hides_behind_its_position_loops_become_one_candidate_of_both():
     hidden = {
         "amplitude": 1.2, "cycles_per_turn": 88.3, "phase": 0.4,
         "amplitude_2": 0.9, "cycles_per_turn_2": 199.0, "phase_2": -1.0,
     }  # fmt: skip
-    runs = [observe(m) for m in session("cogging", "knee", **hidden) if m.purpose == "train"]
-    library = fill(runs, baseline_of(runs))
-    shapes = [c.shapes[0] for c in library.candidates if c.label == "cogging@knee"]
-    assert any(shape == pytest.approx((88.3,), abs=0.5) for shape in shapes)
-    assert any(sorted(shape) == pytest.approx([88.3, 199.0], abs=0.5) for shape in shapes)
+    look = Screening.of(session("cogging", "knee", **hidden))
+    (fitted,) = look.fits(Cogging("knee", on=look.prepared.baseline.machine))
+    assert sorted(fitted.candidate.shapes[0]) == pytest.approx([88.3, 199.0], abs=0.5)
+    assert fitted.columns.shape[1] == 4, "a sine and a cosine of each line"
