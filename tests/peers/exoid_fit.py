@@ -71,7 +71,7 @@ def diagnose(files: Sequence[Path]) -> Diagnosed:
     found = find(motions)
     said = verdict(found)
     seconds = time.process_time() - begun
-    model = model_of_run(found.choice.named.fit, found.baseline, found.validate[0])
+    model = model_of_run(found.after.fit, found.baseline, found.validate[0])
     causes = tuple(_in_words(cause) for cause in said["causes"])
     return Diagnosed(said["status"], causes, model.torque(_judged(motions)), seconds)
 

@@ -56,7 +56,7 @@ def simulated(number: int, spring: bool, folder: Path) -> Leg:
             plan.torque(SPRING, KNEE, STIFFNESS, REST, 0.0, 0.0)
         run = Run("exo_alone", purpose, DURATION_S, draw(2, k))
         runs.append(record(rig, random_excitation(draw(3, k)), plan, run, draw(4, k)))
-    session = Session(Case(seed, "none", kinds=("exo_alone",)), rig, [], runs)
+    session = Session(Case(seed, "none", kinds=("exo_alone",), plain=True), rig, [], runs)
     write(session, folder / "recordings", folder / "truth.json")
     files = sorted((folder / "recordings").iterdir())
     machine = rig.machine
