@@ -34,7 +34,7 @@ def test_the_floor_is_the_noise_that_was_put_in(faultless):
     """Ripple of 0.6 and 0.4 N·m, correlated over 20 ms: what a mean over 25 ms leaves of it."""
     rho = np.exp(-1 / (200 * 0.02))
     mean = np.sqrt((5 + 2 * sum((5 - k) * rho**k for k in range(1, 5))) / 25)
-    np.testing.assert_allclose(faultless.standing.floor, np.array([0.6, 0.4]) * mean, rtol=0.06)
+    np.testing.assert_allclose(faultless.floor_rms, np.array([0.6, 0.4]) * mean, rtol=0.06)
 
 
 @pytest.mark.parametrize(
@@ -57,19 +57,20 @@ def test_a_hidden_effect_is_named_with_its_size_and_the_error_falls_to_the_floor
     assert first["probability"] > 0.5
     size = next(p for p in first["parameters"] if p["name"] == parameter)
     assert size["value"] == pytest.approx(values[parameter], rel=0.15)
-    np.testing.assert_allclose(found.after.errors.rms, found.standing.floor, rtol=0.08)
+    np.testing.assert_allclose(found.after.errors.rms, found.floor_rms, rtol=0.08)
     assert first["gain"]["ci95"][0] > 0
     assert found.unrealizable == []
     # A peak of friction and its level are told apart by how it falls with speed alone; the others stand for themselves.
     assert ["knee coulomb" in sentence for sentence in found.collinear] == [True] * (effect == "stribeck_friction")
 
 
-def test_a_drag_that_training_was_too_slow_for_is_named_where_faster_runs_bear_it_out():
+def test_a_drag_that_slow_training_hardly_shows_is_found_among_laws_of_its_joints_speed():
     found = diagnose(session("quadratic_drag", "hip", seed=3, trained=SLOW, drag=28.0))
-    trained = found.choice.refined[0][()].fit.rms[0], found.choice.named.fit.rms[0]
-    assert trained[1] > 0.95 * trained[0], "training alone would not have been worth a word"
-    assert found.causes == ("quadratic_drag@hip",)
-    np.testing.assert_allclose(found.after.errors.rms, found.standing.floor, rtol=0.08)
+    assert found.after.fit.rms[0] > 0.95 * found.before.fit.rms[0], "it is a twentieth of the error at most"
+    (finding,) = found.selected.findings
+    (speed,) = (p for level, value, p in finding.path if (level, value) == ("family", "speed"))
+    assert (finding.joint, finding.family) == ("hip", "speed") and speed > 0.9
+    assert "quadratic_drag@hip" in list(found.selected.posterior.marginals)[:3]
 
 
 @pytest.mark.parametrize(
