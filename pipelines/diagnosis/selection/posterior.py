@@ -75,7 +75,8 @@ def posterior(evidence: Evidence, criteria: Criteria = CRITERIA) -> Posterior:
     """Weigh all sets of up to three elements."""
     weigh = MarginalLikelihood(evidence, criteria)
     odds: dict[Set, float] = {(): 0.0}
-    odds |= {(i,): float(value) for i, value in enumerate(weigh.alone)}
+    # A shape that a cause has beside others counts in their set only, or the cause would count twice.
+    odds |= {(i,): float(v) for i, v in enumerate(weigh.alone) if evidence.elements[i].context < 0}
     for chosen in (*_pairs(weigh), *map(_ordered, evidence.contexts)):
         odds[chosen] = weigh(chosen)
     for chosen in _triples(weigh, odds):
