@@ -141,7 +141,7 @@ class MarginalLikelihood:
 
     def pairs(self, chosen: Sequence[int]) -> tuple[NDArray, NDArray]:
         """Return all pairs of different labels among elements, (p, 2), and rough log odds, (p,)."""
-        chosen = np.asarray(chosen)
+        chosen = np.asarray(chosen, dtype=int)
         labels = np.array([self.evidence.elements[i].label for i in chosen])
         one, other = np.triu_indices(len(chosen), 1)
         apart = labels[one] != labels[other]
