@@ -165,10 +165,9 @@ def _effects(prepared: Prepared) -> list[Effect]:
 
 def _shapes(fits: Sequence[Fitted], alone: ShapeRefinement, regression: DecisionRegression) -> list[Cause]:
     """Return an effect at its best shape, refined, and at the next best of the coarse search."""
-    start = alone.fit(fits[0].candidate) if fits else None
-    if start is None:
+    if not fits:
         return []
-    best, slopes = alone.refined(start)
+    best, slopes = alone.refined(fits[0])
     others = others_of(fits, best, ALTERNATIVES)
     if forms := _other_forms(best, alone):
         other = max(forms, key=lambda fitted: fitted.gain_as_is)

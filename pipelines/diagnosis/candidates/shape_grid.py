@@ -3,7 +3,6 @@
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +22,8 @@ BENDING = 2
 """Values of one whose effect is nearly in proportion to it."""
 HARDENING = ("1/rad²", "1/m²")
 """Units of a form that only bends a spring: left to the refinement."""
+SLOW_WAVES = 4.0
+"""Times the fewest waves of a ripple, up to which block averages are searched for one."""
 OSCILLATING = {"Hz", *TURNS}
 """Units of parameters along which an effect has many maxima."""
 APART = 2
@@ -35,7 +36,7 @@ def screened(
     effect: Effect, alone: ShapeRefinement, prepared: Prepared, regression: DecisionRegression
 ) -> list[Fitted]:
     """Return the fits of an effect's grid, those that explain most first."""
-    fit, runs = partial(alone.fit, rough=True), prepared.runs
+    runs = prepared.runs
     if chosen := effect.directions([run.motion for run in runs]):
         starts = [_along(effect, directions, len(runs)) for directions in chosen]
     elif lines := _lines_of(effect, prepared):
@@ -45,7 +46,7 @@ def screened(
         starts = [_from_the_begin(effect, len(runs))]
     else:
         starts = [Candidate(effect, (shape,) * len(runs)) for shape in _grid(effect, runs, regression)]
-    fits = [fitted for start in starts if (fitted := fit(start)) is not None]
+    fits = [fitted for start in starts if (fitted := alone.fit(start)) is not None]
     return sorted(fits, key=lambda fitted: -fitted.gain)
 
 
@@ -103,7 +104,10 @@ def _tried(effect: Effect, parameter: Parameter, few: int, runs: Sequence[Run]) 
     if effect.swings and parameter.unit in HARDENING:
         return np.array([parameter.default])
     values = values_in(effect, parameter, few, runs)
-    return values[values >= lowest(effect, parameter, runs)]
+    least = lowest(effect, parameter, runs)
+    # Faster waves are lines, known at the full sampling rate.
+    most = SLOW_WAVES * least if parameter.unit in TURNS else np.inf
+    return values[(values >= least) & (values <= most)]
 
 
 def values_in(effect: Effect, parameter: Parameter, count: int, runs: Sequence[Run]) -> NDArray:
