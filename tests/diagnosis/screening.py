@@ -40,7 +40,7 @@ class Screening:
 
     def fits(self, effect: Effect) -> list[Fitted]:
         """Return the fits of an effect's coarse search, the best first."""
-        return screened(effect, self.alone, self.prepared, self.regression)
+        return screened(effect, self.alone, self.prepared.runs, self.regression)
 
     def refined(self, start: Fitted) -> tuple[float, ...]:
         """Return the shape that the refinement finds from a start."""

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from pipelines.diagnosis.candidates.library import _ripples
 from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.order_tracking import FALSE_ALARMS, lines_of
 from pipelines.diagnosis.evidence.whitened_residual import Trace
-from pipelines.effects import Cogging
 from pipelines.signals.blocks import BlockAverage
 from tests.diagnosis.screening import Screening
 from tests.diagnosis.sessions import RICH, session
@@ -164,6 +164,7 @@ def test_lines_that_a_leg_hides_behind_its_position_loops_become_one_candidate_o
         "amplitude_2": 0.9, "cycles_per_turn_2": 199.0, "phase_2": -1.0,
     }  # fmt: skip
     look = Screening.of(session("cogging", "knee", **hidden))
-    (fitted,) = look.fits(Cogging("knee", on=look.prepared.baseline.machine))
-    assert sorted(fitted.candidate.shapes[0]) == pytest.approx([88.3, 199.0], abs=0.5)
-    assert fitted.columns.shape[1] == 4, "a sine and a cosine of each line"
+    (ripple,) = _ripples(look.prepared, look.alone, look.regression)
+    assert ripple.candidate.label == "cogging@knee"
+    assert sorted(ripple.candidate.shapes[0]) == pytest.approx([88.3, 199.0], abs=0.5)
+    assert ripple.columns.shape[1] == 4, "a sine and a cosine of each line"

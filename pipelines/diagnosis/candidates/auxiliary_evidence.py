@@ -16,7 +16,6 @@ PERCEIVED = {
     "shows in the mean of the torque",
     VoluntaryTorque.name: "what differs from period to period is felt in cuffs and drive alike: it comes through the "
     "cuffs, and no model foretells it",
-    Cogging.name: "the torque at the full sampling rate has a line over the joint's angle, which averages lose most of",
 }
 """How causes are known besides what they do to the mean of the torque."""
 
