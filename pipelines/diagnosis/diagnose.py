@@ -107,11 +107,7 @@ def _validated(data: TrainingData, prepared: Prepared, selected: Selected) -> Di
     refine = Refinement(prepared.runs, baseline, weights)
     validate = tuple(with_load(like_trained(run, baseline), baseline, prepared.values) for run in data.validate)
     before = Validated.of(refine(()), validate, baseline)
-    after, without = _fitted(selected, refine, prepared, before)
-    ratios = {label: log_likelihood_ratio(less, after, prepared.noise) for label, less in without.items()}
-    if (judged := selected.judged(ratios)).answer.named != selected.answer.named:
-        selected = judged
-        after, without = _fitted(selected, refine, prepared, before)
+    selected, after, without = _judged(selected, refine, prepared, before)
     known = uncertainty(after.fit, prepared.runs, baseline, imperfection(prepared.runs))
     parameters, covariance = parameter_rows.parameters(after.fit, baseline, known)
     residuals = {"baseline": before.residuals, "extended": after.residuals}
@@ -124,6 +120,25 @@ def _validated(data: TrainingData, prepared: Prepared, selected: Selected) -> Di
             "extended": simulation_error(after.fit, validate, baseline),
         },
     )  # fmt: skip
+
+
+def _judged(
+    selected: Selected, refine: Refinement, prepared: Prepared, before: Validated
+) -> tuple[Selected, Validated, dict[str, Validated]]:
+    """Return the causes that the validation runs leave named, fitted, and the same without each.
+
+    The most harmful cause is dropped first and the rest fitted anew: beside it, what others do may
+    seem to harm too.
+    """
+    while True:
+        after, without = _fitted(selected, refine, prepared, before)
+        ratios = {label: log_likelihood_ratio(less, after, prepared.noise) for label, less in without.items()}
+        judged = selected.judged(ratios)
+        harmful = ratios.keys() - {one.element.label for one in judged.answer.named}
+        if not harmful:
+            return judged, after, without
+        worst = min(harmful, key=lambda label: ratios[label])
+        selected = selected.judged({worst: ratios[worst]})
 
 
 def _fitted(
