@@ -19,6 +19,7 @@ from pipelines.effects.backlash import Backlash
 from pipelines.effects.parallel_spring import ParallelSpring
 from pipelines.errors import InputError
 from pipelines.identification import identify
+from pipelines.label import cause_label
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.machine import THE_LEG, Machine, machine_of
@@ -28,6 +29,7 @@ from pipelines.mechanics.scale import on_one_scale
 from pipelines.model import Model, Term, baseline
 from pipelines.settings.filter import FilterSettings
 from tests.diagnosis.machines import lift, pendulum, slide
+from tests.diagnosis.naming import naming
 
 
 @cache
@@ -42,22 +44,19 @@ def labels(machine):
 
 
 @pytest.fixture(scope="module")
-def servo():
-    found = diagnose(motions(pendulum, spring=0.8))
-    return found, verdict(found)
-
-
-@pytest.fixture(scope="module")
 def screw():
     found = diagnose(motions(slide, asymmetry=-80.0))
     return found, verdict(found)
 
 
-def test_a_spring_at_a_small_servo_is_named_with_its_size(servo):
-    _, said = servo
+def test_a_spring_at_a_small_servo_is_named_or_tied_and_fitted_to_its_size():
+    found = diagnose(motions(pendulum, spring=0.8))
+    said = verdict(found)
     (cause,) = said["causes"]
-    assert (cause["effect"], cause["joint"], said["status"]) == ("parallel_spring", "arm", "explained")
-    stiffness, rest = cause["parameters"]
+    assert "parallel_spring@arm" in {cause_label(one) for one in (cause, *cause["indistinguishable_from"])}
+    assert said["status"] == "explained"
+    (spring,) = verdict(naming(found, "parallel_spring@arm"))["causes"]
+    stiffness, rest = spring["parameters"]
     assert stiffness["value"] == pytest.approx(0.8, rel=0.05)
     assert stiffness["ci95"][0] < 0.8 < stiffness["ci95"][1]
     assert (rest["value"], rest["unit"]) == (pytest.approx(0.3, abs=0.03), "rad")
