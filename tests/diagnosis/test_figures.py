@@ -7,16 +7,17 @@ import pytest
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
-from pipelines.diagnosis import figures, replayed
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.diagnosis.fit.fitted_model import model_of_run
+from pipelines.diagnosis.verdict import figures, worst_stretch
 from pipelines.diagnosis.verdict.error_budget import scatter_between_periods, shares_of_causes
 from pipelines.diagnosis.verdict.figures.against import against
 from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.dynamics.replay import replay
 from pipelines.errors import InputError
 from pipelines.signals.binned_mean import binned_mean
+from tests.diagnosis.naming import naming
 from tests.diagnosis.sessions import session
 
 
@@ -38,6 +39,8 @@ MADE = {
     "spoilt": lambda: [replace(m, torque=m.torque * [1.0, -1.0]) for m in session(seed=8)],
     "nothing": session,
 }
+NAMED = dict.fromkeys(("explained", "one kind, no periods"), "parallel_spring@knee")
+"""What is named in some of them, whatever may be tied with it."""
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +51,7 @@ def diagnosed():
     def of(name):
         if name not in made:
             found = diagnose(MADE[name]())
+            found = naming(found, NAMED[name]) if name in NAMED else found
             made[name] = found, verdict(found)
         return made[name]
 
@@ -113,7 +117,7 @@ def test_every_figure_is_drawn_whatever_the_verdict(diagnosed, name, tmp_path):
     figures.draw(*diagnosed(name), tmp_path)
     written = {path.name: path.read_bytes()[:4] for path in tmp_path.iterdir()}
     assert written == {f"{stem}.png": b"\x89PNG" for stem in figures.FIGURES} | {
-        f"{stem}.pdf": b"%PDF" for stem in ("verdict", "error-budget")
+        f"{stem}.pdf": b"%PDF" for stem in ("decision", "verdict", "error-budget")
     }
 
 
@@ -124,6 +128,27 @@ def test_the_verdicts_bars_are_as_long_as_their_shares(diagnosed, name):
     drawn = [bar.get_width() for bar in bars]
     wanted = [100 * s / sum(shares.values()) for shares in said["error_budget"].values() for s in shares.values()]
     np.testing.assert_allclose(drawn, wanted)
+
+
+@pytest.mark.parametrize("name", ["explained", "one kind, no periods", "unknown", "nothing"])
+def test_the_decisions_bars_are_as_long_as_the_shares_of_the_residual_and_the_probabilities_of_sets(diagnosed, name):
+    found, said = diagnosed(name)
+    shares, sets = figures.FIGURES["decision"](found, said).axes
+    parts = [
+        said["router"][joint][part] or 0.0
+        for joint in found.baseline.joints
+        for part in ("noise", "wanders", "between_runs", "repeats", "unsplit")
+    ]
+    drawn = [bar.get_width() for bar in shares.patches]
+    np.testing.assert_allclose(drawn, [part for part in parts if part > 0.0])
+    assert sum(drawn) == pytest.approx(len(found.baseline.joints), abs=1e-9), "each joint's add up to one"
+    likely = sorted(found.selected.posterior.by_labels.values(), reverse=True)
+    np.testing.assert_allclose([bar.get_width() for bar in sets.patches], likely[: len(sets.patches)])
+
+
+def test_no_set_is_weighed_where_acquisition_is_at_fault(diagnosed):
+    _, sets = figures.FIGURES["decision"](*diagnosed("spoilt")).axes
+    assert [text.get_text() for text in sets.texts] == ["not asked: acquisition is at fault"]
 
 
 def test_a_spring_is_shown_against_its_joints_angle(diagnosed):
@@ -163,7 +188,7 @@ def test_the_figures_models_stray_as_far_as_the_verdict_says(diagnosed):
     found, _ = diagnosed("explained")
     errors = [replay(model_of_run(found.after.fit, found.baseline, run), run.motion).error for run in found.validate]
     pooled = np.concatenate([error.reshape(-1, 2) for error in errors])
-    np.testing.assert_allclose(np.sqrt(np.mean(pooled**2, axis=0)), found.strayed["extended"], rtol=1e-6)
+    np.testing.assert_allclose(np.sqrt(np.mean(pooled**2, axis=0)), found.simulation_error["extended"], rtol=1e-6)
 
 
 def test_a_model_that_no_leg_has_is_said_not_to_be_simulated(diagnosed, monkeypatch):
@@ -171,7 +196,7 @@ def test_a_model_that_no_leg_has_is_said_not_to_be_simulated(diagnosed, monkeypa
         raise InputError("no such leg")
 
     found, said = diagnosed("explained")
-    monkeypatch.setattr(replayed, "replay", impossible)
+    monkeypatch.setattr(worst_stretch, "replay", impossible)
     nowhere = dict.fromkeys(found.baseline.joints)
     drawn = figures.FIGURES["simulation"](found, said | {"baseline_simulation_rmse_rad": nowhere})
     words = [text.get_text() for text in drawn.legends[0].get_texts()]
