@@ -304,20 +304,6 @@ def _shapes(effect: Effect, runs: Sequence[Run]) -> Iterator[Candidate]:
 
 
 def _seen(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> NDArray:
-    """Return the values of a shape parameter that stand for its range; of a ripple, those that blocks pass.
-
-    Faster ones are found at the full sampling rate (``order_tracking``), where they show no less.
-    """
-    values = values_in(effect, parameter, SHAPES, runs)
-    if parameter.unit not in TURNS or effect.joint is None:
-        return values
-    j = runs[0].motion.joint_index(effect.joint)
-    speeds = np.concatenate([run.state[1][:, j] for run in runs])
-    fastest = 2.0 * np.pi * runs[0].bandwidth_hz / float(np.sqrt(np.mean(speeds**2)))
-    return values[values <= max(fastest, values[0])]
-
-
-def _seen(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> NDArray:
     """Return the values of a shape parameter that stand for its range.
 
     Of a ripple, those that blocks pass: faster ones are found at the full sampling rate
