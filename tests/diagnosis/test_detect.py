@@ -4,16 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pipelines.diagnosis.choice import MATERIAL, NEEDED
 from scipy.signal import lfilter
 
 from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.candidates.columns import torque_columns
+from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.detectability.detectability import POWER, Look, _alike, detectability, needed_noncentrality
 from pipelines.diagnosis.detectability.planned_runs import planned_motions, planned_noise
 from pipelines.diagnosis.evidence.baseline import baseline_of
 from pipelines.diagnosis.evidence.baseline_columns import columns_under
-from pipelines.diagnosis.evidence.model_error import IMPERFECTION
 from pipelines.diagnosis.evidence.noise_floor import Floor
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.mechanics.fourier import FourierTrajectory
@@ -74,7 +73,9 @@ def test_an_effect_of_the_smallest_size_is_found_as_often_as_promised(label):
     candidate = Candidate(one.effect, ((),))
     own = [torque_columns(candidate, r, run)[:, :2] for r, run in enumerate(runs)]
     plain = [columns_under((), run, baseline)[0][:, :2] for run in runs]
-    root = np.sqrt(share) / rms
+    root = np.sqrt(CRITERIA.drive_weight * share) / rms
+    independent = share * max(sum(run.usable[:, o].sum() for run in runs) for o in (0, 1))
+    price = 0.5 * np.log(independent) - CRITERIA.cause
     effect = one.smallest * rows_of(own, runs, root)[:, 0]
     basis = np.linalg.qr(rows_of(plain, runs, root))[0]
     left = effect - basis @ (basis.T @ effect)
@@ -86,8 +87,9 @@ def test_an_effect_of_the_smallest_size_is_found_as_often_as_promised(label):
         noise = rows_of([coloured(rng, rms, run.measured[:, :2].shape) for run in runs], runs, root)
         for factor in found:
             gain = 0.5 * (left @ (factor * effect + noise)) ** 2  # what the fit's squared error drops by
-            found[factor] += gain > NEEDED + 0.5
-    # Slow effects meet the noise at its strongest, where the integrated correlation is exact; fast ones fare better.
+            found[factor] += gain > price
+    # Slow effects meet the noise at its strongest, where the integrated correlation is exact; fast ones fare better,
+    # and a likelihood that counts less than its rows do promises less than it holds.
     assert POWER - 0.07 < found[1.0] / trials
     assert found[0.3] / trials < 0.1
 
@@ -97,21 +99,16 @@ def test_the_needed_noncentrality_is_the_square_of_two_quantiles():
     assert needed_noncentrality(1, 6.5, 0.9) == pytest.approx((np.sqrt(13.0) + 1.2816) ** 2, rel=1e-3)
 
 
-def test_what_is_material_takes_its_share_of_a_joints_error_and_of_its_torque():
-    rms = np.array([0.05, 0.05])
-    runs = 3 * runs_on(RICH)  # so much data that anything would show
-    floor = Floor(np.append(rms, [np.nan, np.nan]), np.ones(4), from_periods=False)
-    one = next(d for d in detectability(runs, baseline_of(runs), floor) if d.effect.label == "torque_drift@knee")
-    assert one.limited_by == "materiality"
-    baseline = baseline_of(runs)
-    plain = np.concatenate([columns_under((), run, baseline)[0][:, :2][run.usable[:, :2]] for run in runs])
-    drift = [one.smallest * (run.time - run.time.mean())[:, np.newaxis] * [0.0, 1.0] for run in runs]
-    y = np.concatenate([d[run.usable[:, :2]] for d, run in zip(drift, runs, strict=True)])
-    left = y - plain @ np.linalg.lstsq(plain, y, rcond=1e-12)[0]
-    at_knee = np.concatenate([np.nonzero(run.usable[:, :2])[1] for run in runs]) == 1
-    of_error = rms[1] * np.sqrt(1.0 / (1.0 - MATERIAL) ** 2 - 1.0)
-    of_torque = IMPERFECTION[0] * np.sqrt(np.mean(np.concatenate([r.measured[r.usable[:, 1], 1] for r in runs]) ** 2))
-    assert np.sqrt(np.mean(left[at_knee] ** 2)) == pytest.approx(max(of_error, of_torque), rel=0.02)
+def test_where_anything_would_show_an_effect_must_be_some_times_what_a_good_rig_has():
+    runs = 3 * runs_on(RICH)
+    found = []
+    for rms in (0.05, 0.025):
+        floor = Floor(np.array([rms, rms, np.nan, np.nan]), np.ones(4), from_periods=False)
+        found += [d for d in detectability(runs, baseline_of(runs), floor) if d.effect.label == "quadratic_drag@knee"]
+    assert [one.limited_by for one in found] == ["materiality"] * 2
+    loud, quiet = (one.smallest_rms_nm / one.torque_rms_nm for one in found)
+    assert 2.0 * CRITERIA.background_cause < loud < 8.0 * CRITERIA.background_cause
+    assert quiet == pytest.approx(loud, rel=1e-3), "half the noise shows none that is smaller"
 
 
 @pytest.mark.parametrize(
@@ -145,11 +142,12 @@ def test_a_single_sine_hides_a_spring_that_a_rich_motion_shows(rich):
     assert spring.smallest_rms_nm < 0.1 * spring.torque_rms_nm
 
 
-def test_twice_the_noise_hides_effects_twice_as_large(rich):
+def test_twice_the_noise_hides_effects_twice_as_large():
     floor = planned_noise(NOISE, 200.0, BlockAverage(5))
-    louder = looked_at(RICH, replace(floor, rms=2 * floor.rms))
+    loud, louder = (looked_at(RICH, replace(floor, rms=times * floor.rms)) for times in (5.0, 10.0))
     for label in ("viscous_asymmetry@knee", "cogging@hip", "encoder_offset@hip"):
-        assert louder[label].smallest_rms_nm == pytest.approx(2 * rich[label].smallest_rms_nm, rel=0.1)
+        assert loud[label].limited_by == louder[label].limited_by == "noise"
+        assert louder[label].smallest_rms_nm == pytest.approx(2 * loud[label].smallest_rms_nm, rel=0.1)
 
 
 def test_planned_noise_is_what_block_averages_of_coloured_noise_have():
