@@ -4,33 +4,38 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pipelines.diagnosis.examined import Examined, Extended
-from pipelines.diagnosis.status import WANDERING, Standing
 from scipy.optimize import brentq
 from scipy.signal import butter, lfilter
 
-from pipelines.diagnosis import impacts
 from pipelines.diagnosis.candidates.candidate import Candidate, lowest
+from pipelines.diagnosis.candidates.shape_refinement import changed, free_shapes
 from pipelines.diagnosis.dependence.spectral_lines import strongest_tone
+from pipelines.diagnosis.evidence import impact_bursts
 from pipelines.diagnosis.evidence.baseline import baseline_of, with_load
 from pipelines.diagnosis.evidence.baseline_columns import columns_under
 from pipelines.diagnosis.evidence.cuff_coherence import evidence_of_will
 from pipelines.diagnosis.evidence.impact_bursts import evidence_of_play
 from pipelines.diagnosis.evidence.noise_floor import slow_scatter
 from pipelines.diagnosis.evidence.observed_run import FOLDS, observe
-from pipelines.diagnosis.evidence.slow_error import SlowError, slow_error
-from pipelines.diagnosis.fit.joint_fit import _scale, fit, refined
-from pipelines.diagnosis.fit.validation_error import Errors
-from pipelines.effects import Backlash, Cogging, EncoderOffset, Parameter, TorqueDrift, ViscousAsymmetry
+from pipelines.diagnosis.evidence.slow_error import slow_error
+from pipelines.diagnosis.fit.joint_fit import fit
+from pipelines.diagnosis.fit.joint_refinement import Refinement
+from pipelines.effects import Cogging, ViscousAsymmetry, VoluntaryTorque
 from tests.diagnosis.sessions import session
 
 NOISE = 0.5
+WANDERING = 3.0
+"""Slow scatter between periods over that of noise, from which something moves that does not repeat."""
 
 
 @pytest.fixture(scope="module")
-def run():
-    motion = session(seconds=40.0)[1]
-    observed = observe(motion)
+def motions():
+    return session(seconds=40.0)
+
+
+@pytest.fixture(scope="module")
+def run(motions):
+    observed = observe(motions[1])
     baseline = baseline_of([observed])
     values = np.zeros(baseline.size)
     values[:4] = 1.5, 0.2, 0.4, 2.0
@@ -38,8 +43,8 @@ def run():
 
 
 @pytest.fixture(scope="module")
-def worn():
-    return observe(session(seconds=40.0)[3])
+def worn(motions):
+    return observe(motions[3])
 
 
 def noise(run, seed=0):
@@ -140,7 +145,7 @@ def test_what_goes_smoothly_with_a_motion_that_is_fast_where_the_load_changes_si
     eccentric[:, 1] += 0.3 * ddq[:, 1] * (1.0 + 0.5 * np.sin(q[:, 1] + 1.0))
     assert evidence_of_play([fast], [eccentric], 1 / 6)[1] < 2.0
     with monkeypatch.context() as deaf:
-        deaf.setattr(impacts, "BLOCKS_EACH", 10**9)
+        deaf.setattr(impact_bursts, "BLOCKS_EACH", 10**9)
         assert evidence_of_play([fast], [eccentric], 1 / 6)[1] > 6.0, "without a law taken off it passes for bursts"
     loud = noise(run)
     loud[np.abs(np.sin(at)) < 0.3, 1] *= 3.0
@@ -171,89 +176,6 @@ def test_a_drag_of_the_machines_own_and_noise_are_no_push(worn):
     assert np.all(np.array(silent) == 0.0)
 
 
-def standing(before, after, floor=1.0, torque=20.0, samples=500.0):
-    """One joint's errors, the other at the floor, no cuffs; slow and all errors alike."""
-    floors = np.array([floor, floor, np.inf, np.inf])
-    errors = [SlowError(np.array([rms, floor, 0.0, 0.0]), floors, np.full(4, samples)) for rms in (before, after)]
-    drives = (e.rms[:2] for e in errors)
-    return Standing(floors[:2], *drives, *errors, np.array([torque, torque, 0.0, 0.0]))
-
-
-def test_what_is_a_little_off_in_every_cuff_does_not_outweigh_what_is_missing_in_a_drive():
-    floors = np.array([1.0, 1.0, 0.02, 0.02])
-    before, after = (SlowError(np.array([rms, 1.0, 0.1, 0.1]), floors, np.full(4, 500.0)) for rms in (1.5, 1.0))
-    made = Standing(floors[:2], before.rms[:2], after.rms[:2], before, after, np.array([20.0, 20.0, 10.0, 10.0]))
-    assert made.held_up([EncoderOffset(joint="hip")])
-    loud = replace(before, rms=np.array([1.5, 1.0, 0.6, 0.6])), replace(after, rms=np.array([1.0, 1.0, 0.6, 0.6]))
-    assert not replace(made, slow_before=loud[0], slow_after=loud[1]).held_up([EncoderOffset(joint="hip")])
-
-
-def test_causes_are_dropped_where_plain_error_is_left_and_three_of_them_sooner():
-    play = [Backlash(joint="hip")]
-    assert standing(3.0, 1.05).held_up(play)
-    assert not standing(3.0, 2.9).held_up(play)
-    springless = [EncoderOffset(joint="hip")]
-    assert not standing(3.0, 2.2).held_up(springless)
-    assert standing(3.0, 1.5).held_up(springless)
-    assert not standing(3.0, 1.5).held_up(springless * 3)
-    assert standing(3.0, 2.2).held_up(play), "what rings is not followed to the end"
-    assert standing(3.0, 2.2).held_up([TorqueDrift(joint="hip")]), "nor is what goes with wall time"
-
-
-def test_a_hum_is_no_doubt_of_a_cause_that_takes_all_error_and_of_no_other():
-    assert standing(3.0, 1.0).leaves_nothing
-    assert not standing(3.0, 1.5).leaves_nothing
-    assert not standing(1.05, 1.0).leaves_nothing, "there was nothing to take"
-
-
-def test_what_takes_nothing_away_is_no_cause_however_little_there_was():
-    drag = [EncoderOffset(joint="hip")]
-    assert not standing(1.1, 1.1, torque=100.0).held_up(drag)
-    assert not standing(1.0, 1.0, torque=100.0).held_up(drag)
-    assert standing(1.1, 1.0, torque=100.0).held_up(drag)
-
-
-def test_an_error_that_grows_on_other_runs_is_no_cause():
-    assert not standing(1.5, 1.6).held_up([Backlash(joint="hip")])
-
-
-def test_a_cause_without_which_other_runs_are_plainly_explained_better_is_no_help_unless_it_was_heard():
-    def leaving(squares):
-        errors = Errors(np.array(squares)[:, np.newaxis], np.full(len(squares), 100), np.ones(1))
-        return Extended(fit=None, runs=(), residuals=(), errors=errors)
-
-    made = Examined(
-        after=leaving([1.0, 1.1, 0.9, 1.0]), floor=None, standing=None, unsteady=False, holds_up=True, sure=(),
-        without={"helps": leaving([2.0, 2.1, 1.9, 2.0]), "harms": leaving([0.9, 1.0, 0.8, 0.9]),
-                 "may": leaving([1.2, 0.9, 1.1, 0.9])},
-    )  # fmt: skip
-    assert made.helpful == ("helps", "may")
-    assert replace(made, sure=("harms",)).helpful == ("helps", "harms", "may")
-
-
-def test_trust_falls_with_what_is_plainly_left():
-    assert standing(3.0, 1.0).trust == pytest.approx(1.0)
-    assert standing(3.0, 2.0, torque=0.0).trust == pytest.approx(1.0 - 0.5 * 3.0 / 8.0)
-    assert standing(1.2, 1.1, samples=20.0).trust > 0.9, "what chance could have left is not held against a cause"
-
-
-def test_a_hum_that_the_causes_took_most_of_is_their_misfit_and_any_other_is_foreign():
-    made = standing(3.0, 1.05)
-    silence, hip, shaken = np.zeros(2), np.array([2.0, 0.5]), np.array([0.8, 0.5])
-    assert not made.hums(silence, silence, made.floor)
-    assert made.hums(hip, hip, made.floor), "what no cause touches"
-    assert not made.hums(hip, shaken, made.floor), "a ripple that is explained, and what it shakes at the other joint"
-    assert made.hums(hip, 0.6 * hip, made.floor)
-    assert made.hums(np.array([0.0, 2.0]), np.array([0.0, 1.9]), made.floor)
-
-
-def test_a_hum_that_is_little_beside_what_there_was_is_no_reason_to_doubt_a_cause():
-    made = standing(5.0, 1.05)
-    assert made.is_minor(np.array([1.0, 0.5]))
-    assert not made.is_minor(np.array([3.0, 0.5]))
-    assert not standing(1.0, 1.0).is_minor(np.array([0.4, 0.0])), "nothing else was missing"
-
-
 @pytest.mark.parametrize(("speed_share", "absurd"), [(0.2, False), (3.0, True)])
 def test_a_large_amplitude_is_absurd_only_where_it_carries_most_of_the_joints_torque(run, speed_share, absurd):
     cause, J = Candidate(ViscousAsymmetry(joint="hip"), ((),)), 2
@@ -282,10 +204,11 @@ def test_causes_beside_which_the_machine_has_no_mass_are_absurd(run, least, unre
     assert bool(found.absurdity(baseline, run.motion.geometry)) == unreal
 
 
-def test_refinement_stays_at_the_maximum_that_the_scan_found():
-    rhythm = Parameter("frequency", "Hz", "", "f", (0.1, 3.0))
-    _, low, high = _scale(rhythm, 0.43, 1.0, -np.inf)
-    assert (low, high) == pytest.approx((0.42, 0.44))
+def test_a_step_of_the_refinement_stays_at_the_maximum_that_the_search_found():
+    rhythm = Candidate(VoluntaryTorque(joint="hip"), ((0.43,),))
+    ((i, unit),) = free_shapes(rhythm)
+    for step in (-50.0, 50.0):
+        assert changed(rhythm, i, unit, step).shapes[0][0] == pytest.approx(0.43, abs=0.01)
 
 
 def test_a_run_shorter_than_its_period_is_still_dealt_out_to_every_fold(run):
@@ -300,5 +223,5 @@ def test_a_wave_that_does_not_come_again_within_the_motion_is_no_cogging(run):
     measured[:, 1] += 5.0 * np.sin(2.0 * np.pi * (angle - angle.min()) / np.ptp(angle))
     runs = [replace(run, measured=measured)]
     least = lowest(ripple, ripple.shape[0], runs)
-    found = refined([Candidate(ripple, ((least + 0.5,),))], runs, baseline, np.ones(4))
+    found = Refinement(runs, baseline, np.ones(4))([Candidate(ripple, ((least + 0.5,),))])
     assert found.causes[0].shapes[0][0] * np.ptp(angle) / (2.0 * np.pi) >= 1.5
