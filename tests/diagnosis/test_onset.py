@@ -15,7 +15,7 @@ from pipelines.diagnosis.evidence.baseline import baseline_of
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.diagnosis.fit.change_point import ALWAYS, NEVER, Onset
 from pipelines.diagnosis.fit.held_out import settled
-from pipelines.diagnosis.fit.joint_fit import refined
+from pipelines.diagnosis.fit.joint_refinement import Refinement
 from pipelines.diagnosis.fit.uncertainty import uncertainty
 from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.effects import PayloadChange
@@ -49,7 +49,7 @@ def fitted(runs, begun):
     """Return the fit of a load that is handed over, sought from the instants that it may have been ``begun`` at."""
     baseline = baseline_of(runs)
     cause = Candidate(PayloadChange(joint="arm", on=baseline.machine), tuple((t, 0.3) for t in begun))
-    return refined([cause], runs, baseline, np.array([1.0, 0.0])), baseline
+    return Refinement(runs, baseline, np.array([1.0, 0.0]))([cause]), baseline
 
 
 def onset_of(run, noise, pull, instant):
