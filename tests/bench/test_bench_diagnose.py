@@ -4,18 +4,17 @@ from tests.bench.bench_diagnose import (
     catalogue_rows,
     length_rows,
     order_rows,
+    posterior_rows,
     recorded,
-    search_rows,
 )
 
 
-def test_the_search_outruns_a_refit_of_every_combination():
-    searched, every, same, each = search_rows(recorded(20.0), sample=3)
-    assert "3 causes" in searched.name
-    # Of 20 s; which of the two naive searches takes longer is not held to anything, scaled up from 3 sets as they are.
-    assert every.ratio > 5.0
-    assert same.ratio > 1.0
-    assert "scaled up from 3 sets" in each.name
+def test_the_posterior_outruns_a_refit_of_every_pair():
+    library, weighed, refitted = posterior_rows(recorded(20.0), sample=10)
+    assert "shapes" in library.name
+    assert "sets in full" in weighed.name
+    assert "scaled up from 10" in refitted.name
+    assert refitted.ratio > 3.0
 
 
 def test_a_smaller_catalogue_offers_fewer_shapes():
