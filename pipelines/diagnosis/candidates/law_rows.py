@@ -15,8 +15,8 @@ from pipelines.diagnosis.candidates.smooth_laws import (
     curves_of_time,
     smooth_laws,
 )
-from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.evidence.decision_band import LENGTH_S
+from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
 
