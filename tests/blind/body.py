@@ -10,16 +10,22 @@ from pathlib import Path
 import llvmlite.binding
 import mujoco
 import numpy as np
-from numba import njit, types
+from numba import types
 from numpy.typing import NDArray
 
-llvmlite.binding.load_library_permanently(str(next(Path(mujoco.__file__).parent.glob("libmujoco.so*"))))
+from tests.blind.compiled import njit
+
+llvmlite.binding.load_library_permanently(
+    str(next(Path(mujoco.__file__).parent.glob("libmujoco.so*")))
+)
 _PASS = types.void(types.intp, types.intp)
 _kinematics = types.ExternalFunction("mj_kinematics", _PASS)
 _com_pos = types.ExternalFunction("mj_comPos", _PASS)
 _inertia = types.ExternalFunction("mj_crb", _PASS)
 _com_vel = types.ExternalFunction("mj_comVel", _PASS)
-_newton_euler = types.ExternalFunction("mj_rne", types.void(types.intp, types.intp, types.int32, types.intp))
+_newton_euler = types.ExternalFunction(
+    "mj_rne", types.void(types.intp, types.intp, types.int32, types.intp)
+)
 
 PAYLOAD_INERTIA = 1e-3
 """kg·m² per kg of a payload, about its own centre."""
@@ -27,7 +33,8 @@ PAYLOAD_INERTIA = 1e-3
 
 @dataclass(frozen=True)
 class Segment:
-    """A rigid link: mass (kg), centre of mass along and in front of its axis (m), inertia about that centre (kg·m²)."""
+    """A rigid link: mass (kg), centre of mass along and in front of its axis (m), inertia about
+    that centre (kg·m²)."""
 
     mass: float
     along: float
@@ -39,7 +46,10 @@ class Segment:
         mass = self.mass + other.mass
         along = (self.mass * self.along + other.mass * other.along) / mass
         forward = (self.mass * self.forward + other.mass * other.forward) / mass
-        inertia = sum(s.inertia + s.mass * ((s.along - along) ** 2 + (s.forward - forward) ** 2) for s in (self, other))
+        inertia = sum(
+            s.inertia + s.mass * ((s.along - along) ** 2 + (s.forward - forward) ** 2)
+            for s in (self, other)
+        )
         return Segment(mass, along, inertia, forward)
 
 
@@ -57,7 +67,8 @@ class Leg:
         return Leg(self.thigh + other.thigh, self.shank + other.shank, self.length, self.gravity)
 
     def inertial(self) -> NDArray:
-        """X1..X4 of the leg: what an identification should find where the centres lie on the axes."""
+        """X1..X4 of the leg: what an identification should find where the centres lie on the
+        axes."""
         t, s = self.thigh, self.shank
         X2 = s.mass * s.along**2 + s.inertia
         X1 = t.mass * t.along**2 + t.inertia + s.mass * self.length**2 + X2
@@ -66,7 +77,8 @@ class Leg:
 
 @dataclass(frozen=True)
 class Payload:
-    """A lump on a segment (0 thigh, 1 shank), ``distance`` m down its axis; its mass is set as time goes by."""
+    """A lump on a segment (0 thigh, 1 shank), ``distance`` m down its axis; its mass is set as time
+    goes by."""
 
     joint: int
     distance: float
@@ -82,13 +94,25 @@ class Body:
 
     @property
     def handles(self) -> tuple:
-        """What the compiled loop takes: addresses, state, bias, mass matrix (lower triangle), masses, gravity."""
+        """What the compiled loop takes: addresses, state, bias, mass matrix (lower triangle),
+        masses, gravity."""
         m, d = self.model, self.data
         pattern = np.array([m.M_rowadr, m.M_rownnz]).astype(np.int64)
         return (
-            m._address, d._address, d.qpos, d.qvel, d.qacc, d.qfrc_bias, d.M, pattern, m.M_colind.astype(np.int64),
-            m.body_mass, m.body_subtreemass, m.body_inertia, m.opt.gravity,
-        )  # fmt: skip
+            m._address,
+            d._address,
+            d.qpos,
+            d.qvel,
+            d.qacc,
+            d.qfrc_bias,
+            d.M,
+            pattern,
+            m.M_colind.astype(np.int64),
+            m.body_mass,
+            m.body_subtreemass,
+            m.body_inertia,
+            m.opt.gravity,
+        )
 
     def inverse(self, q: NDArray, dq: NDArray, ddq: NDArray) -> NDArray:
         """Torque that moves the leg along a motion, (n, 2) N·m."""
@@ -98,7 +122,8 @@ class Body:
 
 
 def mjcf(leg: Leg, wearer: Leg | None = None, payload: Payload | None = None) -> str:
-    """Return the model: hinges turn about -y, so that with z up and the leg hanging, forward (x) is positive.
+    """Return the model: hinges turn about -y, so that with z up and the leg hanging, forward (x) is
+    positive.
 
     A wearer who is not one with the machine hangs beside it as a second leg.
     """
@@ -119,14 +144,15 @@ def _chain(leg: Leg, inside: list[str]) -> str:
 
 
 def _inertial(s: Segment) -> str:
-    # Only the inertia about the hinges' direction matters; the others keep MuJoCo's triangle inequality.
+    # Only the inertia about the hinges' direction matters; the others keep MuJoCo's triangle
+    # inequality.
     return (
         f'<inertial pos="{s.forward!r} 0 {-s.along!r}" mass="{s.mass!r}" '
         f'diaginertia="{s.inertia!r} {s.inertia!r} {s.inertia!r}"/>'
     )
 
 
-@njit(cache=True)
+@njit()
 def evaluate(model, data, bias):
     """Bring mass matrix and bias torque (Coriolis, gravity) up to the state in qpos and qvel."""
     _kinematics(model, data)
@@ -136,7 +162,7 @@ def evaluate(model, data, bias):
     _newton_euler(model, data, 0, bias.ctypes.data)
 
 
-@njit(cache=True)
+@njit()
 def _inverse(model, data, qpos, qvel, qacc, bias, q, dq, ddq):
     torque = np.empty_like(q)
     for k in range(len(q)):

@@ -1,8 +1,8 @@
 """The catalogue's causes as a plant would have them: for each, several functional forms.
 
-``FORMS[cause]`` lists functions that draw one form's shape and return a ``Cause``; ``own`` marks the forms
-that the catalogue itself writes down, all others are what the literature offers beside them. ``size`` is the
-one number by which a cause's magnitude is set.
+``FORMS[cause]`` lists functions that draw one form's shape and return a ``Cause``; ``own`` marks
+the forms that the catalogue itself writes down, all others are what the literature offers beside
+them. ``size`` is the one number by which a cause's magnitude is set.
 """
 
 from collections.abc import Callable
@@ -10,17 +10,22 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
+from numpy.typing import NDArray
 
 from tests.blind import dry, smooth
 from tests.blind.body import Payload, Segment
 from tests.blind.excitation import HIGHEST, LOWEST
-from tests.blind.loop import ELASTIC, PLAY, PLAY_HERTZ, WIND_UP
+from tests.blind.families import OF_CATALOGUE
 from tests.blind.plan import HIP, JOINTS, KNEE, Plan, Run
+from tests.blind.transmissions import ELASTIC, PLAY, PLAY_HERTZ, WIND_UP
 from tests.blind.wandering import random_walk
 
 Install = Callable[[Plan, float, Run], None]
 Spec = tuple[str, int | None]
 """An effect and its joint; none for the whole leg."""
+Reach = tuple[NDArray, NDArray]
+"""Least and greatest angle of each joint that a motion comes to."""
+BOUNDS: Reach = (LOWEST, HIGHEST)
 
 
 @dataclass(frozen=True)
@@ -44,6 +49,17 @@ class Cause:
     human: bool = False
     slow: bool = False
     """Does it change over a whole run?"""
+    fast: bool = False
+    """Is it too fast for block averages, and told sample by sample?"""
+    follows_temperature: bool = False
+    """Is it read off the recorded temperature?"""
+    families: tuple[str, ...] = ()
+    """Kinds of law that it may be said to be (``families.py``)."""
+    repeats: bool = True
+    """Is it the same in every period of the motion?"""
+    at_both_joints: bool = False
+    held_back: bool = False
+    """Is it never shown to what learns from sessions?"""
     kin: tuple[str, ...] = ()
     """Causes of the contract that a person would call it by, where it is none of them."""
 
@@ -61,15 +77,44 @@ Form = Callable[[Generator, int], Cause]
 FORMS: dict[str, list[Form]] = {}
 
 
-def form(effect: str, *, own: bool = False) -> Callable:
-    """Register a form of a cause; the function's name is the form's."""
+WORLDS = ("mujoco", "planar", "two_mass")
+
+
+def form(
+    effect: str,
+    *,
+    own: bool = False,
+    worlds: tuple[str, ...] = WORLDS,
+    plain: bool = True,
+    warm: bool = False,
+) -> Callable:
+    """Register a form of a cause; the function's name is the form's.
+
+    ``worlds`` are those whose plants have it, ``plain`` cases draw from the forms of the first
+    examinations only, and ``warm`` forms need temperatures, which plain cases have not.
+    """
 
     def register(draw: Callable) -> Callable:
-        def made(rng: Generator, joint: int | None) -> Cause:
-            return Cause(effect=effect, form=draw.__name__, own=own, joint=joint, **draw(rng, joint))
+        within = draw.__code__.co_argcount > 2
+
+        def made(rng: Generator, joint: int | None, reach: Reach = BOUNDS) -> Cause:
+            drawn = draw(rng, joint, reach) if within else draw(rng, joint)
+            kind = OF_CATALOGUE[effect]
+            return Cause(
+                effect=effect,
+                form=draw.__name__,
+                own=own,
+                joint=joint,
+                families=kind.families,
+                repeats=kind.repeats,
+                **drawn,
+            )
 
         made.own = own
         made.form = draw.__name__
+        made.worlds = worlds
+        made.plain = plain
+        made.warm = warm
         FORMS.setdefault(effect, []).append(made)
         return draw
 
@@ -91,7 +136,9 @@ def either(rng: Generator) -> float:
     return float(rng.choice([-1.0, 1.0]))
 
 
-def hidden_torque(kind: int, joint: int, *shape: float, sign: float = 1.0, human: bool = False) -> Install:
+def hidden_torque(
+    kind: int, joint: int, *shape: float, sign: float = 1.0, human: bool = False
+) -> Install:
     """Return an installer of a torque whose first parameter is the size."""
 
     def install(plan: Plan, size: float, run: Run) -> None:
@@ -107,9 +154,13 @@ def hidden_torque(kind: int, joint: int, *shape: float, sign: float = 1.0, human
 def _stribeck(kind, rng, joint):
     vs = rng.uniform(0.12, 0.45)
     return dict(
-        install=hidden_torque(kind, joint, vs), start=3.0, shape=(vs,),
-        parameters=lambda s: {"stribeck_torque": s, "stribeck_velocity": vs} if kind == dry.STRIBECK_GAUSS else {},
-    )  # fmt: skip
+        install=hidden_torque(kind, joint, vs),
+        start=3.0,
+        shape=(vs,),
+        parameters=lambda s: (
+            {"stribeck_torque": s, "stribeck_velocity": vs} if kind == dry.STRIBECK_GAUSS else {}
+        ),
+    )
 
 
 @form("stribeck_friction", own=True)
@@ -131,57 +182,73 @@ def exponential(rng, joint):
 def by_direction(rng, joint):
     sign = either(rng)
     return dict(
-        install=hidden_torque(dry.ASYMMETRY, joint, sign=sign), start=1.0, parameters=lambda s: {"asymmetry": sign * s}
+        install=hidden_torque(dry.ASYMMETRY, joint, sign=sign),
+        start=1.0,
+        parameters=lambda s: {"asymmetry": sign * s},
     )
 
 
 @form("coulomb_asymmetry")
 def smooth_transition(rng, joint):
     width = rng.uniform(0.05, 0.2)
-    return dict(install=hidden_torque(dry.ASYMMETRY_SMOOTH, joint, width, sign=either(rng)), start=1.0, shape=(width,))
+    return dict(
+        install=hidden_torque(dry.ASYMMETRY_SMOOTH, joint, width, sign=either(rng)),
+        start=1.0,
+        shape=(width,),
+    )
 
 
 @form("viscous_asymmetry", own=True)
 def by_speed(rng, joint):
     sign = either(rng)
     return dict(
-        install=hidden_torque(smooth.VISCOUS_ASYMMETRY, joint, sign=sign), start=2.0,
+        install=hidden_torque(smooth.VISCOUS_ASYMMETRY, joint, sign=sign),
+        start=2.0,
         parameters=lambda s: {"asymmetry": sign * s},
-    )  # fmt: skip
+    )
 
 
 @form("viscous_asymmetry")
 def rounded(rng, joint):
     width = rng.uniform(0.1, 0.3)
     return dict(
-        install=hidden_torque(smooth.VISCOUS_ASYMMETRY_SMOOTH, joint, width, sign=either(rng)), start=2.0,
+        install=hidden_torque(smooth.VISCOUS_ASYMMETRY_SMOOTH, joint, width, sign=either(rng)),
+        start=2.0,
         shape=(width,),
-    )  # fmt: skip
+    )
 
 
 @form("load_dependent_friction", own=True)
 def proportional(rng, joint):
     return dict(
-        install=hidden_torque(dry.LOAD_LINEAR, joint), start=0.1, largest=0.45,
+        install=hidden_torque(dry.LOAD_LINEAR, joint),
+        start=0.1,
+        largest=0.45,
         parameters=lambda s: {"load_coefficient": s},
-    )  # fmt: skip
+    )
 
 
 @form("load_dependent_friction")
 def root(rng, joint):
     scale = rng.uniform(10.0, 40.0)
-    return dict(install=hidden_torque(dry.LOAD_ROOT, joint, scale), start=0.1, largest=0.45, shape=(scale,))
+    return dict(
+        install=hidden_torque(dry.LOAD_ROOT, joint, scale), start=0.1, largest=0.45, shape=(scale,)
+    )
 
 
 @form("load_dependent_friction")
 def above_a_preload(rng, joint):
     onset = rng.uniform(1.0, 5.0)
-    return dict(install=hidden_torque(dry.LOAD_OFFSET, joint, onset), start=0.1, largest=0.5, shape=(onset,))
+    return dict(
+        install=hidden_torque(dry.LOAD_OFFSET, joint, onset), start=0.1, largest=0.5, shape=(onset,)
+    )
 
 
 @form("quadratic_drag", own=True)
 def quadratic(rng, joint):
-    return dict(install=hidden_torque(smooth.DRAG, joint, 2.0), start=2.0, parameters=lambda s: {"drag": s})
+    return dict(
+        install=hidden_torque(smooth.DRAG, joint, 2.0), start=2.0, parameters=lambda s: {"drag": s}
+    )
 
 
 @form("quadratic_drag")
@@ -193,9 +260,13 @@ def power(rng, joint):
 def _presliding(kind, rng, joint, *more):
     angle = log_uniform(rng, 0.015, 0.1)
     return dict(
-        install=hidden_torque(kind, joint, angle, *more), start=1.5, shape=(angle, *more),
-        parameters=lambda s: {"friction_torque": s, "presliding_angle": angle} if kind == smooth.DAHL else {},
-    )  # fmt: skip
+        install=hidden_torque(kind, joint, angle, *more),
+        start=1.5,
+        shape=(angle, *more),
+        parameters=lambda s: (
+            {"friction_torque": s, "presliding_angle": angle} if kind == smooth.DAHL else {}
+        ),
+    )
 
 
 @form("presliding_hysteresis", own=True)
@@ -229,10 +300,16 @@ def _warm_up(coulomb_kind, viscous_kind, rng, joint):
 
     own = coulomb_kind == dry.WARMUP_EXPONENTIAL
     return dict(
-        install=install, start=2.0, slow=True, shape=(time, share),
-        parameters=lambda s: {"viscous_drop": s * viscous, "coulomb_drop": s * share, "time_constant": time} if own
-        else {},
-    )  # fmt: skip
+        install=install,
+        start=2.0,
+        slow=True,
+        shape=(time, share),
+        parameters=lambda s: (
+            {"viscous_drop": s * viscous, "coulomb_drop": s * share, "time_constant": time}
+            if own
+            else {}
+        ),
+    )
 
 
 @form("friction_warmup", own=True)
@@ -248,9 +325,13 @@ def power_law(rng, joint):
 def _cogging(rng, joint, second):
     cycles, phase = float(rng.integers(8, 60)), rng.uniform(0.0, 2 * np.pi)
     return dict(
-        install=hidden_torque(smooth.COGGING, joint, cycles, phase, second, rng.uniform(0.0, 2 * np.pi)), start=1.0,
-        shape=(cycles, phase, second), parameters=lambda s: {"amplitude": s, "cycles_per_turn": cycles},
-    )  # fmt: skip
+        install=hidden_torque(
+            smooth.COGGING, joint, cycles, phase, second, rng.uniform(0.0, 2 * np.pi)
+        ),
+        start=1.0,
+        shape=(cycles, phase, second),
+        parameters=lambda s: {"amplitude": s, "cycles_per_turn": cycles},
+    )
 
 
 @form("cogging", own=True)
@@ -285,53 +366,60 @@ def carried_by_the_thigh(rng, joint):
     return dict(install=install, start=0.2, shape=(ratio,), parameters=lambda s: {"inertia": s})
 
 
-def _play(kind, rng, joint):
+def play(kind, rng, joint):
     stiffness, damping = log_uniform(rng, 2500.0, 6000.0), rng.uniform(2.0, 6.0)
 
     def install(plan: Plan, size: float, run: Run) -> None:
         plan.soft(joint, kind, stiffness, damping, size)
 
     return dict(
-        install=install, start=0.03, smallest=0.004, largest=0.2, shape=(stiffness, damping),
+        install=install,
+        start=0.03,
+        smallest=0.004,
+        largest=0.2,
+        shape=(stiffness, damping),
         parameters=lambda s: {"play": s} if kind == PLAY else {},
-    )  # fmt: skip
+    )
 
 
 @form("backlash")
 def two_masses_with_stiff_contact(rng, joint):
-    return _play(PLAY, rng, joint)
+    return play(PLAY, rng, joint)
 
 
 @form("backlash")
 def two_masses_with_hertzian_contact(rng, joint):
-    return _play(PLAY_HERTZ, rng, joint)
+    return play(PLAY_HERTZ, rng, joint)
 
 
-def _elastic(kind, rng, joint, *more):
+def elastic(kind, rng, joint, *more):
     def install(plan: Plan, size: float, run: Run) -> None:
         damping = 0.1 * np.sqrt(0.04 / size)
         plan.soft(joint, kind, 1.0 / size, damping, *more)
 
     return dict(
-        install=install, start=1 / 800.0,
-        smallest=1 / 4000.0, largest=1 / 90.0, shape=more,
+        install=install,
+        start=1 / 800.0,
+        smallest=1 / 4000.0,
+        largest=1 / 90.0,
+        shape=more,
         parameters=lambda s: {"stiffness": 1.0 / s} if not more else {},
-    )  # fmt: skip
+    )
 
 
 @form("joint_elasticity", own=True)
 def two_masses(rng, joint):
-    return _elastic(ELASTIC, rng, joint)
+    return elastic(ELASTIC, rng, joint)
 
 
 @form("joint_elasticity")
 def hardening(rng, joint):
-    return _elastic(ELASTIC, rng, joint, log_uniform(rng, 50.0, 800.0))
+    return elastic(ELASTIC, rng, joint, log_uniform(rng, 50.0, 800.0))
 
 
 @form("joint_elasticity")
 def soft_wind_up(rng, joint):
-    return _elastic(WIND_UP, rng, joint, rng.uniform(0.004, 0.02), rng.uniform(1.4, 2.2))
+    return elastic(WIND_UP, rng, joint, rng.uniform(0.004, 0.02), rng.uniform(1.4, 2.2))
 
 
 # --- Structure
@@ -340,9 +428,11 @@ def soft_wind_up(rng, joint):
 def _spring(rng, joint, cubic, damping):
     rest = rng.uniform(LOWEST[joint], HIGHEST[joint])
     return dict(
-        install=hidden_torque(smooth.SPRING, joint, rest, cubic, damping), start=5.0, shape=(rest, cubic, damping),
+        install=hidden_torque(smooth.SPRING, joint, rest, cubic, damping),
+        start=5.0,
+        shape=(rest, cubic, damping),
         parameters=lambda s: {"stiffness": s, "rest_angle": rest} if cubic == damping == 0 else {},
-    )  # fmt: skip
+    )
 
 
 @form("parallel_spring", own=True)
@@ -373,7 +463,11 @@ def swaying(rng, joint):
         plan.tilt += np.array([sign * size, depth * size, frequency])
 
     return dict(
-        install=install, start=0.05, largest=0.35, shape=(depth, frequency), parameters=lambda s: {"tilt": sign * s}
+        install=install,
+        start=0.05,
+        largest=0.35,
+        shape=(depth, frequency),
+        parameters=lambda s: {"tilt": sign * s},
     )
 
 
@@ -385,7 +479,12 @@ def point_mass(rng, joint):
     def install(plan: Plan, size: float, run: Run) -> None:
         plan.lumps.append((joint, Segment(size / distance, 0.15, 0.0, sign * distance)))
 
-    return dict(install=install, start=0.2, shape=(distance,), parameters=lambda s: {"mass_moment": sign * s})
+    return dict(
+        install=install,
+        start=0.2,
+        shape=(distance,),
+        parameters=lambda s: {"mass_moment": sign * s},
+    )
 
 
 @form("mass_off_axis")
@@ -399,11 +498,14 @@ def extended_body(rng, joint):
         plan.lumps.append((joint, Segment(mass, along, mass * gyration**2, sign * distance)))
 
     return dict(
-        install=install, start=0.2, shape=(distance, along, gyration), parameters=lambda s: {"mass_moment": sign * s}
+        install=install,
+        start=0.2,
+        shape=(distance, along, gyration),
+        parameters=lambda s: {"mass_moment": sign * s},
     )
 
 
-def _payload(rng, joint, ramp, *, everywhere):
+def payload(rng, joint, ramp, *, everywhere):
     distance, direction = rng.uniform(0.2, 0.35), either(rng)
     shared = rng.uniform(0.25, 0.75)
 
@@ -415,19 +517,22 @@ def _payload(rng, joint, ramp, *, everywhere):
             plan.load = np.array([size / distance, share * run.duration_s, ramp, direction])
 
     return dict(
-        install=install, start=0.5, slow=True, shape=(distance, ramp, direction),
+        install=install,
+        start=0.5,
+        slow=True,
+        shape=(distance, ramp, direction),
         parameters=lambda s: {"mass_moment": direction * s},
-    )  # fmt: skip
+    )
 
 
 @form("payload_change", own=True)
 def sudden(rng, joint):
-    return _payload(rng, joint, 0.01, everywhere=True)
+    return payload(rng, joint, 0.01, everywhere=True)
 
 
 @form("payload_change")
 def over_half_a_second(rng, joint):
-    return _payload(rng, joint, 0.5, everywhere=False)
+    return payload(rng, joint, 0.5, everywhere=False)
 
 
 # --- Sensors
@@ -471,15 +576,15 @@ def settling(rng, joint):
 
     def install(plan: Plan, size: float, run: Run) -> None:
         plan.channel.offset[joint] += sign * size
-        plan.channel.moving_offset[joint] = lambda t: 0.1 * sign * size * np.exp(-t / time)
+        plan.channel.moving_offset[joint].append(lambda t: 0.1 * sign * size * np.exp(-t / time))
 
     return dict(install=install, start=1.0, shape=(time,))
 
 
-def _drift(curve_of, rng, joint, parameters=lambda s: {}):
+def drift(curve_of, rng, joint, parameters=lambda s: {}):
     def install(plan: Plan, size: float, run: Run) -> None:
         curve = curve_of(run)
-        plan.channel.moving_offset[joint] = lambda t: size * curve(t)
+        plan.channel.moving_offset[joint].append(lambda t: size * curve(t))
 
     return dict(install=install, start=2.0, slow=True, parameters=parameters)
 
@@ -487,18 +592,20 @@ def _drift(curve_of, rng, joint, parameters=lambda s: {}):
 @form("torque_drift", own=True)
 def steady(rng, joint):
     sign = either(rng)
-    return _drift(lambda run: lambda t: sign * t / 70.0, rng, joint, lambda s: {"rate": sign * s / 70.0})
+    return drift(
+        lambda run: lambda t: sign * t / 70.0, rng, joint, lambda s: {"rate": sign * s / 70.0}
+    )
 
 
 @form("torque_drift")
 def exponential_approach(rng, joint):
     sign, time = either(rng), rng.uniform(15.0, 40.0)
-    return _drift(lambda run: lambda t: sign * (1.0 - np.exp(-t / time)), rng, joint)
+    return drift(lambda run: lambda t: sign * (1.0 - np.exp(-t / time)), rng, joint)
 
 
 @form("torque_drift")
 def smooth_random_walk(rng, joint):
-    return _drift(lambda run: random_walk(run.rng, run.duration_s, smoothing_s=6.0), rng, joint)
+    return drift(lambda run: random_walk(run.rng, run.duration_s, smoothing_s=6.0), rng, joint)
 
 
 @form("encoder_offset", own=True)
@@ -517,7 +624,7 @@ def with_slight_eccentricity(rng, joint):
 
     def install(plan: Plan, size: float, run: Run) -> None:
         plan.encoder_offset[joint] += sign * size
-        plan.wobble[joint] = depth * size, phase
+        plan.eccentric(joint, depth * size, phase)
 
     return dict(install=install, start=0.05, largest=0.3, shape=(depth, phase))
 
@@ -527,7 +634,9 @@ def _late(rng, joint, delay, lag, parameters=lambda s: {}):
         plan.channel.delay_s[joint] += delay * size
         plan.channel.lag_s[joint] += lag * size
 
-    return dict(install=install, start=0.02, largest=0.08, shape=(delay, lag), parameters=parameters)
+    return dict(
+        install=install, start=0.02, largest=0.08, shape=(delay, lag), parameters=parameters
+    )
 
 
 @form("time_delay", own=True)
@@ -544,35 +653,37 @@ def delay_and_lag(rng, joint):
 # --- The person
 
 
-def _end_range(kind, rng, joint, *sharpness):
+def _end_range(kind, rng, joint, reach, *sharpness):
     side = either(rng)
-    low, high = LOWEST[joint], HIGHEST[joint]
-    reach = rng.uniform(0.25, 0.45) * (high - low)
-    onset = high - reach if side > 0 else low + reach
+    low, high = reach[0][joint], reach[1][joint]
+    depth = rng.uniform(0.25, 0.45) * (high - low)
+    onset = high - depth if side > 0 else low + depth
     return dict(
-        install=hidden_torque(kind, joint, onset, *sharpness, side, human=True), start=2.0, human=True,
+        install=hidden_torque(kind, joint, onset, *sharpness, side, human=True),
+        start=2.0,
+        human=True,
         shape=(onset, *sharpness, side),
-    )  # fmt: skip
+    )
 
 
 @form("passive_joint_torque", own=True)
-def exponential_stiffness(rng, joint):
-    return _end_range(smooth.END_EXPONENTIAL, rng, joint, rng.uniform(4.0, 9.0))
+def exponential_stiffness(rng, joint, reach):
+    return _end_range(smooth.END_EXPONENTIAL, rng, joint, reach, rng.uniform(4.0, 9.0))
 
 
 @form("passive_joint_torque")
-def tanh_stop(rng, joint):
-    return _end_range(smooth.END_TANH, rng, joint, rng.uniform(4.0, 9.0))
+def tanh_stop(rng, joint, reach):
+    return _end_range(smooth.END_TANH, rng, joint, reach, rng.uniform(4.0, 9.0))
 
 
 @form("passive_joint_torque")
-def quadratic_stop(rng, joint):
-    return _end_range(smooth.END_POWER, rng, joint, 2.0)
+def quadratic_stop(rng, joint, reach):
+    return _end_range(smooth.END_POWER, rng, joint, reach, 2.0)
 
 
 @form("passive_joint_torque")
-def cubic_stop(rng, joint):
-    return _end_range(smooth.END_POWER, rng, joint, 3.0)
+def cubic_stop(rng, joint, reach):
+    return _end_range(smooth.END_POWER, rng, joint, reach, 3.0)
 
 
 def _rhythm(kind, rng, joint, depth):
@@ -582,13 +693,19 @@ def _rhythm(kind, rng, joint, depth):
     def install(plan: Plan, size: float, run: Run) -> None:
         if run.has_human:
             phases = run.rng.uniform(0.0, 2 * np.pi, 2)
-            plan.torque(kind, joint, size, frequency, phases[0], depth, *slow, phases[1], human=True)
+            plan.torque(
+                kind, joint, size, frequency, phases[0], depth, *slow, phases[1], human=True
+            )
 
     own = kind == smooth.RHYTHM
     return dict(
-        install=install, start=2.0, human=True, slow=True, shape=(frequency, depth),
+        install=install,
+        start=2.0,
+        human=True,
+        slow=True,
+        shape=(frequency, depth),
         parameters=lambda s: {"amplitude": s, "frequency": frequency} if own else {},
-    )  # fmt: skip
+    )
 
 
 @form("voluntary_torque", own=True)
@@ -609,10 +726,14 @@ def pushes(rng, joint):
 def _reflex(kind, rng, joint, *more):
     threshold, side = rng.uniform(0.2, 0.6), either(rng)
     return dict(
-        install=hidden_torque(kind, joint, threshold, side, *more, human=True), start=5.0, human=True,
+        install=hidden_torque(kind, joint, threshold, side, *more, human=True),
+        start=5.0,
+        human=True,
         shape=(threshold, side, *more),
-        parameters=lambda s: {"gain": s, "threshold_velocity": threshold} if kind == smooth.REFLEX else {},
-    )  # fmt: skip
+        parameters=lambda s: (
+            {"gain": s, "threshold_velocity": threshold} if kind == smooth.REFLEX else {}
+        ),
+    )
 
 
 @form("spasticity", own=True)
@@ -622,20 +743,23 @@ def above_a_threshold(rng, joint):
 
 @form("spasticity")
 def smooth_threshold_with_latency(rng, joint):
-    return _reflex(smooth.REFLEX_SMOOTH, rng, joint, rng.uniform(0.03, 0.12), rng.uniform(0.02, 0.05))
+    return _reflex(
+        smooth.REFLEX_SMOOTH, rng, joint, rng.uniform(0.03, 0.12), rng.uniform(0.02, 0.05)
+    )
 
 
-FIRM_CUFF = (15000.0, 60.0, 0.0)
-"""The other cuff of a wearer whose leg is one of its own: N·m/rad, N·m·s/rad, 1/rad²."""
+FIRM_CUFF = (15000.0, 60.0, 0.0, 0.0, 0.0, 0.0)
+"""The other cuff of a wearer whose leg is one of its own, as ``Plan.cuffs``."""
 
 
-def _limb(rng, joint, hardens):
+def limb(rng, joint, hardens, slack=0.0, creep=(0.0, 0.0)):
     lag = rng.uniform(0.01, 0.03)
 
     def install(plan: Plan, size: float, run: Run) -> None:
         if run.has_human:
-            plan.cuffs = np.array([FIRM_CUFF, FIRM_CUFF])
-            plan.cuffs[joint] = 1.0 / size, lag / size, hardens
+            if plan.cuffs is None:
+                plan.cuffs = np.array([FIRM_CUFF, FIRM_CUFF])
+            plan.cuffs[joint] = 1.0 / size, lag / size, hardens, slack, *creep
 
     return dict(
         install=install,
@@ -650,21 +774,35 @@ def _limb(rng, joint, hardens):
 
 @form("cuff_compliance")
 def kelvin_voigt_limb(rng, joint):
-    return _limb(rng, joint, 0.0)
+    return limb(rng, joint, 0.0)
 
 
 @form("cuff_compliance")
 def hardening_limb(rng, joint):
-    return _limb(rng, joint, log_uniform(rng, 20.0, 150.0))
+    return limb(rng, joint, log_uniform(rng, 20.0, 150.0))
 
 
-CAUSES = tuple(FORMS)
+PLAIN_CAUSES = tuple(FORMS)
+"""What the first examinations hid; ``further_forms`` adds to it."""
 SOFT = ("backlash", "joint_elasticity")
 """Causes that part the motor from its link."""
 HUMAN_CAUSES = ("passive_joint_torque", "voluntary_torque", "spasticity", "cuff_compliance")
 
 
-def random_cause(rng: Generator, effect: str, joint: int | None, form_name: str | None = None) -> Cause:
-    """Draw one form of a cause, or the form of that name; shape and all."""
-    forms = [f for f in FORMS[effect] if form_name in (None, f.form)]
-    return forms[int(rng.integers(len(forms)))](rng, joint)
+def random_cause(
+    rng: Generator,
+    effect: str,
+    joint: int | None,
+    form_name: str | None = None,
+    world: str | None = None,
+    reach: Reach = BOUNDS,
+) -> Cause:
+    """Draw one form of a cause, or the form of that name; shape and all.
+
+    Without a world the forms are those of plain cases.
+    """
+    known = [f for f in FORMS[effect] if (f.plain if world is None else world in f.worlds)]
+    # What the first examinations did not hide has no plain forms: a machine of one joint takes any.
+    known = known or [f for f in FORMS[effect] if WORLDS[0] in f.worlds and not f.warm]
+    forms = [f for f in known if form_name in (None, f.form)]
+    return forms[int(rng.integers(len(forms)))](rng, joint, reach)

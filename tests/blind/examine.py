@@ -19,11 +19,18 @@ from tests.blind.detection import smallest_visible
 from tests.blind.scoring import Score, score
 
 SIMULATOR = (
-    "body", "cases", "causes", "dry", "excitation", "faults", "floor", "imperfections", "loop", "machine", "magnitude",
-    "mechanisms", "outside", "people", "plan", "plant", "session", "smooth", "units", "wandering",
+    "body", "cases", "causes", "channel", "compiled", "conditions", "cuffs", "dry", "encoders",
+    "excitation", "families", "faults", "floor", "further_forms", "further_torques",
+    "imperfections", "legs", "loop", "machine", "magnitude", "mechanisms", "outside", "people",
+    "plan", "planar", "plant", "recorded", "recorder", "session", "smooth", "temperature",
+    "trajectories", "transmissions", "two_link", "two_mass", "units", "wandering", "worlds",
 )  # fmt: skip
-"""What decides how a session looks: when one of these files changes, sessions are simulated anew."""
-ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")}
+"""What decides how a session looks: when one of these files changes, sessions are simulated
+anew."""
+ONE_THREAD = {
+    name: "1"
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+}
 TIME_LIMIT_S = 600.0
 EXOID = (Path(sys.executable).with_name("exoid"),)
 
@@ -56,11 +63,14 @@ def fingerprint() -> str:
 
 
 def neutral_name(case: Case) -> str:
-    """Name a session so that the name says nothing, and is another one when the simulator has changed."""
+    """Name a session so that the name says nothing, and is another one when the simulator has
+    changed."""
     return hashlib.sha256(f"{fingerprint()} {case}".encode()).hexdigest()[:12]
 
 
-def examine(cases: Sequence[Case], root: Path, workers: int = 2, again: bool = False) -> Iterator[Score]:
+def examine(
+    cases: Sequence[Case], root: Path, workers: int = 2, again: bool = False
+) -> Iterator[Score]:
     """Simulate what is not there yet, diagnose, and yield scores as they come.
 
     Parameters
@@ -88,7 +98,9 @@ def examine_one(case: Case, folders: Folders, again: bool) -> Score:
     if again or not kept.exists():
         shutil.rmtree(folders.answer(name), ignore_errors=True)
         folders.answer(name).mkdir(parents=True)
-        kept.write_text(json.dumps(diagnose(folders.recordings(name), folders.answer(name)), indent=1))
+        kept.write_text(
+            json.dumps(diagnose(folders.recordings(name), folders.answer(name)), indent=1)
+        )
     answer = json.loads(kept.read_text())
     truth = json.loads(folders.truth(name).read_text())
     return score(truth, answer, smallest_visible(folders.answer(name)))
@@ -110,9 +122,13 @@ def diagnose(recordings: Path, out: Path, program: Sequence[str | Path] = EXOID)
     begin = time.perf_counter()
     try:
         ended = subprocess.run(
-            [*program, "diagnose", *files, "--out", out, "--no-figures"], cwd=recordings, env=os.environ | ONE_THREAD,
-            text=True, capture_output=True, timeout=TIME_LIMIT_S,
-        )  # fmt: skip
+            [*program, "diagnose", *files, "--out", out, "--no-figures"],
+            cwd=recordings,
+            env=os.environ | ONE_THREAD,
+            text=True,
+            capture_output=True,
+            timeout=TIME_LIMIT_S,
+        )
         exit_code, message = ended.returncode, ended.stderr[-2000:]
     except subprocess.TimeoutExpired:
         exit_code, message = 1, f"no answer within {TIME_LIMIT_S:g} s"

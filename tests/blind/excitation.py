@@ -1,4 +1,5 @@
-"""Excitations: periodic multi-sines within the paper's Table 2, the most informative of a few random ones."""
+"""Excitations: periodic multi-sines within the paper's Table 2, the most informative of a few
+random ones."""
 
 from dataclasses import dataclass
 
@@ -34,7 +35,8 @@ class Excitation:
 
 
 def random_excitation(rng: Generator, tries: int = 60) -> Excitation:
-    """Draw feasible excitations of one number of harmonics and return the one with the largest determinant."""
+    """Draw feasible excitations of one number of harmonics and return the one with the largest
+    determinant."""
     harmonics = int(rng.integers(3, 6))
     drawn = [_feasible(rng, harmonics) for _ in range(tries)]
     return max(drawn, key=_information)
@@ -59,7 +61,9 @@ def _information(excitation: Excitation) -> float:
     return float(np.linalg.slogdet(columns.T @ columns)[1])
 
 
-def baseline_columns(q: NDArray, dq: NDArray, ddq: NDArray, length: float, gravity: float) -> NDArray:
+def baseline_columns(
+    q: NDArray, dq: NDArray, ddq: NDArray, length: float, gravity: float
+) -> NDArray:
     """Torque per unit of X1..X4 and of each joint's Coulomb and viscous friction, (n, 2, 8)."""
     absolute = q.sum(axis=1)
     bend, fold = np.cos(q[:, 1]), np.sin(q[:, 1])
@@ -68,7 +72,9 @@ def baseline_columns(q: NDArray, dq: NDArray, ddq: NDArray, length: float, gravi
     Y[:, 0, 1] = ddq[:, 1]
     Y[:, 1, 1] = ddq.sum(axis=1)
     centrifugal = (2 * dq[:, 0] + dq[:, 1]) * dq[:, 1]
-    Y[:, 0, 2] = length * (bend * (2 * ddq[:, 0] + ddq[:, 1]) - fold * centrifugal) + gravity * np.sin(absolute)
+    Y[:, 0, 2] = length * (
+        bend * (2 * ddq[:, 0] + ddq[:, 1]) - fold * centrifugal
+    ) + gravity * np.sin(absolute)
     Y[:, 1, 2] = length * (bend * ddq[:, 0] + fold * dq[:, 0] ** 2) + gravity * np.sin(absolute)
     Y[:, 0, 3] = gravity * np.sin(q[:, 0])
     for j in range(2):

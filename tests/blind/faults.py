@@ -1,7 +1,8 @@
 """Faults of acquisition: what can go wrong between a sound leg and its file.
 
-Each takes the columns of one run and changes them in place; ``everywhere`` marks those of the wiring, which
-are the same in all runs. ``words`` are what an honest description would say, in any form.
+Each takes the columns of one run and changes them in place; ``everywhere`` marks those of the
+wiring, which are the same in all runs. ``words`` are what an honest description would say, in any
+form.
 """
 
 from collections.abc import Callable
@@ -111,8 +112,8 @@ def _keep(columns: Columns, rows: np.ndarray) -> None:
 
 Fault = Callable[[Columns, Generator, int], str | None]
 FAULTS: tuple[Fault, ...] = (
-    gap, stuck_encoder, saturated_torque, swapped_joints, degrees, torque_in_another_unit, sign_flipped, clock_jitter,
-    repeated_samples, dropped_samples,
+    gap, stuck_encoder, saturated_torque, swapped_joints, degrees, torque_in_another_unit,
+    sign_flipped, clock_jitter, repeated_samples, dropped_samples,
 )  # fmt: skip
 IN_EVERY_RUN = ("swapped_joints", "torque_in_another_unit", "sign_flipped")
 """Wiring and configuration are the same in all runs of a session."""

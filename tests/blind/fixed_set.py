@@ -1,7 +1,8 @@
 """The fixed set that CI examines, and the record of how each of its cases came out.
 
-The set is chosen by number alone: every cause once, hip and knee in turn, then the first few of each other category.
-``fixed_set.json`` holds what came out; ``python -m tests.blind --fixed --write`` rewrites it.
+The set is chosen by number alone: every cause once, hip and knee in turn, then the first few of
+each other category. ``fixed_set.json`` holds what came out; ``python -m tests.blind --fixed
+--write`` rewrites it.
 """
 
 import json
@@ -9,8 +10,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from tests.blind.cases import SINGLES, Case, case
-from tests.blind.causes import CAUSES, joints_of
+from tests.blind.cases import PLAIN_SINGLES, Case, case
+from tests.blind.causes import joints_of
 from tests.blind.scoring import Score
 from tests.blind.seeds import RANGES
 from tests.blind.tables import label
@@ -38,18 +39,27 @@ class Outcome:
 
 def fixed_set() -> list[Case]:
     """Return the cases of the fixed set."""
-    places = [(effect, joints_of(effect)) for effect in CAUSES]
-    singles = [SINGLES.index((effect, joints[i % len(joints)])) for i, (effect, joints) in enumerate(places)]
+    places = [(effect, joints_of(effect)) for effect in dict(PLAIN_SINGLES)]
+    singles = [
+        PLAIN_SINGLES.index((effect, joints[i % len(joints)]))
+        for i, (effect, joints) in enumerate(places)
+    ]
     turns = [("single", turn) for turn in singles]
     turns += [(category, turn) for category, count in OTHERS.items() for turn in range(count)]
-    return [case(RANGES["fixed"].start + k, category, turn) for k, (category, turn) in enumerate(turns)]
+    return [
+        case(RANGES["fixed"].start + k, category, turn, plain=True)
+        for k, (category, turn) in enumerate(turns)
+    ]
 
 
 def outcomes(cases: Iterable[Case], scores: Iterable[Score]) -> list[Outcome]:
     """Return how the cases came out, in their order; scores come in any."""
     by_seed = {s.seed: s for s in scores}
     found = [(c, by_seed[c.seed]) for c in cases]
-    return [Outcome(c.seed, c.label, s.status, label(s.named[0]) if s.named else None, s.right) for c, s in found]
+    return [
+        Outcome(c.seed, c.label, s.status, label(s.named[0]) if s.named else None, s.right)
+        for c, s in found
+    ]
 
 
 def write(found: Sequence[Outcome], path: Path = RECORD) -> None:
@@ -66,22 +76,38 @@ def read(path: Path = RECORD) -> list[Outcome]:
 def complaints(recorded: Sequence[Outcome], found: Sequence[Outcome]) -> list[str]:
     """Say what is not as recorded, a line each; nothing where all is well.
 
-    Rounding differs between machines, and where two causes or a threshold are close it decides. So of the cases at
-    most two may differ in whether they are right or in the first cause, and at most one right answer may be lost. Two
-    things are never allowed: a new false alarm, and a case that has become right, which belongs into the record lest it
-    be lost again unnoticed. Once recorded, a machine whose rounding makes it wrong is within what is allowed.
+    Rounding differs between machines, and where two causes or a threshold are close it decides. So
+    of the cases at most two may differ in whether they are right or in the first cause, and at most
+    one right answer may be lost. Two things are never allowed: a new false alarm, and a case that
+    has become right, which belongs into the record lest it be lost again unnoticed. Once recorded,
+    a machine whose rounding makes it wrong is within what is allowed.
     """
     if [(o.seed, o.hidden) for o in recorded] != [(o.seed, o.hidden) for o in found]:
-        return [f"{RECORD.name} tells of other cases than the fixed set has: rewrite it by `{REWRITE}`"]
-    changes = [(was, now) for was, now in zip(recorded, found, strict=True) if _essence(was) != _essence(now)]
+        return [
+            f"{RECORD.name} tells of other cases than the fixed set has: rewrite it by `{REWRITE}`"
+        ]
+    changes = [
+        (was, now)
+        for was, now in zip(recorded, found, strict=True)
+        if _essence(was) != _essence(now)
+    ]
     better = [_change(*c) for c in changes if c[1].right and not c[0].right]
-    alarms = [_change(*c) for c in changes if c[0].right and not c[1].right and c[1].hidden in SILENT_IS_RIGHT]
+    alarms = [
+        _change(*c)
+        for c in changes
+        if c[0].right and not c[1].right and c[1].hidden in SILENT_IS_RIGHT
+    ]
     other = [said for said in (_change(*c) for c in changes) if said not in better]
     were, are = (sum(o.right for o in which) for which in (recorded, found))
-    said = [f"{change}: better than recorded; rewrite {RECORD.name} by `{REWRITE}`" for change in better]
+    said = [
+        f"{change}: better than recorded; rewrite {RECORD.name} by `{REWRITE}`" for change in better
+    ]
     said += [f"{change}: a false alarm" for change in alarms]
     if len(other) > MOST_DIFFERENT or are < were - MOST_LOST:
-        said += [f"{change}; {len(other)} cases differ, {are} are right and {were} were" for change in other]
+        said += [
+            f"{change}; {len(other)} cases differ, {are} are right and {were} were"
+            for change in other
+        ]
     return said
 
 

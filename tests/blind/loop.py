@@ -1,19 +1,22 @@
-"""The compiled loop: MuJoCo's leg under sampled PD drives, with sticking friction and whatever is hidden.
+"""The compiled loop: MuJoCo's leg under sampled PD drives, with sticking friction and whatever is
+hidden.
 
-Velocities are stepped first, positions with the new velocity (symplectic Euler); viscous friction is
-implicit. Dry friction is an impulse within its levels that stops the joint if it can (Moreau, 1988),
-found by projected Gauss-Seidel over both joints.
+Velocities are stepped first, positions with the new velocity (symplectic Euler); viscous friction
+is implicit. Dry friction is an impulse within its levels that stops the joint if it can (Moreau,
+1988), found by projected Gauss-Seidel over both joints.
 """
 
 from math import cos, pi, sin
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from tests.blind.body import PAYLOAD_INERTIA, evaluate
-from tests.blind.dry import LAST_DRY, dry_levels
+from tests.blind.compiled import njit
+from tests.blind.dry import dry_levels, is_dry
+from tests.blind.encoders import WAVES, reading, slope
 from tests.blind.smooth import smooth_torque
+from tests.blind.transmissions import RIGID, transmitted
 
 DT = 0.25e-3
 STEPS_PER_TICK = 4
@@ -22,20 +25,28 @@ SAMPLE_S = DT * STEPS_PER_TICK * TICKS_PER_SAMPLE
 LEAD_IN_S = 5.0
 """From rest into the periodic motion before anything is recorded."""
 BLEND_S = 3.0
-RIGID, ELASTIC, WIND_UP, PLAY, PLAY_HERTZ = 0, 1, 2, 3, 4
+TABLE_STEP_S = 0.02
 
 
 class Excited(NamedTuple):
-    """Fourier coefficients, (2,), (2, n), (2, n)."""
+    """Fourier coefficients, (2,), (2, n), (2, n); or, where there is one, a table of the motion.
+
+    ``table`` (m, 4): angles and speeds of hip and knee each ``TABLE_STEP_S`` from ``-LEAD_IN_S``
+    on.
+    """
 
     theta0: np.ndarray
     a: np.ndarray
     b: np.ndarray
     omega: float
+    table: np.ndarray
 
 
 class Drives(NamedTuple):
-    """PD loops and encoders, arrays (2,); ``wobble`` is (2, 2): amplitude and phase of the eccentricity."""
+    """PD loops and encoders, arrays (2,).
+
+    ``wobble`` (2, 6): amplitude and phase of the encoders' errors once, twice, three times a turn.
+    """
 
     kp: np.ndarray
     kd: np.ndarray
@@ -44,13 +55,14 @@ class Drives(NamedTuple):
     offset: np.ndarray
     wobble: np.ndarray
     speed_share: float
+    recorded_count: np.ndarray
 
 
 class Joints(NamedTuple):
     """Friction and transmission, arrays (2,), ``added_mass`` (2, 2), ``spring`` (2, 5).
 
-    ``cuffs`` (2, 3) for thigh and shank: stiffness (N/m), damping (N·s/m), hardening (1/m²); ``levers`` (3,):
-    distance of each cuff from its joint, thigh length.
+    ``cuffs`` (2, 3) for thigh and shank: stiffness (N/m), damping (N·s/m), hardening (1/m²);
+    ``levers`` (3,): distance of each cuff from its joint, thigh length.
     """
 
     coulomb: np.ndarray
@@ -64,7 +76,8 @@ class Joints(NamedTuple):
 
 
 class World(NamedTuple):
-    """What is outside the leg: tilt of gravity (base, sway, Hz), payload (body, mass, start, ramp, direction)."""
+    """What is outside the leg: tilt of gravity (base, sway, Hz), payload (body, mass, start, ramp,
+    direction)."""
 
     gravity: float
     tilt: np.ndarray
@@ -83,7 +96,8 @@ class Hidden(NamedTuple):
 
 
 class Log(NamedTuple):
-    """What happened. Samples of 5 ms, latched in their middle: (n, 2); drive torque by ticks of 1 ms."""
+    """What happened. Samples of 5 ms, latched in their middle: (n, 2); drive torque by ticks of 1
+    ms."""
 
     reading: np.ndarray
     """Counted angle, rad."""
@@ -104,11 +118,27 @@ class Log(NamedTuple):
     """(5 n, 2)."""
 
 
-@njit(cache=True)
+@njit()
+def tabulated(table, t, j):
+    """Angle of joint ``j`` at time ``t``, by cubic Hermite interpolation of angles and speeds."""
+    place = min(max((t + LEAD_IN_S) / TABLE_STEP_S, 0.0), len(table) - 1.001)
+    i = int(place)
+    f = place - i
+    q0, q1 = table[i, j], table[i + 1, j]
+    v0, v1 = table[i, 2 + j] * TABLE_STEP_S, table[i + 1, 2 + j] * TABLE_STEP_S
+    rise = q1 - q0
+    return q0 + f * (v0 + f * (3.0 * rise - 2.0 * v0 - v1 + f * (v0 + v1 - 2.0 * rise)))
+
+
+@njit()
 def reference_at(x, t, out):
     """Set-point at time ``t``, a smooth start from the mean angle before time 0."""
     s = min(1.0, max(0.0, (t + LEAD_IN_S - 0.5) / BLEND_S))
     share = s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+    if len(x.table) > 0:
+        for j in range(2):
+            out[j] = x.theta0[j] + share * (tabulated(x.table, t, j) - x.theta0[j])
+        return
     for j in range(2):
         swing = 0.0
         for k in range(x.a.shape[1]):
@@ -117,35 +147,10 @@ def reference_at(x, t, out):
         out[j] = x.theta0[j] + share * swing
 
 
-@njit(cache=True)
-def _read(d, j, theta):
-    return theta + d.offset[j] + d.wobble[j, 0] * sin(theta + d.wobble[j, 1])
-
-
-@njit(cache=True)
-def _transmitted(kind, s, x, rate):
-    """Torque of a transmission wound up by ``x``; ``s``: stiffness, damping, and the form's own."""
-    if kind == ELASTIC:
-        return s[0] * x * (1.0 + s[2] * x * x) + s[1] * rate
-    if kind == WIND_UP:
-        # Harmonic drives: soft until the first torque step, then stiffer.
-        soft = min(s[2], max(-s[2], x))
-        return s[0] * soft + s[3] * s[0] * (x - soft) + s[1] * rate
-    gap = 0.5 * s[2]
-    if abs(x) <= gap:
-        return 0.0
-    depth = abs(x) - gap
-    side = 1.0 if x > 0 else -1.0
-    if kind == PLAY_HERTZ:
-        push = s[0] * 12.0 * depth**1.5 + s[1] * side * rate * min(1.0, depth / 1e-3)
-    else:
-        push = s[0] * depth + s[1] * side * rate
-    return side * max(0.0, push)
-
-
-@njit(cache=True)
+@njit()
 def _press(jt, z, u, force, pressed):
-    """Let the machine's cuffs push the wearer's leg (coordinates 2 and 3): forces across thigh and shank."""
+    """Let the machine's cuffs push the wearer's leg (coordinates 2 and 3): forces across thigh and
+    shank."""
     thigh, shank, length = jt.levers
     bend = length * cos(z[1])
     hip, knee = z[0] - z[2], z[1] - z[3]
@@ -153,7 +158,9 @@ def _press(jt, z, u, force, pressed):
     for i in range(2):
         way = thigh * hip if i == 0 else bend * hip + shank * (hip + knee)
         rate = thigh * hip_rate if i == 0 else bend * hip_rate + shank * (hip_rate + knee_rate)
-        pressed[i] = jt.cuffs[i, 0] * way * (1.0 + jt.cuffs[i, 2] * way * way) + jt.cuffs[i, 1] * rate
+        pressed[i] = (
+            jt.cuffs[i, 0] * way * (1.0 + jt.cuffs[i, 2] * way * way) + jt.cuffs[i, 1] * rate
+        )
     at_hip = thigh * pressed[0] + (bend + shank) * pressed[1]
     at_knee = shank * pressed[1]
     force[2] += at_hip
@@ -162,7 +169,7 @@ def _press(jt, z, u, force, pressed):
     force[1] -= at_knee
 
 
-@njit(cache=True)
+@njit()
 def _solve(A, b, n, x):
     """Solve A x = b in place for up to five unknowns; A symmetric and positive definite."""
     for i in range(n):
@@ -181,7 +188,7 @@ def _solve(A, b, n, x):
             x[i, c] = total / A[i, i]
 
 
-@njit(cache=True)
+@njit()
 def _set_world(h, w, t):
     """Turn gravity and load the payload as they are at time ``t``."""
     mass, subtree, inertia, gravity = h[9:]
@@ -196,12 +203,14 @@ def _set_world(h, w, t):
         inertia[body, :] = lump * PAYLOAD_INERTIA
 
 
-@njit(cache=True)
-def simulate(h, x, d, jt, w, hid, start, samples, with_drives, out):
-    """Run the leg from rest at ``start`` (2,) and log ``samples`` samples from time 0 on into ``out``.
+@njit()
+def simulate(h, x, d, jt, w, hid, start, samples, ticks, with_drives, out):
+    """Run the leg from rest at ``start`` (2,) and log ``samples`` samples of ``ticks`` ms into
+    ``out``.
 
     Without drives there is no lead-in and no torque: the leg swings freely.
     """
+    sample_s = DT * STEPS_PER_TICK * ticks
     model, data, qpos, qvel, _, bias, M, pattern, columns = h[:9]
     nv = len(qpos)
     soft = np.where(jt.transmission != RIGID)[0]
@@ -223,33 +232,36 @@ def simulate(h, x, d, jt, w, hid, start, samples, with_drives, out):
     angle, speed = np.zeros(2), np.zeros(2)
     up, down, lam, load, human = np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2)
     opened, pressed = np.zeros(n), np.zeros(2)
-    first = -round(LEAD_IN_S / SAMPLE_S) if with_drives else 0
-    reference_at(x, first * SAMPLE_S, old_ref)
+    first = -round(LEAD_IN_S / sample_s) if with_drives else 0
+    reference_at(x, first * sample_s, old_ref)
     for j in range(2):
-        angle[j] = _read(d, j, z[place[j]])
-    half = STEPS_PER_TICK * TICKS_PER_SAMPLE // 2
+        angle[j] = reading(d.offset[j], d.wobble[j], z[place[j]])
+    half = STEPS_PER_TICK * ticks // 2
     for k in range(first, samples):
         opened[:] = u
-        for s in range(STEPS_PER_TICK * TICKS_PER_SAMPLE):
-            t = k * SAMPLE_S + s * DT
+        for s in range(STEPS_PER_TICK * ticks):
+            t = k * sample_s + s * DT
             if s == 0:
                 _set_world(h, w, t)
             if with_drives and s % STEPS_PER_TICK == 0:
                 tick = STEPS_PER_TICK * DT
                 reference_at(x, t, ref)
                 for j in range(2):
-                    seen = _read(d, j, z[place[j]])
+                    seen = reading(d.offset[j], d.wobble[j], z[place[j]])
                     if d.count[j] > 0.0:
                         seen = d.count[j] * np.round(seen / d.count[j])
                     speed[j] += d.speed_share * ((seen - angle[j]) / tick - speed[j])
                     angle[j] = seen
-                    wanted = d.kp[j] * (ref[j] - seen) + d.kd[j] * ((ref[j] - old_ref[j]) / tick - speed[j])
+                    wanted = d.kp[j] * (ref[j] - seen) + d.kd[j] * (
+                        (ref[j] - old_ref[j]) / tick - speed[j]
+                    )
                     drive[j] = min(d.limit[j], max(-d.limit[j], wanted))
                     old_ref[j] = ref[j]
                 if k >= 0:
-                    out.torque[k * TICKS_PER_SAMPLE + s // STEPS_PER_TICK] = drive
+                    out.torque[k * ticks + s // STEPS_PER_TICK] = drive
             for i in range(nv):
-                # Speeds belong half a step before the positions; Coriolis torque wants both at one instant.
+                # Speeds belong half a step before the positions; Coriolis torque wants both at one
+                # instant.
                 qpos[i], qvel[i] = z[i], 1.5 * u[i] - 0.5 * before[i]
             evaluate(model, data, bias)
             for i in range(nv):
@@ -273,19 +285,25 @@ def simulate(h, x, d, jt, w, hid, start, samples, with_drives, out):
                 human[j] = 0.0
                 if place[j] != j:
                     A[place[j], place[j]] += jt.motor_inertia[j]
-                    passed = _transmitted(int(jt.transmission[j]), jt.spring[j], th[j] - q[j], om[j] - v[j])
+                    passed = transmitted(
+                        int(jt.transmission[j]), jt.spring[j], th[j] - q[j], om[j] - v[j]
+                    )
                     force[j] += passed
                     force[place[j]] -= passed
             if nv == 4:
                 _press(jt, z, u, force, pressed)
             for i in range(len(hid.kind)):
                 j = hid.joint[i]
-                if hid.kind[i] <= LAST_DRY:
-                    more, less = dry_levels(hid.kind[i], hid.p[i], t, om[j], load[j], q[1 - j])
+                if is_dry(hid.kind[i]):
+                    more, less = dry_levels(
+                        hid.kind[i], hid.p[i], hid.table[i], t, j, th[j], q[1 - j], om, load
+                    )
                     up[j] += more
                     down[j] += less
                 elif hid.human[i]:
-                    extra = smooth_torque(hid.kind[i], hid.p[i], hid.memory[i], hid.table[i], t, DT, j, q, v, a)
+                    extra = smooth_torque(
+                        hid.kind[i], hid.p[i], hid.memory[i], hid.table[i], t, DT, j, q, v, a
+                    )
                     human[j] += extra
                     force[j + 2 if nv == 4 else j] -= extra
                 else:
@@ -308,27 +326,36 @@ def simulate(h, x, d, jt, w, hid, start, samples, with_drives, out):
                 u[i] = V[i, 0] - V[i, 1] * lam[0] - V[i, 2] * lam[1]
             for j in range(2):
                 a[j] = (u[j] - before[j]) / DT
-                inert = jt.motor_inertia[j] * (u[place[j]] - before[place[j]]) / DT if place[j] != j else 0.0
+                inert = (
+                    jt.motor_inertia[j] * (u[place[j]] - before[place[j]]) / DT
+                    if place[j] != j
+                    else 0.0
+                )
                 load[j] = drive[j] - lam[j] / DT - jt.viscous[j] * u[place[j]] - inert
             if k >= 0 and s == half:
-                # Kicks come at the beginning of a step, where the drive's torque is spread over it: half a
+                # Kicks come at the beginning of a step, where the drive's torque is spread over it:
+                # half a
                 # step back, where the last speeds are, motion and torque belong together.
                 _latch(out, k, z, before, place, d, human, ref, speed, pressed)
             for i in range(n):
                 z[i] += DT * u[i]
         if k >= 0:
             for j in range(2):
-                at = z[place[j]] + d.wobble[j, 1]
-                mean = (u[place[j]] - opened[place[j]]) / SAMPLE_S
-                bent = d.wobble[j, 0] * (cos(at) * mean - sin(at) * u[place[j]] ** 2)
+                mean = (u[place[j]] - opened[place[j]]) / sample_s
+                bent = 0.0
+                for n_waves in range(1, WAVES + 1):
+                    size = n_waves * d.wobble[j, 2 * n_waves - 2]
+                    at = n_waves * z[place[j]] + d.wobble[j, 2 * n_waves - 1]
+                    bent += size * (cos(at) * mean - n_waves * sin(at) * u[place[j]] ** 2)
                 out.acceleration[k, j] = mean + bent
             for i in range(2):
-                out.link[k, 4 + i] = (u[i] - opened[i]) / SAMPLE_S
+                out.link[k, 4 + i] = (u[i] - opened[i]) / sample_s
 
 
-@njit(cache=True)
+@njit()
 def _grip(V, place, up, down, speed, lam):
-    """Find the friction impulses ``lam`` (2,) within their levels that leave each joint stuck or opposed."""
+    """Find the friction impulses ``lam`` (2,) within their levels that leave each joint stuck or
+    opposed."""
     for j in range(2):
         lam[j] = DT * (max(0.0, up[j]) if speed[j] > 0 else -max(0.0, down[j]))
     for _ in range(25):
@@ -343,15 +370,16 @@ def _grip(V, place, up, down, speed, lam):
             break
 
 
-@njit(cache=True)
+@njit()
 def _latch(out, k, z, u, place, d, human, ref, speed, pressed):
     """Log what is measured: positions half a step back, and the speeds ``u`` of that moment."""
     for j in range(2):
         theta = z[place[j]] - 0.5 * DT * u[place[j]]
-        seen = _read(d, j, theta)
+        seen = reading(d.offset[j], d.wobble[j], theta)
         out.angle[k, j] = seen
-        out.reading[k, j] = d.count[j] * np.round(seen / d.count[j]) if d.count[j] > 0.0 else seen
-        out.speed[k, j] = u[place[j]] * (1.0 + d.wobble[j, 0] * cos(theta + d.wobble[j, 1]))
+        count = d.recorded_count[j]
+        out.reading[k, j] = count * np.round(seen / count) if count > 0.0 else seen
+        out.speed[k, j] = u[place[j]] * slope(d.wobble[j], theta)
         out.human[k, j] = human[j]
         out.reference[k, j] = ref[j]
         out.drive_speed[k, j] = speed[j]

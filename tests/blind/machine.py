@@ -1,4 +1,5 @@
-"""Random exoskeletons: links, friction, drives, encoders, and how well torque and forces are measured."""
+"""Random exoskeletons: links, friction, drives, encoders, and how well torque and forces are
+measured."""
 
 from dataclasses import dataclass, replace
 
@@ -11,7 +12,8 @@ from tests.blind.body import Leg, Segment
 SPEED_CUTOFF_HZ = 40.0
 DRIVE_RATE_HZ = 1000.0
 KNEE_ROTOR = 0.04
-"""kg·m², felt behind a soft transmission only; one that is felt elsewhere is an effect to be hidden."""
+"""kg·m², felt behind a soft transmission only; one that is felt elsewhere is an effect to be
+hidden."""
 SOFT_DAMPING = 150.0
 """Most damping per motor inertia, 1/s, with which drives behind a soft transmission do not hunt."""
 CHATTER_NM = 0.8
@@ -46,6 +48,8 @@ class Machine:
     carried: float
     """Share of the limb's weight that the cuffs carry along it."""
     preload: float
+    drive_counts: NDArray | None = None
+    """Counts that the drives see, where they count on the motor's side."""
 
     @property
     def rotors(self) -> NDArray:
@@ -53,17 +57,43 @@ class Machine:
         return np.array([self.hip_rotor, KNEE_ROTOR])
 
     def tuned_for_soft(self, joint: int) -> "Machine":
-        """Return the machine with the drive of a joint tuned as a lab would tune it behind a soft transmission."""
+        """Return the machine with the drive of a joint tuned as a lab would tune it behind a soft
+        transmission."""
         kd = self.kd.copy()
         kd[joint] = min(kd[joint], SOFT_DAMPING * self.rotors[joint])
         return replace(self, kd=kd)
+
+    def controller(self, joint: int) -> dict:
+        """Return what a recording says of a drive."""
+        return {
+            "type": "pd", "kp_nm_rad": float(self.kp[joint]), "kd_nm_s_rad": float(self.kd[joint]),
+            "rate_hz": DRIVE_RATE_HZ, "limit_nm": float(self.limit[joint]),
+        }  # fmt: skip
+
+
+def random_rich_machine(rng: Generator, thigh_length: float) -> Machine:
+    """Draw an exoskeleton whose encoders and torques are as different as labs have them."""
+    drawn = random_machine(rng, thigh_length)
+    counts = np.round(2.0 ** rng.uniform(12.0, 20.0, 2))
+    return replace(
+        drawn,
+        counts=counts,
+        # Coarse ones are for the record: a drive counts on its motor's side.
+        drive_counts=np.maximum(counts, drawn.counts),
+        ripple=np.exp(rng.uniform(np.log(0.1), np.log(1.5), 2)),
+        ripple_time=np.exp(rng.uniform(np.log(0.002), np.log(0.2), 2)),
+        # Finer than any line of the catalogue's cogging.
+        ripple_cycles=rng.integers(500, 1500, 2).astype(float),
+    )
 
 
 def random_machine(rng: Generator, thigh_length: float) -> Machine:
     """Draw an exoskeleton for a thigh of this length."""
     thigh_mass, shank_mass = rng.uniform(2.5, 5.0), rng.uniform(1.5, 3.0)
     leg = Leg(
-        Segment(thigh_mass, rng.uniform(0.35, 0.6) * thigh_length, thigh_mass * rng.uniform(0.01, 0.02)),
+        Segment(
+            thigh_mass, rng.uniform(0.35, 0.6) * thigh_length, thigh_mass * rng.uniform(0.01, 0.02)
+        ),
         Segment(shank_mass, rng.uniform(0.12, 0.24), shank_mass * rng.uniform(0.008, 0.02)),
         thigh_length,
     )

@@ -1,16 +1,19 @@
-"""How large a hidden effect is: rms of its torque away from reversals over the rms of the joint's, a weight apart."""
+"""How large a hidden effect is: rms of its torque away from reversals over the rms of the joint's,
+a weight apart."""
 
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from tests.blind.causes import Cause
-from tests.blind.floor import blocks, moving
 from tests.blind.plan import HIP
-from tests.blind.plant import Recorded
+from tests.blind.recorded import Recorded
 
 PASSES = 7
 CLOSE = 0.04
+ACTS, OF_LARGEST, LEAST_AT_LARGEST = 0.3, 0.9, 0.012
+"""Share of the wanted magnitude that has to come of a size below this share of the largest, and
+the magnitude that has to come of the largest."""
 FARTHEST = 5.0
 """Factor by which a size changes at once: from afar the leg may behave otherwise."""
 
@@ -22,20 +25,31 @@ def magnitude(cause: Cause, runs: Sequence[Recorded]) -> float:
 
 
 def rms(cause: Cause, runs: Sequence[Recorded]) -> tuple[float, float]:
-    """Return rms of what is hidden and of the torque, N·m, away from reversals, over the runs where the cause acts."""
+    """Return rms of what is hidden and of the torque, N·m, away from reversals, over the runs where
+    the cause acts."""
     j = HIP if cause.joint is None else cause.joint
-    acting = [(r, moving(r)[:, j]) for r in runs if cause.acts_in(r.run.kind)]
-    hidden = np.concatenate([blocks(r.effect)[rows, j] for r, rows in acting])
-    torque = np.concatenate([blocks(r.clean_torque)[rows, j] - r.weight for r, rows in acting])
+    acting = [r for r in runs if cause.acts_in(r.run.kind)]
+    # What is faster than blocks is told sample by sample.
+    rows = [(r.moving_samples() if cause.fast else r.moving())[:, j] for r in acting]
+    shown = [(lambda x: x) if cause.fast else r.blocks for r in acting]
+    several = list(zip(acting, rows, shown, strict=True))
+    hidden = np.concatenate([of(r.effect)[moving, j] for r, moving, of in several])
+    torque = np.concatenate([of(r.clean_torque)[moving, j] - r.weight for r, moving, of in several])
     if not len(hidden):
         raise FloatingPointError("the simulated leg is stuck")
     return float(np.sqrt(np.mean(hidden**2))), float(np.sqrt(np.mean(torque**2)))
 
 
-def size_for(cause: Cause, wanted: float, pilot: Callable[[float], Sequence[Recorded]]) -> float:
+def size_for(
+    cause: Cause,
+    wanted: float,
+    pilot: Callable[[float], Sequence[Recorded]],
+    must_act: bool = False,
+) -> float:
     """Find the size at which a cause has a magnitude, by simulating it alone a few times.
 
-    The sizes that make a working leg win over the wish.
+    The sizes that make a working leg win over the wish. With ``must_act`` a cause that does nothing
+    along these motions raises FloatingPointError.
     """
     size, low, high = cause.start, cause.smallest, cause.largest
     for _ in range(PASSES):
@@ -52,4 +66,24 @@ def size_for(cause: Cause, wanted: float, pilot: Callable[[float], Sequence[Reco
         new = float(np.clip(new, cause.smallest, cause.largest))
         # What is far from proportional is bisected.
         size = new if low <= new <= high else float(np.sqrt(low * high))
+    least = LEAST_AT_LARGEST if size >= OF_LARGEST * cause.largest else ACTS * wanted
+    if must_act and found < least:
+        raise FloatingPointError(f"{cause.label} does not act on this motion")
     return size
+
+
+def small_size_for(
+    cause: Cause, wanted: float, pilot: Callable[[float], Sequence[Recorded]]
+) -> float:
+    """Return the size at which a cause has a small magnitude, in proportion to that of one larger
+    size."""
+    size = cause.start
+    for _ in range(3):
+        try:
+            found = magnitude(cause, pilot(size))
+        except FloatingPointError:
+            found = np.inf
+        if np.isfinite(found) and found > 0:
+            return float(min(size * wanted / found, cause.largest))
+        size *= 0.2
+    raise FloatingPointError(f"{cause.label} has no size")

@@ -1,7 +1,7 @@
 """What is moved and recorded: the exoskeleton's leg with its wearer, or a machine of one joint.
 
-A machine of one joint is the simulated leg whose knee stands still and whose shank weighs nothing; what it records is
-the hip's, under another name and in the units of a machine of another size.
+A machine of one joint is the simulated leg whose knee stands still and whose shank weighs nothing;
+what it records is the hip's, under another name and in the units of a machine of another size.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,10 +16,10 @@ from tests.blind import imperfections
 from tests.blind.body import Leg, Segment
 from tests.blind.causes import Spec, log_uniform
 from tests.blind.excitation import Excitation, random_excitation
-from tests.blind.machine import DRIVE_RATE_HZ, random_machine
+from tests.blind.machine import random_machine
 from tests.blind.people import random_person
 from tests.blind.plan import HIP, JOINTS, Run
-from tests.blind.plant import Recorded, Rig
+from tests.blind.recorded import Recorded, Rig
 from tests.blind.units import Units
 
 WEIGHTLESS = Segment(1e-4, 0.0, 1e-5)
@@ -48,7 +48,8 @@ class Mechanism(Protocol):
         """Return what the recording says of the machine."""
 
     def truth(self, rig: Rig, kinds: Sequence[str]) -> dict[str, Any]:
-        """Return what a truth file says of the rig in these kinds of run, in the recording's units."""
+        """Return what a truth file says of the rig in these kinds of run, in the recording's
+        units."""
 
 
 @dataclass(frozen=True)
@@ -86,20 +87,16 @@ class ExoskeletonLeg:
         if r.run.has_human:
             thigh, shank = machine.cuff_distance
             geometry |= {"thigh_cuff_distance_m": thigh, "shank_cuff_distance_m": shank}
-        controller = {
-            joint: {
-                "type": "pd", "kp_nm_rad": float(machine.kp[j]), "kd_nm_s_rad": float(machine.kd[j]),
-                "rate_hz": DRIVE_RATE_HZ, "limit_nm": float(machine.limit[j]),
-            }
-            for j, joint in enumerate(JOINTS)
-        }  # fmt: skip
+        controller = {joint: machine.controller(j) for j, joint in enumerate(JOINTS)}
         return {"controller": controller, "geometry": geometry}
 
     def truth(self, rig: Rig, kinds: Sequence[str]) -> dict[str, Any]:
         """Return the wearer, the rigid body and the machine."""
         return {
             "person": asdict(rig.person),
-            "X": {kind: rig.leg(Run(kind, "train", 0.0, None)).inertial().tolist() for kind in kinds},
+            "X": {
+                kind: rig.leg(Run(kind, "train", 0.0, None)).inertial().tolist() for kind in kinds
+            },
             "machine": {
                 name: np.asarray(getattr(rig.machine, name)).tolist()
                 for name in ("coulomb", "viscous", "hip_rotor", "counts", "ripple", "ripple_time")
@@ -125,8 +122,15 @@ class OneJoint:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Causes of the contract that such a machine can have, and that are no part of its rigid body."""
-        turned = ("backlash", "mass_off_axis", "payload_change", "encoder_offset")
+        """Causes of the contract that such a machine can have, and that are no part of its rigid
+        body."""
+        turned = (
+            "backlash",
+            "mass_off_axis",
+            "payload_change",
+            "encoder_offset",
+            "encoder_eccentricity",
+        )
         constant = ("coulomb_asymmetry", "torque_offset")
         return (*ANYWHERE, *(turned if self.gravity else ()), *(() if self.weight else constant))
 
@@ -140,10 +144,13 @@ class OneJoint:
         size = Units(log_uniform(rng, 0.01, 5.0))
         if self.kind == "prismatic":
             size = Units(log_uniform(rng, 1.0, 100.0), log_uniform(rng, 0.02, 0.5))
-        return Rig(machine, random_person(rng), size, rng.uniform(5.0, 25.0) if self.weight else 0.0)
+        return Rig(
+            machine, random_person(rng), size, rng.uniform(5.0, 25.0) if self.weight else 0.0
+        )
 
     def excitation(self, rng: Generator) -> Excitation:
-        """Draw a motion, on either side of where stops and detents are; what would be the knee stands still."""
+        """Draw a motion, on either side of where stops and detents are; what would be the knee
+        stands still."""
         drawn = random_excitation(rng)
         still = np.zeros_like(drawn.a)
         still[HIP] = 1.0
@@ -161,7 +168,10 @@ class OneJoint:
     def header(self, rig: Rig, r: Recorded) -> dict[str, Any]:
         """Return joint and gravity."""
         gravity = 9.81 if self.weight else self.gravity
-        return {"joints": [{"name": "axis", "kind": self.kind}], "geometry": {"gravity_m_s2": gravity}}
+        return {
+            "joints": [{"name": "axis", "kind": self.kind}],
+            "geometry": {"gravity_m_s2": gravity},
+        }
 
     def truth(self, rig: Rig, kinds: Sequence[str]) -> dict[str, Any]:
         """Return the rigid body, its motor's rotor with it, and the machine; nobody wears it."""
@@ -185,8 +195,9 @@ class OneJoint:
 
 
 ANYWHERE = (
-    "stribeck_friction", "viscous_asymmetry", "load_dependent_friction", "quadratic_drag", "presliding_hysteresis",
-    "friction_warmup", "cogging", "joint_elasticity", "parallel_spring", "torque_drift", "time_delay",
+    "stribeck_friction", "viscous_asymmetry", "load_dependent_friction", "quadratic_drag",
+    "presliding_hysteresis", "friction_warmup", "cogging", "joint_elasticity", "parallel_spring",
+    "torque_drift", "time_delay", "end_stop", "position_dependent_friction", "gain_drift",
 )  # fmt: skip
 """Causes that a joint can have wherever it stands."""
 ONE_JOINT: dict[str, OneJoint] = {
@@ -199,7 +210,8 @@ MECHANISMS: dict[str, Mechanism] = {"leg": ExoskeletonLeg(), **ONE_JOINT}
 
 
 class _Quantity(NamedTuple):
-    """What is recorded of each joint: the end of its column's name, values (n, 2), powers of torque and of angle."""
+    """What is recorded of each joint: the end of its column's name, values (n, 2), powers of torque
+    and of angle."""
 
     column: str
     values: NDArray
@@ -207,7 +219,9 @@ class _Quantity(NamedTuple):
     angle: int
 
 
-def _named(angle: str, torque: str, reference: str, speed: str) -> Callable[[Recorded], list[_Quantity]]:
+def _named(
+    angle: str, torque: str, reference: str, speed: str
+) -> Callable[[Recorded], list[_Quantity]]:
     def of(r: Recorded) -> list[_Quantity]:
         return [
             _Quantity(angle, r.angle, 0, 1), _Quantity(torque, r.torque, 1, 0),

@@ -1,8 +1,9 @@
 """The page that reports the blind examination, written from its records.
 
-``python -m tests.blind.page build/blind/report.json build/blind-full/report.json docs/blind.md`` writes the page, and
-``images/blind-reliability.png`` beside it. The mixed examination comes first: its probabilities are those drawn.
-``docs/blind-machines.md`` is written from that of the machines of one joint.
+``python -m tests.blind.page build/blind/report.json build/blind-full/report.json docs/blind.md``
+writes the page, and ``images/blind-reliability.png`` beside it. The mixed examination comes first:
+its probabilities are those drawn. ``docs/blind-machines.md`` is written from that of the machines
+of one joint.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,34 +28,59 @@ OF_SINGLES: tuple[tuple[Table, str], ...] = (
     (tables.by_form, ""),
     (tables.by_machine, ""),
     (tables.by_kinds, ""),
-    (tables.confusion, "Right answers, honest ties included, stand on the diagonal; the right cause at the wrong joint "
-     "under *joint*."),
-)  # fmt: skip
+    (
+        tables.confusion,
+        "Right answers, honest ties included, stand on the diagonal; the right cause at the wrong "
+        "joint under *joint*.",
+    ),
+)
 """What the examination with most single effects tells best, and what is said above each table."""
 OF_EACH: tuple[tuple[Table, str], ...] = (
+    (tables.by_world, ""),
     (tables.pairs, ""),
     (tables.alarms, ""),
-    (tables.outside, "Right is `unknown_cause`, or the cause of the catalogue that a person would call it by."),
+    (
+        tables.outside,
+        "Right is that something is missing, and that no cause of the catalogue is likely but one "
+        "that a person would call it by.",
+    ),
+    (
+        tables.families,
+        "Right is a finding of an acceptable family, at the joint, with a probability of a half or "
+        "more.",
+    ),
     (tables.faults, "Right is file, joint and kind."),
     (tables.kinds_of_miss, "What was hidden, and what was answered, with the number of cases."),
     (tables.residuals, "Quantiles over sessions and joints."),
-    (tables.probabilities, "Of every named cause, whether it or what it is tied with was there.\n\n"
-     "![Probability said against how often it was so]({picture})\n\n*Drawn from examination 1.*"),
-    (tables.coverage, "Of rightly named causes, parameters that the plant's form has in common with the catalogue's."),
-    (tables.seconds, "Quantiles of wall time, beside whatever else ran; `make bench` measures speed."),
-)  # fmt: skip
+    (
+        tables.probabilities,
+        "Of every named cause, whether it or what it is tied with was there.\n\n"
+        "![Probability said against how often it was so]({picture})\n\n"
+        "*Drawn from examination 1.*",
+    ),
+    (
+        tables.coverage,
+        "Of rightly named causes, parameters that the plant's form has in common with the "
+        "catalogue's.",
+    ),
+    (
+        tables.seconds,
+        "Quantiles of wall time, beside whatever else ran; `make bench` measures speed.",
+    ),
+)
 """What every examination tells that has such cases; a remark may show the page's ``{picture}``."""
 
 INTRODUCTION = """\
 # How often a diagnosis is right
 
-Written by `make blind-page` from the records of the blind examination; what that is, what is hidden and how answers are
-scored, tells [tests/blind/README.md](../tests/blind/README.md). Recordings come from a plant that shares no code with
-exoid, and `exoid diagnose` gets them and nothing else. Shares with Wilson's 95 % interval in brackets.
+Written by `make blind-page` from the records of the blind examination;
+[tests/blind/README.md](../tests/blind/README.md) says what that is, what is hidden and how answers
+are scored. Recordings come from simulators that share no code with exoid, and `exoid diagnose` gets
+them and nothing else. Shares with Wilson's 95 % interval in brackets.
 """
 OF_ONE_JOINT = """\
-Here they are of machines of one joint, of sizes far from an exoskeleton's: a pendulum, a turntable, a level slide and a
-lift, each with one run of 60 to 80 s to train on and one to validate on.
+Here they are of machines of one joint, of sizes far from an exoskeleton's: a pendulum, a turntable,
+a level slide and a lift, each with one run of 60 to 80 s to train on and one to validate on.
 """
 
 
@@ -62,13 +88,23 @@ def page(examinations: Sequence[Examination], picture: str = "") -> str:
     """Return the page as Markdown; ``picture`` is where its figure lies beside it."""
     richest = max(examinations, key=lambda e: len(of(e.scores, "single")))
     legs = any(s.machine == "leg" for e in examinations for s in e.scores)
-    parts = [INTRODUCTION, "" if legs else OF_ONE_JOINT, _what_was_run(examinations), _targets(examinations)]
+    parts = [
+        INTRODUCTION,
+        "" if legs else OF_ONE_JOINT,
+        _what_was_run(examinations),
+        _targets(examinations),
+    ]
     parts += [_section(table, remark, examinations, [richest]) for table, remark in OF_SINGLES]
-    parts += [_section(table, remark.format(picture=picture), examinations, examinations) for table, remark in OF_EACH]
+    parts += [
+        _section(table, remark.format(picture=picture), examinations, examinations)
+        for table, remark in OF_EACH
+    ]
     return "\n".join(part for part in parts if part)
 
 
-def _section(table: Table, remark: str, every: Sequence[Examination], chosen: Sequence[Examination]) -> str:
+def _section(
+    table: Table, remark: str, every: Sequence[Examination], chosen: Sequence[Examination]
+) -> str:
     """Return a table of each chosen examination under one heading; nothing where none has rows."""
     made = [(number, table(e.scores)) for number, e in enumerate(every, 1) if e in chosen]
     made = [(number, page) for number, page in made if page.rows]
@@ -84,19 +120,29 @@ def _what_was_run(examinations: Sequence[Examination]) -> str:
     rows = []
     for number, examination in enumerate(examinations, 1):
         seeds = [s.seed for s in examination.scores]
-        rows.append((str(number), f"`{examination.command}`", str(len(seeds)), f"{min(seeds)} to {max(seeds)}"))
+        rows.append(
+            (
+                str(number),
+                f"`{examination.command}`",
+                str(len(seeds)),
+                f"{min(seeds)} to {max(seeds)}",
+            )
+        )
     made = Page("What was run", ("", "command", "cases", "seeds"), rows)
-    return f"{titled(made)}\n{_provenance({use for e in examinations for use in uses(s.seed for s in e.scores)})}\n"
+    found = {use for e in examinations for use in uses(s.seed for s in e.scores)}
+    return f"{titled(made)}\n{_provenance(found)}\n"
 
 
 def _provenance(found: set[str]) -> str:
     tuning, reporting = RANGES["tuning"], RANGES["reporting"]
     if found == {"reporting"}:
         return (
-            f"Seeds from {reporting.start} to {reporting.stop - 1} are for reporting: the diagnosis was never tuned on "
-            f"them, only on seeds from {tuning.start} to {tuning.stop - 1}."
+            f"Seeds from {reporting.start} to {reporting.stop - 1} are for reporting: the "
+            f"diagnosis was never tuned on them, only on seeds from {tuning.start} to "
+            f"{tuning.stop - 1}."
         )
-    return f"**Not a report: not all of these seeds are for reporting ({reporting.start} to {reporting.stop - 1}).**"
+    span = f"{reporting.start} to {reporting.stop - 1}"
+    return f"**Not a report: not all of these seeds are for reporting ({span}).**"
 
 
 def _targets(examinations: Sequence[Examination]) -> str:
@@ -115,7 +161,9 @@ def _targets(examinations: Sequence[Examination]) -> str:
 
 
 def main(
-    records: Annotated[list[Path], typer.Argument(exists=True, help="report.json of one or more, and the page.")],
+    records: Annotated[
+        list[Path], typer.Argument(exists=True, help="report.json of one or more, and the page.")
+    ],
     out: Annotated[Path, typer.Argument(help="The page to be written.")],
 ) -> None:
     """Write the page and its picture."""

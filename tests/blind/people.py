@@ -1,7 +1,7 @@
 """Random people: their legs by body mass and height.
 
-Winter (2009), Biomechanics and Motor Control of Human Movement, table 4.1: segment masses, centres of
-mass and radii of gyration as shares; thigh 0.245 and shank 0.246 of the height (figure 4.1).
+Winter (2009), Biomechanics and Motor Control of Human Movement, table 4.1: segment masses, centres
+of mass and radii of gyration as shares; thigh 0.245 and shank 0.246 of the height (figure 4.1).
 """
 
 from dataclasses import dataclass
@@ -34,9 +34,9 @@ class Person:
         )
 
 
-def random_person(rng: Generator) -> Person:
-    """Draw a person of 50 to 100 kg whose height suits the mass (body mass index 19 to 30)."""
-    mass = rng.uniform(50.0, 100.0)
+def random_person(rng: Generator, lightest_kg: float = 50.0, heaviest_kg: float = 100.0) -> Person:
+    """Draw a person whose height suits the mass (body mass index 19 to 30)."""
+    mass = rng.uniform(lightest_kg, heaviest_kg)
     height = (mass / rng.uniform(19.0, 30.0)) ** 0.5
     return Person(mass, min(1.98, max(1.50, height)))
 

@@ -1,14 +1,18 @@
-"""What is hidden in one run: every place where an effect can act, gathered before the run is simulated."""
+"""What is hidden in one run: every place where an effect can act, gathered before the run is
+simulated."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from tests.blind.body import Payload, Segment
-from tests.blind.loop import RIGID, Hidden
+from tests.blind.body import Leg, Payload, Segment
+from tests.blind.channel import Channel
+from tests.blind.encoders import WAVES
+from tests.blind.loop import Hidden
 from tests.blind.smooth import MEMORIES
+from tests.blind.transmissions import RIGID
 
 HIP, KNEE = 0, 1
 JOINTS = ("hip", "knee")
@@ -22,29 +26,15 @@ class Run:
     purpose: str
     duration_s: float
     rng: Generator
+    temperature: NDArray | None = None
+    """Of both motors at 50 Hz, (n, 2) degrees Celsius."""
+    temperature_range: NDArray | None = None
+    """Coldest and warmest that they are in any run of the session, (2, 2)."""
 
     @property
     def has_human(self) -> bool:
         """Is a person in the machine?"""
         return self.kind == "with_human"
-
-
-@dataclass
-class Channel:
-    """What becomes of a joint's torque between motor and file; arrays (2,)."""
-
-    gain: NDArray = field(default_factory=lambda: np.ones(2))
-    bend: NDArray = field(default_factory=lambda: np.zeros(2))
-    """Change of gain per N·m of the torque's size."""
-    fade: NDArray = field(default_factory=lambda: np.zeros((2, 2)))
-    """Change of gain as the sensor warms, and its time constant."""
-    offset: NDArray = field(default_factory=lambda: np.zeros(2))
-    moving_offset: list = field(default_factory=lambda: [None, None])
-    """Function of time, N·m."""
-    delay_s: NDArray = field(default_factory=lambda: np.zeros(2))
-    lag_s: NDArray = field(default_factory=lambda: np.zeros(2))
-    cross: NDArray = field(default_factory=lambda: np.zeros((2, 2)))
-    """Share of the other joint's torque that leaks in."""
 
 
 class Plan:
@@ -57,19 +47,40 @@ class Plan:
         self.transmission = np.full(2, RIGID)
         self.spring = np.zeros((2, 5))
         self.encoder_offset = np.zeros(2)
-        self.wobble = np.zeros((2, 2))
+        self.wobble = np.zeros((2, 2 * WAVES))
+        """Of the encoders: amplitude and phase of errors once, twice and three times a turn."""
         self.tilt = np.zeros(3)
         self.lumps: list[tuple[int, Segment]] = []
         self.payload: Payload | None = None
         self.load = np.array([0.0, 0.0, 1.0, 1.0])
         """Payload's mass, start, ramp, and whether it comes (+1) or goes (-1)."""
         self.cuffs: NDArray | None = None
-        """(2, 3) stiffness (N·m/rad about the joint), damping (N·m·s/rad), hardening (1/rad²) of thigh and shank cuff.
+        """(2, 6) of thigh and shank cuff, about their joints; None where both legs move as one.
 
-        None where the wearer is strapped so firmly that both legs are one.
+        Stiffness (N·m/rad), damping (N·m·s/rad), hardening (1/rad²), slack (rad), share that
+        relaxes, and its time (s).
         """
 
-    def torque(self, kind: int, joint: int, *p: float, human: bool = False, table: NDArray | None = None) -> None:
+    def with_lumps(self, leg: Leg) -> Leg:
+        """Return a leg with what is fixed to its segments."""
+        for joint, lump in self.lumps:
+            name = ("thigh", "shank")[joint]
+            leg = replace(leg, **{name: getattr(leg, name) + lump})
+        return leg
+
+    def eccentric(self, joint: int, *waves: float) -> None:
+        """Add errors to an encoder: amplitude and phase once a turn, twice, three times."""
+        for c in range(0, len(waves), 2):
+            size, angle = self.wobble[joint, c : c + 2]
+            if not size:
+                self.wobble[joint, c : c + 2] = waves[c : c + 2]
+            elif waves[c]:
+                both = size * np.exp(1j * angle) + waves[c] * np.exp(1j * waves[c + 1])
+                self.wobble[joint, c : c + 2] = abs(both), np.angle(both)
+
+    def torque(
+        self, kind: int, joint: int, *p: float, human: bool = False, table: NDArray | None = None
+    ) -> None:
         """Hide a torque at a joint."""
         self.rows.append((kind, joint, human, p, table))
 

@@ -15,9 +15,10 @@ from tests.blind.scoring import Score
 from tests.blind.tables import Page
 
 TABLES = (
-    tables.summary, tables.by_cause, tables.by_magnitude, tables.by_visibility, tables.by_form, tables.by_machine,
-    tables.by_kinds, tables.pairs, tables.alarms, tables.outside, tables.faults, tables.misses, tables.confusion,
-    tables.residuals, tables.probabilities, tables.coverage,
+    tables.summary, tables.by_world, tables.by_cause, tables.by_magnitude, tables.by_visibility,
+    tables.by_form, tables.by_machine, tables.by_kinds, tables.pairs, tables.alarms, tables.outside,
+    tables.families, tables.faults, tables.misses, tables.confusion, tables.residuals,
+    tables.probabilities, tables.coverage,
 )  # fmt: skip
 
 
@@ -37,7 +38,13 @@ def pages(scores: Sequence[Score]) -> list[Page]:
 def show(console: Console, scores: Sequence[Score]) -> None:
     """Print all tables."""
     for page in pages(scores):
-        table = Table(*page.head, title=page.title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+        table = Table(
+            *page.head,
+            title=page.title,
+            title_justify="left",
+            box=box.SIMPLE_HEAD,
+            padding=(0, 1, 0, 0),
+        )
         for row in page.rows:
             table.add_row(*row)
         console.print(table)
@@ -49,9 +56,12 @@ def write(folder: Path, examination: Examination) -> None:
     scores = sorted(examination.scores, key=lambda s: s.seed)
     record = {"command": examination.command, "scores": [asdict(s) for s in scores]}
     (folder / "report.json").write_text(json.dumps(record, indent=1))
-    said = f"`{examination.command}`: {len(scores)} cases, seeds {scores[0].seed} to {scores[-1].seed}."
+    seeds = f"seeds {scores[0].seed} to {scores[-1].seed}"
+    said = f"`{examination.command}`: {len(scores)} cases, {seeds}."
     lines = ["# Blind examination", "", said, "Rates with Wilson's 95 % interval.", ""]
-    (folder / "report.md").write_text("\n".join([*lines, *(titled(page) for page in pages(scores))]))
+    (folder / "report.md").write_text(
+        "\n".join([*lines, *(titled(page) for page in pages(scores))])
+    )
 
 
 def read(path: Path) -> Examination:
@@ -63,7 +73,9 @@ def read(path: Path) -> Examination:
 
 def markdown(page: Page) -> str:
     """Return a table as Markdown."""
-    return "\n".join([_row(page.head), _row("---" for _ in page.head), *(_row(row) for row in page.rows), ""])
+    return "\n".join(
+        [_row(page.head), _row("---" for _ in page.head), *(_row(row) for row in page.rows), ""]
+    )
 
 
 def titled(page: Page) -> str:

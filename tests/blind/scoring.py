@@ -1,7 +1,8 @@
 """What a verdict is worth against the truth."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import log
 from typing import Any
 
 from tests.blind.faults import WORDS
@@ -9,6 +10,10 @@ from tests.blind.faults import WORDS
 Named = tuple[str, str | None]
 JOINTS = ("hip", "knee")
 SILENT = "nothing_missing"
+LIKELY = 0.5
+"""Probability from which something counts as said."""
+LEAST = 1e-4
+"""Least probability whose logarithm is taken."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +29,8 @@ class Score:
     magnitude: float | None
     """Of a single effect."""
     visibility: float
-    """What rigid body and friction cannot imitate of it, over the noise floor, at the joint where that is most."""
+    """What rigid body and friction cannot imitate of it, over the noise floor, at the joint where
+    that is most."""
     kinds: tuple[str, ...]
     status: str
     """The verdict's, or ``refused``, ``crashed``, ``fault`` where a data fault was named."""
@@ -40,6 +46,15 @@ class Score:
     """Effect, parameter, and whether its 95 % interval holds the truth."""
     seconds: float = 0.0
     machine: str = "leg"
+    world: str = "mujoco"
+    held_back: bool = False
+    """Is it of a kind that is never shown to what learns?"""
+    family_right: bool | None = None
+    """Is a finding of an acceptable family, at the right joint, at least as likely as not? None
+    where nothing is hidden, or the verdict has no findings."""
+    log_probability: float | None = None
+    """Natural logarithm of the probability given to the truth; None where the verdict tells
+    none."""
 
     @property
     def first(self) -> str:
@@ -47,7 +62,11 @@ class Score:
         return self.named[0][0] if self.named else self.status
 
 
-def score(truth: Mapping[str, Any], answer: Mapping[str, Any], smallest: Mapping[Named, float] | None = None) -> Score:
+def score(
+    truth: Mapping[str, Any],
+    answer: Mapping[str, Any],
+    smallest: Mapping[Named, float] | None = None,
+) -> Score:
     """Compare an answer with the truth.
 
     Parameters
@@ -55,22 +74,29 @@ def score(truth: Mapping[str, Any], answer: Mapping[str, Any], smallest: Mapping
     truth : mapping
         A truth file.
     answer : mapping
-        ``exit_code``, ``message`` (what the command said), ``seconds``, and ``verdict`` (``verdict/1``, or None).
+        ``exit_code``, ``message`` (what the command said), ``seconds``, and ``verdict``
+        (``verdict/1``, or None).
     smallest : mapping, optional
-        Smallest visible size of each cause, rms N·m; without it silence about an effect is always wrong.
+        Smallest visible size of each cause, rms N·m; without it silence about an effect is always
+        wrong.
     """
     category = truth["case"]["category"]
-    verdict = answer["verdict"] or {"status": _without_verdict(answer["exit_code"]), "causes": [], "data_faults": []}
+    verdict = answer["verdict"] or {
+        "status": _without_verdict(answer["exit_code"]),
+        "causes": [],
+        "data_faults": [],
+    }
     hidden = tuple((h["effect"], h["joint"]) for h in truth["hidden"])
     causes = verdict["causes"]
     kin = {(effect, h["joint"]) for h in truth["hidden"] for effect in h["kin"]}
+    faults = [f for f in verdict["data_faults"] if not _is_a_declared_gap(f, truth)]
     unseen = _unseen(truth, smallest) and verdict["status"] == SILENT
     right = {
         "single": lambda: bool(causes) and hidden[0] in names_of(causes[0]),
         "pair": lambda: all(any(h in names_of(c) for c in causes) for h in hidden),
-        "none": lambda: verdict["status"] == SILENT and not verdict["data_faults"],
-        "imperfect": lambda: verdict["status"] == SILENT and not verdict["data_faults"],
-        "outside": lambda: verdict["status"] == "unknown_cause" or bool(causes and kin & names_of(causes[0])),
+        "none": lambda: verdict["status"] == SILENT and not faults,
+        "imperfect": lambda: verdict["status"] == SILENT and not faults,
+        "outside": lambda: _is_called_unlisted(verdict, kin),
         "fault": lambda: fault_is_named(truth["fault"], verdict["data_faults"], answer["message"]),
     }[category]()
     return Score(
@@ -80,7 +106,10 @@ def score(truth: Mapping[str, Any], answer: Mapping[str, Any], smallest: Mapping
         forms=tuple(h["form"] for h in truth["hidden"]),
         own_form=all(h["own_form"] for h in truth["hidden"]),
         magnitude=truth["hidden"][0]["magnitude"] if len(hidden) == 1 else None,
-        visibility=max(left / truth["noise_floor_nm"][joint] for joint, left in truth["left_by_baseline_nm"].items()),
+        visibility=max(
+            left / truth["noise_floor_nm"][joint]
+            for joint, left in truth["left_by_baseline_nm"].items()
+        ),
         kinds=tuple(truth["case"]["kinds"]),
         status=verdict["status"],
         named=tuple((c["effect"], c["joint"]) for c in causes),
@@ -96,7 +125,66 @@ def score(truth: Mapping[str, Any], answer: Mapping[str, Any], smallest: Mapping
         covered=tuple(_covered(truth["hidden"], causes)),
         seconds=float(answer["seconds"]),
         machine=truth["case"]["machine"],
+        world=truth["case"].get("world", "mujoco"),
+        held_back=any(h.get("held_back", False) for h in truth["hidden"]),
+        family_right=_family_is_right(truth["hidden"], verdict.get("findings")),
+        log_probability=_log_probability(truth, verdict.get("posterior")),
     )
+
+
+def _is_called_unlisted(verdict: Mapping[str, Any], kin: set[Named]) -> bool:
+    """Tell whether something was found missing and no listed cause called likely, but for its
+    kin."""
+    if verdict["status"] not in ("unknown_cause", "partly_explained", "explained"):
+        return False
+    likely = [c for c in verdict["causes"] if float(c["probability"]) >= LIKELY]
+    return all(kin & names_of(c) for c in likely)
+
+
+def _is_a_declared_gap(fault: Mapping[str, Any], truth: Mapping[str, Any]) -> bool:
+    """Tell whether a data fault is what the file's own metadata says: samples that it lost."""
+    words = ("gap", "missing", "dropped", "lost")
+    declared = fault["file"] in truth.get("with_gaps", ())
+    return declared and any(word in fault["what"].lower() for word in words)
+
+
+def _family_is_right(
+    hidden: Sequence[Mapping[str, Any]], findings: Sequence[Mapping[str, Any]] | None
+) -> bool | None:
+    """Tell whether each hidden effect has a likely finding of its kind of law at its joint."""
+    told = [h for h in hidden if h.get("families")]
+    if findings is None or not told:
+        return None
+    return all(any(_is_of_family(finding, h) for finding in findings) for h in told)
+
+
+def _is_of_family(finding: Mapping[str, Any], hidden: Mapping[str, Any]) -> bool:
+    anywhere = hidden["joint"] is None or hidden.get("at_both_joints", False)
+    at_joint = anywhere or finding.get("joint") in (None, hidden["joint"])
+    of_family = finding.get("family") in hidden["families"]
+    return bool(at_joint and of_family and float(finding["probability"]) >= LIKELY)
+
+
+def _log_probability(truth: Mapping[str, Any], posterior: Mapping[str, Any] | None) -> float | None:
+    """Return the mean logarithm of the probabilities of all that is true, each at least
+    ``LEAST``."""
+    category = truth["case"]["category"]
+    if posterior is None or category == "fault":
+        return None
+    if category in ("none", "imperfect"):
+        true = [posterior.get("nothing_missing", 0.0)]
+    else:
+        true = [_probability_of(h, posterior) for h in truth["hidden"]]
+    return sum(log(max(LEAST, float(p))) for p in true) / len(true)
+
+
+def _probability_of(hidden: Mapping[str, Any], posterior: Mapping[str, Any]) -> float:
+    causes, joint = posterior.get("causes", {}), hidden["joint"]
+    names = [hidden["effect"], *hidden["kin"]]
+    told = [causes.get(name if joint is None else f"{name}@{joint}", 0.0) for name in names]
+    if hidden["effect"].startswith("outside:"):
+        told.append(posterior.get("unlisted", 0.0))
+    return max(told)
 
 
 def names_of(cause: Mapping[str, Any]) -> set[Named]:
@@ -105,10 +193,14 @@ def names_of(cause: Mapping[str, Any]) -> set[Named]:
     return {(cause["effect"], cause["joint"])} | {(tie["effect"], tie["joint"]) for tie in ties}
 
 
-def fault_is_named(fault: Mapping[str, Any], found: Iterable[Mapping[str, Any]], message: str) -> bool:
-    """Tell whether a data fault was said, in the verdict or in the line with which the command refused the files.
+def fault_is_named(
+    fault: Mapping[str, Any], found: Iterable[Mapping[str, Any]], message: str
+) -> bool:
+    """Tell whether a data fault was said, in the verdict or in the line with which the command
+    refused the files.
 
-    Right are a file that has the fault and a word for what it is; where one channel has it, that channel or joint.
+    Right are a file that has the fault and a word for what it is; where one channel has it, that
+    channel or joint.
     """
     sentences = [f"{f['file']} {f['channel']} {f['what']}" for f in found] + [message]
     joint = (fault["channel"] or "").split("_")[0]
@@ -131,14 +223,21 @@ def _unseen(truth: Mapping[str, Any], smallest: Mapping[Named, float] | None) ->
     return hidden["rms_nm"] < smallest.get((hidden["effect"], hidden["joint"]), 0.0)
 
 
-def _ratio(values: Mapping[str, float] | None, floor: Mapping[str, float], category: str) -> dict[str, float]:
+def _ratio(
+    values: Mapping[str, float] | None, floor: Mapping[str, float], category: str
+) -> dict[str, float]:
     if not values or category == "fault":
         return {}
-    return {joint: values[joint] / noise for joint, noise in floor.items() if values.get(joint) is not None}
+    return {
+        joint: values[joint] / noise
+        for joint, noise in floor.items()
+        if values.get(joint) is not None
+    }
 
 
 def _covered(hidden: Iterable[Mapping[str, Any]], causes: Iterable[Mapping[str, Any]]):
-    """Yield whether intervals hold the truth, for causes named rightly, parameters that the plant's form has too."""
+    """Yield whether intervals hold the truth, for causes named rightly, parameters that the plant's
+    form has too."""
     for h in hidden:
         for cause in causes:
             if (cause["effect"], cause["joint"]) != (h["effect"], h["joint"]):

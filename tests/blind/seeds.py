@@ -7,7 +7,8 @@ RANGES = {
     "reporting": range(540_000, 900_000),
     "fixed": range(900_000, 1_000_000),
 }
-"""For whoever works on the diagnosis; for numbers that are published; for the fixed set and the simulator's tests."""
+"""For whoever works on the diagnosis; for numbers that are published; for the fixed set and the
+simulator's tests."""
 
 
 def uses(seeds: Iterable[int]) -> set[str]:

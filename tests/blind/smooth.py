@@ -1,14 +1,16 @@
 """Hidden torques that are functions of motion, time and a few memories.
 
-Each form is a number, its parameters ``p``, memories ``m``, and a branch below. The sign is that of the
-torque the drive must add. Sources: LuGre after Canudas de Wit, Olsson, Astrom, Lischinsky (1995), IEEE TAC
-40(3); Bouc-Wen after Wen (1976), J. Eng. Mech. 102(2); Maxwell slip after Al-Bender, Lampaert, Swevers (2005),
-IEEE TAC 50(11); passive joint torque after Riener and Edrich (1999), J. Biomech. 32(5).
+Each form is a number, its parameters ``p``, memories ``m``, and a branch below. The sign is that of
+the torque the drive must add. Sources: LuGre after Canudas de Wit, Olsson, Astrom, Lischinsky
+(1995), IEEE TAC 40(3); Bouc-Wen after Wen (1976), J. Eng. Mech. 102(2); Maxwell slip after
+Al-Bender, Lampaert, Swevers (2005), IEEE TAC 50(11); passive joint torque after Riener and Edrich
+(1999), J. Biomech. 32(5).
 """
 
 from math import cos, exp, log, pi, sin, sqrt, tanh
 
-from numba import njit
+from tests.blind.compiled import njit
+from tests.blind.further_torques import FURTHER, further_torque
 
 VISCOUS_ASYMMETRY, VISCOUS_ASYMMETRY_SMOOTH = 20, 21
 DRAG = 22
@@ -25,9 +27,12 @@ MEMORIES = 6
 TABLE_RATE_HZ = 50.0
 
 
-@njit(cache=True)
+@njit()
 def smooth_torque(kind, p, m, table, t, dt, j, q, v, a):
-    """Torque at joint ``j`` for angles, speeds and accelerations (2,); memories ``m`` advance by ``dt``."""
+    """Torque at joint ``j`` for angles, speeds and accelerations (2,); memories ``m`` advance by
+    ``dt``."""
+    if kind >= FURTHER:
+        return further_torque(kind, p, m, table, t, dt, j, q, v, a)
     if kind <= DRAG:
         return _viscous(kind, p, v[j])
     if kind <= MAXWELL_SLIP:
@@ -50,7 +55,7 @@ def smooth_torque(kind, p, m, table, t, dt, j, q, v, a):
     return _uncatalogued(kind, p, m, table, t, dt, j, q, v, a)
 
 
-@njit(cache=True)
+@njit()
 def _viscous(kind, p, v):
     if kind == VISCOUS_ASYMMETRY:
         return p[0] * abs(v)
@@ -59,9 +64,10 @@ def _viscous(kind, p, v):
     return p[0] * abs(v) ** p[1] * (1.0 if v > 0 else -1.0)
 
 
-@njit(cache=True)
+@njit()
 def _presliding(kind, p, m, dt, v):
-    """``p``: friction torque, presliding angle, exponent or damping; memories hold the bristles, in rad."""
+    """``p``: friction torque, presliding angle, exponent or damping; memories hold the bristles, in
+    rad."""
     force, angle = p[0], p[1]
     if kind == MAXWELL_SLIP:
         total = 0.0
@@ -87,9 +93,10 @@ def _presliding(kind, p, m, dt, v):
     return force * m[0] / angle
 
 
-@njit(cache=True)
+@njit()
 def _end_range(kind, p, q):
-    """``p``: torque scale, onset, sharpness (1/rad) or power, side (+1: beyond the onset upward)."""
+    """``p``: torque scale, onset, sharpness (1/rad) or power, side (+1: beyond the onset
+    upward)."""
     x = (q - p[1]) * p[3]
     if kind == END_EXPONENTIAL:
         return p[3] * p[0] * exp(p[2] * x)
@@ -98,12 +105,14 @@ def _end_range(kind, p, q):
     return p[3] * p[0] * max(0.0, x) ** p[2]
 
 
-@njit(cache=True)
+@njit()
 def _rhythm(kind, p, m, t, dt):
     """``p``: amplitude, frequency, phase, depth of wandering and two slow frequencies of it."""
     if kind == RHYTHM:
         return p[0] * sin(2.0 * pi * p[1] * t + p[2])
-    wander = 1.0 + p[3] * (sin(2.0 * pi * p[4] * t + p[6]) + 0.6 * sin(2.0 * pi * p[5] * t + 2.0 * p[6]))
+    wander = 1.0 + p[3] * (
+        sin(2.0 * pi * p[4] * t + p[6]) + 0.6 * sin(2.0 * pi * p[5] * t + 2.0 * p[6])
+    )
     m[0] += dt * 2.0 * pi * p[1] * wander
     beat = sin(m[0] + p[2])
     if kind == RHYTHM_BURSTS:
@@ -111,7 +120,7 @@ def _rhythm(kind, p, m, t, dt):
     return p[0] * beat * (1.0 + p[3] * sin(2.0 * pi * p[5] * t))
 
 
-@njit(cache=True)
+@njit()
 def _reflex(kind, p, m, dt, v):
     """``p``: gain, threshold speed, side, smoothness (rad/s), latency (s)."""
     over = p[2] * v - p[1]
@@ -121,7 +130,7 @@ def _reflex(kind, p, m, dt, v):
     return p[2] * p[0] * m[0]
 
 
-@njit(cache=True)
+@njit()
 def _uncatalogued(kind, p, m, table, t, dt, j, q, v, a):
     if kind == TONE:
         return p[0] * sin(2.0 * pi * p[1] * t + p[2])

@@ -44,7 +44,8 @@ class Rate:
 
 
 def brier(forecasts: Sequence[tuple[float, bool]]) -> float | None:
-    """Mean squared distance of probabilities from what was (Brier, 1950); None without forecasts."""
+    """Mean squared distance of probabilities from what was (Brier, 1950); None without
+    forecasts."""
     if not forecasts:
         return None
     return sum((p - happened) ** 2 for p, happened in forecasts) / len(forecasts)
@@ -73,8 +74,11 @@ def reliability(forecasts: Sequence[tuple[float, bool]], bins: int = 10) -> list
 
 
 def calibration_error(forecasts: Sequence[tuple[float, bool]], bins: int = 10) -> float | None:
-    """Expected calibration error: mean distance of the curve from the diagonal, weighed by its forecasts."""
+    """Expected calibration error: mean distance of the curve from the diagonal, weighed by its
+    forecasts."""
     if not forecasts:
         return None
     curve = reliability(forecasts, bins)
-    return sum(b.happened.cases * abs(b.mean - b.happened.hits / b.happened.cases) for b in curve) / len(forecasts)
+    return sum(
+        b.happened.cases * abs(b.mean - b.happened.hits / b.happened.cases) for b in curve
+    ) / len(forecasts)

@@ -8,7 +8,7 @@ import numpy as np
 
 from tests.blind.scoring import Named, Score
 from tests.blind.statistics import Rate, reliability
-from tests.blind.targets import effects, measures, of, rmse_over_floor
+from tests.blind.targets import effects, measures, of, rmse_over_floor, world_measures
 
 BINS = ((0.0, 0.03), (0.03, 0.06), (0.06, 0.12), (0.12, 1.0))
 VISIBILITY = ((0.0, 0.1), (0.1, 0.2), (0.2, 0.5), (0.5, 1.0), (1.0, float("inf")))
@@ -42,7 +42,11 @@ def answer(s: Score) -> str:
 
 def summary(scores: Sequence[Score]) -> Page:
     """Show what is asked for, and what was measured."""
-    return Page("Summary", ("measure", "result", "target"), [(m.name, m.shown, m.target) for m in measures(scores)])
+    return Page(
+        "Summary",
+        ("measure", "result", "target"),
+        [(m.name, m.shown, m.target) for m in measures(scores)],
+    )
 
 
 def by_cause(scores: Sequence[Score]) -> Page:
@@ -64,18 +68,35 @@ def by_visibility(scores: Sequence[Score]) -> Page:
 def by_form(scores: Sequence[Score]) -> Page:
     """Count singles by each functional form."""
     singles = of(scores, "single")
-    return _rates("By functional form", singles, lambda s: f"{s.truth[0][0]}: {s.forms[0]}{' (own)' * s.own_form}")
+    return _rates(
+        "By functional form",
+        singles,
+        lambda s: f"{s.truth[0][0]}: {s.forms[0]}{' (own)' * s.own_form}",
+    )
 
 
 def by_origin(scores: Sequence[Score]) -> Page:
     """Count singles by whether the plant's form is the catalogue's."""
     singles = of(scores, "single")
-    return _rates("By origin of the form", singles, lambda s: "the catalogue's own" if s.own_form else "another")
+    return _rates(
+        "By origin of the form",
+        singles,
+        lambda s: "the catalogue's own" if s.own_form else "another",
+    )
 
 
 def by_machine(scores: Sequence[Score]) -> Page:
     """Count singles by the machine that has them."""
     return _rates("By machine", of(scores, "single"), lambda s: s.machine)
+
+
+def by_world(scores: Sequence[Score]) -> Page:
+    """Show each world's rates, and how far its probabilities are to be believed."""
+    worlds = sorted({s.world for s in scores})
+    head = ("", *worlds)
+    columns = [world_measures([s for s in scores if s.world == world]) for world in worlds]
+    rows = [(column[0].name, *(m.shown for m in column)) for column in zip(*columns, strict=True)]
+    return Page("By world", head, rows if len(worlds) > 1 else [])
 
 
 def by_kinds(scores: Sequence[Score]) -> Page:
@@ -104,7 +125,21 @@ def alarms(scores: Sequence[Score]) -> Page:
 
 def outside(scores: Sequence[Score]) -> Page:
     """Count what is not in the catalogue, by kind."""
-    return _rates("Outside the catalogue", of(scores, "outside"), lambda s: s.forms[0])
+    return _rates("Outside the catalogue", of(scores, "outside"), _kind_of)
+
+
+def families(scores: Sequence[Score]) -> Page:
+    """Count right families of laws, of what nobody listed by kind, of the catalogue by effect."""
+    told = [s for s in of(scores, "single", "outside") if s.family_right is not None]
+    rows = []
+    for name in sorted({_kind_of(s) for s in told}):
+        chosen = [s.family_right for s in told if _kind_of(s) == name]
+        rows.append((name, str(Rate.of(chosen))))
+    return Page("Families of laws", ("hidden", "right"), rows)
+
+
+def _kind_of(s: Score) -> str:
+    return s.truth[0][0].removeprefix("outside:") + " (held back)" * s.held_back
 
 
 def faults(scores: Sequence[Score]) -> Page:
@@ -141,8 +176,8 @@ def kinds_of_miss(scores: Sequence[Score]) -> Page:
 def confusion(scores: Sequence[Score]) -> Page:
     """Count what was hidden (rows) against what was named first (columns, by the rows' numbers).
 
-    A tie that counts as right stands on the diagonal, as does silence about what could not be seen; the right cause at
-    the wrong joint under ``joint``.
+    A tie that counts as right stands on the diagonal, as does silence about what could not be seen;
+    the right cause at the wrong joint under ``joint``.
     """
     singles = of(scores, "single")
     known = sorted({*effects(singles), *(s.named[0][0] for s in singles if s.named)})
@@ -150,7 +185,10 @@ def confusion(scores: Sequence[Score]) -> Page:
     counts = Counter((s.truth[0][0], _column(s)) for s in singles)
     columns = [*known, "joint", *others]
     head = ("hidden", *(str(i + 1) for i in range(len(known))), "joint", *others)
-    rows = [(f"{i + 1} {effect}", *(str(counts[effect, c] or "") for c in columns)) for i, effect in enumerate(known)]
+    rows = [
+        (f"{i + 1} {effect}", *(str(counts[effect, c] or "") for c in columns))
+        for i, effect in enumerate(known)
+    ]
     return Page("Confusion: hidden against named first", head, rows if singles else [])
 
 
@@ -182,7 +220,9 @@ def coverage(scores: Sequence[Score]) -> Page:
     found = [c for s in scores for c in s.covered]
     names = sorted({c[:2] for c in found})
     rows = [(f"{e}: {p}", str(Rate.of(c[2] for c in found if c[:2] == (e, p)))) for e, p in names]
-    return Page("Coverage of the parameters' 95 % intervals", ("parameter", "holds the truth"), rows)
+    return Page(
+        "Coverage of the parameters' 95 % intervals", ("parameter", "holds the truth"), rows
+    )
 
 
 def _rates(title: str, scores: Sequence[Score], key: Callable[[Score], str]) -> Page:

@@ -39,6 +39,10 @@ def test_causes_of_the_person_are_hidden_where_there_is_one():
 def test_machines_of_one_joint_take_turns_and_hide_what_each_can_have():
     cases = of_one_joint(300, 900_000)
     singles = {(c.machine, c.hidden[0][0]) for c in cases if c.category == "single"}
-    assert singles == {(name, effect) for name, machine in ONE_JOINT.items() for effect in machine.effects}
-    assert {c.hidden[0][0] for c in cases if c.category == "outside"} == {f"outside:{k.__name__}" for k in OF_ONE_JOINT}
+    assert singles == {
+        (name, effect) for name, machine in ONE_JOINT.items() for effect in machine.effects
+    }
+    assert {c.hidden[0][0] for c in cases if c.category == "outside"} == {
+        f"outside:{k}" for k in OF_ONE_JOINT
+    }
     assert {c.machine for c in cases if c.category == "none"} == set(ONE_JOINT)

@@ -1,10 +1,11 @@
 """A fixed set of blind sessions comes out as recorded.
 
-``fixed_set.json`` records of each case what is hidden, the verdict's status, the first cause named, and whether that is
-right. A sixth of the set, all of it in ``make test-slow``, is examined as by ``make blind``, in two processes that
-diagnose by the command. Rounding differs between machines, and decides where two causes or a threshold are close: so
-two of the cases may differ from the record in the first cause or in being right, as long as no more than one right
-answer is lost (``fixed_set.complaints``). All cases are in one test, so that pytest-xdist examines them once.
+``fixed_set.json`` records of each case what is hidden, the verdict's status, the first cause named,
+and whether that is right. A sixth of the set, all of it in ``make test-slow``, is examined as by
+``make blind``, in two processes that diagnose by the command. Rounding differs between machines,
+and decides where two causes or a threshold are close: so two of the cases may differ from the
+record in the first cause or in being right, as long as no more than one right answer is lost
+(``fixed_set.complaints``). All cases are in one test, so that pytest-xdist examines them once.
 """
 
 from collections import Counter
@@ -13,14 +14,17 @@ from dataclasses import replace
 import pytest
 
 from tests.blind import fixed_set
-from tests.blind.cases import SINGLES
-from tests.blind.causes import CAUSES
+from tests.blind.cases import PLAIN_SINGLES
+from tests.blind.causes import PLAIN_CAUSES
 from tests.blind.examine import examine
 from tests.blind.fixed_set import Outcome, complaints, outcomes, read
 from tests.blind.plan import HIP, KNEE
 from tests.blind.seeds import uses
 
-FOUND = [Outcome(seed, "backlash@knee", "explained", "backlash@knee", True) for seed in range(900_000, 900_005)]
+FOUND = [
+    Outcome(seed, "backlash@knee", "explained", "backlash@knee", True)
+    for seed in range(900_000, 900_005)
+]
 MISSED = Outcome(900_005, "cogging@hip", "nothing_missing", None, False)
 SILENT = Outcome(900_006, "none", "nothing_missing", None, True)
 RECORDED = [*FOUND, MISSED, SILENT]
@@ -41,8 +45,8 @@ def test_the_fixed_set_has_every_cause_at_both_joints_in_turn_and_every_category
     singles = [c.hidden[0] for c in cases if c.category == "single"]
     assert len(cases) >= 40
     assert uses(c.seed for c in cases) == {"fixed"}
-    assert [effect for effect, _ in singles] == list(CAUSES)
-    assert set(singles) < set(SINGLES)
+    assert [effect for effect, _ in singles] == list(PLAIN_CAUSES)
+    assert set(singles) < set(PLAIN_SINGLES)
     joints = Counter(joint for _, joint in singles)
     assert min(joints[HIP], joints[KNEE]) >= 10
     assert {c.category for c in cases} == {"single", *fixed_set.OTHERS}
@@ -78,11 +82,14 @@ def test_a_case_that_has_become_right_wants_to_be_recorded(lost):
 
 def test_a_new_false_alarm_is_never_roundings():
     found = changed(6, status="explained", first="cogging@hip", right=False)
-    assert complaints(RECORDED, found) == ["900006 none: nothing_missing (right) -> cogging@hip (wrong): a false alarm"]
+    assert complaints(RECORDED, found) == [
+        "900006 none: nothing_missing (right) -> cogging@hip (wrong): a false alarm"
+    ]
     assert not complaints(found, found)
 
 
 def test_a_record_of_other_cases_is_of_no_use():
     assert complaints(RECORDED[1:], RECORDED) == [
-        "fixed_set.json tells of other cases than the fixed set has: rewrite it by `make blind-fixed`"
+        "fixed_set.json tells of other cases than the fixed set has: "
+        "rewrite it by `make blind-fixed`"
     ]

@@ -37,7 +37,11 @@ def recorded(session, folder):
     truth = json.loads((folder / "truth.json").read_text())
     (name,) = (run["file"] for run in truth["runs"] if run["purpose"] == "validate")
     table = pq.read_table(folder / "recordings" / name)
-    position, force = ("position_m", "force_n") if "axis_force_n" in table.column_names else ("angle_rad", "torque_nm")
+    position, force = (
+        ("position_m", "force_n")
+        if "axis_force_n" in table.column_names
+        else ("angle_rad", "torque_nm")
+    )
     q, torque = (sosfiltfilt(SMOOTH, table[f"axis_{c}"].to_numpy()) for c in (position, force))
     dq = np.gradient(q, SAMPLE_S)
     kept = away_from_reversals(dq)
@@ -53,14 +57,16 @@ def away_from_reversals(dq):
 
 
 def terms(session, m):
-    """Return what inertia, gravity or weight, Coulomb and viscous friction take: the rig in these units."""
+    """Return what inertia, gravity or weight, Coulomb and viscous friction take: the rig in these
+    units."""
     rig, machine = session.rig, session.rig.machine
     torque, angle = rig.units.torque, rig.units.angle
     link = machine.leg.thigh
     inertia = link.mass * link.along**2 + link.inertia + machine.hip_rotor
     return {
         "inertia": torque / angle * inertia * m.ddq,
-        "gravity": torque * (machine.leg.gravity * link.mass * link.along * np.sin(m.q / angle) + rig.weight),
+        "gravity": torque
+        * (machine.leg.gravity * link.mass * link.along * np.sin(m.q / angle) + rig.weight),
         "coulomb": torque * machine.coulomb[HIP] * np.sign(m.dq),
         "viscous": torque / angle * machine.viscous[HIP] * m.dq,
     }
@@ -72,7 +78,7 @@ def rms(x):
 
 @pytest.fixture(scope="module", params=ONE_JOINT)
 def faultless(request, tmp_path_factory):
-    session = simulate(Case(SEED, "none", machine=request.param, kinds=("exo_alone",)))
+    session = simulate(Case(SEED, "none", machine=request.param, kinds=("exo_alone",), plain=True))
     return session, *recorded(session, tmp_path_factory.mktemp(request.param))
 
 
@@ -103,7 +109,16 @@ def test_the_truth_tells_the_rig_in_the_units_of_the_recording(faultless):
 
 
 def test_a_hidden_linear_spring_has_the_stiffness_that_the_truth_tells(tmp_path):
-    session = simulate(Case(SPRUNG, "single", (("parallel_spring", HIP),), machine="slide", kinds=("exo_alone",)))
+    session = simulate(
+        Case(
+            SPRUNG,
+            "single",
+            (("parallel_spring", HIP),),
+            machine="slide",
+            kinds=("exo_alone",),
+            plain=True,
+        )
+    )
     m, truth = recorded(session, tmp_path)
     told = truth["hidden"][0]["parameters"]
     slope, at_zero = np.polyfit(m.q, m.torque - sum(terms(session, m).values()), 1)

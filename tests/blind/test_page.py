@@ -11,21 +11,61 @@ from tests.blind.scoring import Score
 
 PLAY, COGGING = ("backlash", "knee"), ("cogging", "hip")
 FOUND = Score(
-    seed=540_000, category="single", truth=(PLAY,), forms=("two_mass",), own_form=False, magnitude=0.1, visibility=0.8,
-    kinds=("exo_alone", "with_human"), status="explained", named=(PLAY,), right=True, probabilities=((0.9, True),),
-    rmse_over_floor={"hip": 1.0, "knee": 1.1}, covered=(("backlash", "play", True),), seconds=4.0,
-)  # fmt: skip
-MISTAKEN = replace(FOUND, seed=540_001, named=(COGGING,), right=False, probabilities=((0.6, False),), covered=())
-SILENT = replace(
-    FOUND, seed=540_002, category="none", truth=(), forms=(), magnitude=None, status="nothing_missing", named=(),
-    probabilities=(), covered=(),
-)  # fmt: skip
-HALF = replace(
-    FOUND, seed=540_003, category="pair", truth=(PLAY, COGGING), magnitude=None, right=False, named=(PLAY,), covered=()
+    seed=540_000,
+    category="single",
+    truth=(PLAY,),
+    forms=("two_mass",),
+    own_form=False,
+    magnitude=0.1,
+    visibility=0.8,
+    kinds=("exo_alone", "with_human"),
+    status="explained",
+    named=(PLAY,),
+    right=True,
+    probabilities=((0.9, True),),
+    rmse_over_floor={"hip": 1.0, "knee": 1.1},
+    covered=(("backlash", "play", True),),
+    seconds=4.0,
 )
-STRANGE = replace(FOUND, seed=540_004, category="outside", truth=(("outside:tone", "hip"),), forms=("tone",),
-                  status="unknown_cause", named=(), probabilities=(), covered=())  # fmt: skip
-MIXED = Examination("python -m tests.blind --seeds reporting", [FOUND, MISTAKEN, SILENT, HALF, STRANGE])
+MISTAKEN = replace(
+    FOUND, seed=540_001, named=(COGGING,), right=False, probabilities=((0.6, False),), covered=()
+)
+SILENT = replace(
+    FOUND,
+    seed=540_002,
+    category="none",
+    truth=(),
+    forms=(),
+    magnitude=None,
+    status="nothing_missing",
+    named=(),
+    probabilities=(),
+    covered=(),
+)
+HALF = replace(
+    FOUND,
+    seed=540_003,
+    category="pair",
+    truth=(PLAY, COGGING),
+    magnitude=None,
+    right=False,
+    named=(PLAY,),
+    covered=(),
+)
+STRANGE = replace(
+    FOUND,
+    seed=540_004,
+    category="outside",
+    truth=(("outside:tone", "hip"),),
+    forms=("tone",),
+    status="unknown_cause",
+    named=(),
+    probabilities=(),
+    covered=(),
+)
+MIXED = Examination(
+    "python -m tests.blind --seeds reporting", [FOUND, MISTAKEN, SILENT, HALF, STRANGE]
+)
 STRANGERS = "Outside the catalogue"
 
 
@@ -40,9 +80,14 @@ def test_a_record_reads_as_it_was_written(tmp_path):
 
 def test_the_page_sets_what_was_measured_beside_what_was_asked_for():
     said = section(page([MIXED]), "What was asked for, and what was measured")
-    assert "| single: right cause and joint first | >= 96 % | 50.0 % of 2 (9 to 91) | **no** |" in said
+    assert (
+        "| single: right cause and joint first | >= 96 % | 50.0 % of 2 (9 to 91) | **no** |" in said
+    )
     assert "| false alarms, nothing hidden | <= 1 % | 0.0 % of 1 (0 to 79) | yes |" in said
-    assert "| outside the catalogue: unknown_cause | >= 80 % | 100.0 % of 1 (21 to 100) | yes |" in said
+    assert (
+        "| outside the catalogue: called unlisted | >= 80 % | 100.0 % of 1 (21 to 100) | yes |"
+        in said
+    )
     assert "| data fault named |  | no cases |  |" in said
     # (0.1² + 0.6² + 0.1²) / 3
     assert "| Brier score | <= 0.05 | 0.127 | **no** |" in said
@@ -69,9 +114,14 @@ def test_of_a_pair_one_may_be_named():
 
 
 def test_singles_are_told_by_the_examination_with_most_of_them_and_all_else_by_each():
-    full = Examination("python -m tests.blind --full --seeds reporting", [replace(FOUND, seed=k) for k in (1, 2, 3)])
+    full = Examination(
+        "python -m tests.blind --full --seeds reporting",
+        [replace(FOUND, seed=k) for k in (1, 2, 3)],
+    )
     said = page([MIXED, full])
-    by_cause, seconds, outside = (section(said, t) for t in ("By cause and joint", "Seconds a diagnosis", STRANGERS))
+    by_cause, seconds, outside = (
+        section(said, t) for t in ("By cause and joint", "Seconds a diagnosis", STRANGERS)
+    )
     assert "Examination 2:\n\n|  | right | else |" in by_cause and "Examination 1" not in by_cause
     assert "Examination 1:" in seconds and "Examination 2:" in seconds
     assert "Examination 1:" in outside and "Examination 2:" not in outside
@@ -86,13 +136,17 @@ def test_a_page_of_machines_of_one_joint_says_so():
 def test_only_the_remark_on_probabilities_shows_the_picture():
     said = page([replace(MIXED, command="python -m tests.blind --out {picture}")], "images/one.png")
     assert "`python -m tests.blind --out {picture}`" in said
-    assert said.count("images/one.png") == 1 and "(images/one.png)" in section(said, "Reliability of the probabilities")
+    assert said.count("images/one.png") == 1 and "(images/one.png)" in section(
+        said, "Reliability of the probabilities"
+    )
 
 
 @pytest.mark.parametrize("scores", [MIXED.scores, [SILENT]], ids=["mixed", "nothing was named"])
 def test_the_page_and_its_picture_are_written_from_records(tmp_path, scores):
     write(tmp_path, replace(MIXED, scores=scores))
     main([tmp_path / "report.json"], tmp_path / "docs" / "blind.md")
-    assert "(images/blind-reliability.png)" in (tmp_path / "docs" / "blind.md").read_text() or scores == [SILENT]
+    assert "(images/blind-reliability.png)" in (
+        tmp_path / "docs" / "blind.md"
+    ).read_text() or scores == [SILENT]
     picture = image.imread(tmp_path / "docs" / "images" / "blind-reliability.png")
     assert picture.std() > 0

@@ -1,4 +1,5 @@
-"""The rig of the blind examination obeys mechanics, and agrees with exoid where nothing is hidden."""
+"""The rig of the blind examination obeys mechanics, and agrees with exoid where nothing is
+hidden."""
 
 import numpy as np
 import pytest
@@ -9,11 +10,14 @@ from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque, potential_energy
 from tests.blind import loop
 from tests.blind.body import PAYLOAD_INERTIA, Body, Payload, Segment
+from tests.blind.causes import FIRM_CUFF
 from tests.blind.excitation import FASTEST, HIGHEST, LOWEST, STEEPEST, random_excitation
 from tests.blind.machine import random_machine
 from tests.blind.people import Person, random_person
 from tests.blind.plan import HIP, KNEE, Plan, Run
-from tests.blind.plant import Rig, empty_log, move
+from tests.blind.plant import empty_log, move
+from tests.blind.recorded import Rig
+from tests.blind.transmissions import ELASTIC
 
 SEED = 900_000
 PERSON = Person(75.0, 1.75)
@@ -38,13 +42,27 @@ def run_of(kind="exo_alone", duration=10.0):
 def free_swing(start, samples):
     """The wearer's leg alone, without friction or drives."""
     none, pair = np.zeros(2), np.zeros((2, 2))
-    joints = loop.Joints(none, none, pair, np.zeros(2, int), none, np.zeros((2, 5)), np.zeros((2, 3)), np.ones(3))
-    drives = loop.Drives(none, none, none, none, none, pair, 1.0)
+    joints = loop.Joints(
+        none, none, pair, np.zeros(2, int), none, np.zeros((2, 5)), np.zeros((2, 6)), np.ones(3)
+    )
+    drives = loop.Drives(none, none, none, none, none, np.zeros((2, 6)), 1.0, none)
     world = loop.World(PERSON.leg.gravity, np.zeros(3), np.array([-1.0, 0.0, 0.0, 1.0, 1.0]))
-    still = loop.Excited(np.array(start), pair, pair, 1.0)
+    still = loop.Excited(np.array(start), pair, pair, 1.0, np.zeros((0, 4)))
     log = empty_log(samples)
     body = Body(PERSON.leg)
-    loop.simulate(body.handles, still, drives, joints, world, Plan().hidden(), np.array(start), samples, False, log)
+    loop.simulate(
+        body.handles,
+        still,
+        drives,
+        joints,
+        world,
+        Plan().hidden(),
+        np.array(start),
+        samples,
+        5,
+        False,
+        log,
+    )
     return log.link[:, :2], log.link[:, 2:4]
 
 
@@ -90,7 +108,9 @@ def test_a_payload_that_is_there_from_the_start_is_part_of_its_segment(rig, exci
     carried, grown = Plan(), Plan()
     carried.payload, carried.load = Payload(KNEE, 0.3), np.array([1.5, -10.0, 0.1, 1.0])
     grown.lumps.append((KNEE, Segment(1.5, 0.3, 1.5 * PAYLOAD_INERTIA)))
-    torques = [move(rig, excitation, plan, run_of(duration=2.0), 400).torque for plan in (carried, grown)]
+    torques = [
+        move(rig, excitation, plan, run_of(duration=2.0), 400).torque for plan in (carried, grown)
+    ]
     assert_allclose(*torques, atol=1e-6)
 
 
@@ -102,21 +122,26 @@ def test_a_joint_that_reverses_sticks_for_a_while(rig, excitation):
 def test_a_transmission_winds_up_by_torque_over_stiffness(rig, excitation):
     rig = Rig(rig.machine.tuned_for_soft(HIP), rig.person)
     plan = Plan()
-    plan.soft(HIP, loop.ELASTIC, 800.0, 0.5)
+    plan.soft(HIP, ELASTIC, 800.0, 0.5)
     log = move(rig, excitation, plan, run_of("with_human"), 2000)
     wound = log.angle[:, HIP] - log.link[:, HIP]
-    needed = Body(rig.leg(run_of("with_human"))).inverse(*(log.link[:, 2 * i : 2 * i + 2] for i in range(3)))
+    needed = Body(rig.leg(run_of("with_human"))).inverse(
+        *(log.link[:, 2 * i : 2 * i + 2] for i in range(3))
+    )
     assert np.corrcoef(wound, needed[:, HIP])[0, 1] > 0.98
     assert np.polyfit(needed[:, HIP], wound, 1)[0] == pytest.approx(1 / 800.0, rel=0.05)
 
 
 @pytest.mark.parametrize("tilt", [0.0, 0.1])
-@pytest.mark.parametrize("cuffs", [None, np.array([[15000.0, 60.0, 0.0]] * 2)], ids=["one leg", "two legs"])
+@pytest.mark.parametrize("cuffs", [None, np.array([FIRM_CUFF] * 2)], ids=["one leg", "two legs"])
 def test_cuff_forces_tell_the_torque_that_the_wearer_takes(rig, excitation, cuffs, tilt):
     from tests.blind.plant import _cuff_forces
 
     machine = rig.machine
-    quiet = Rig(type(machine)(**{**vars(machine), "cuff_zero": np.zeros((4, 3)), "cuff_noise": 0.0}), rig.person)
+    quiet = Rig(
+        type(machine)(**{**vars(machine), "cuff_zero": np.zeros((4, 3)), "cuff_noise": 0.0}),
+        rig.person,
+    )
     plan = Plan()
     plan.cuffs, plan.tilt[0] = cuffs, tilt
     log = move(quiet, excitation, plan, run_of("with_human"), 2000)
@@ -124,8 +149,12 @@ def test_cuff_forces_tell_the_torque_that_the_wearer_takes(rig, excitation, cuff
     geometry = Geometry(machine.leg.length, machine.leg.gravity, *machine.cuff_distance)
     q = log.link[:, :2]
     told = cuff_torque(forces[:, 0] + forces[:, 1], forces[:, 2] + forces[:, 3], q, geometry)
-    taken = Body(rig.person.leg).inverse(q + np.array([tilt, 0.0]), log.link[:, 2:4], log.link[:, 4:6])
-    assert np.sqrt(np.mean((told - taken) ** 2)) < (1e-9 if cuffs is None else 0.04 * np.sqrt(np.mean(taken**2)))
+    taken = Body(rig.person.leg).inverse(
+        q + np.array([tilt, 0.0]), log.link[:, 2:4], log.link[:, 4:6]
+    )
+    assert np.sqrt(np.mean((told - taken) ** 2)) < (
+        1e-9 if cuffs is None else 0.04 * np.sqrt(np.mean(taken**2))
+    )
 
 
 def test_pads_press_and_never_pull(rig, excitation):

@@ -1,5 +1,6 @@
 """Right is right, an honest tie too, and nothing else."""
 
+import math
 import sys
 
 import pytest
@@ -15,31 +16,52 @@ SECRET = {"hip": 0.5, "knee": 0.4}
 def truth_of(category, *hidden, fault=None, kin=()):
     effects = [
         {
-            "effect": effect, "joint": joint, "form": "some", "own_form": False, "parameters": {"play": 0.03},
-            "magnitude": 0.1, "rms_nm": 1.0, "kin": list(kin),
+            "effect": effect,
+            "joint": joint,
+            "form": "some",
+            "own_form": False,
+            "parameters": {"play": 0.03},
+            "magnitude": 0.1,
+            "rms_nm": 1.0,
+            "kin": list(kin),
         }
         for effect, joint in hidden
-    ]  # fmt: skip
+    ]
     case = {"seed": 1, "category": category, "kinds": ["exo_alone", "with_human"], "machine": "leg"}
-    return {"case": case, "hidden": effects, "fault": fault, "noise_floor_nm": SECRET, "left_by_baseline_nm": SECRET}
+    return {
+        "case": case,
+        "hidden": effects,
+        "fault": fault,
+        "noise_floor_nm": SECRET,
+        "left_by_baseline_nm": SECRET,
+    }
 
 
 def cause(effect, joint, *ties, probability=0.9, parameters=()):
     tied = [{"effect": e, "joint": j, "why": "", "how_to_separate": ""} for e, j in ties]
     return {
-        "effect": effect, "joint": joint, "probability": probability, "parameters": list(parameters),
+        "effect": effect,
+        "joint": joint,
+        "probability": probability,
+        "parameters": list(parameters),
         "indistinguishable_from": tied,
-    }  # fmt: skip
+    }
 
 
 def answer_of(*causes, status="explained", faults=(), exit_code=0, message=""):
     verdict = {
-        "status": status, "causes": list(causes), "data_faults": list(faults),
-        "extended_rmse_nm": {"hip": 0.55, "knee": 0.4}, "noise_floor_nm": {"hip": 0.5, "knee": 0.36},
-    }  # fmt: skip
+        "status": status,
+        "causes": list(causes),
+        "data_faults": list(faults),
+        "extended_rmse_nm": {"hip": 0.55, "knee": 0.4},
+        "noise_floor_nm": {"hip": 0.5, "knee": 0.36},
+    }
     return {
-        "exit_code": exit_code, "message": message, "seconds": 2.0, "verdict": None if exit_code else verdict,
-    }  # fmt: skip
+        "exit_code": exit_code,
+        "message": message,
+        "seconds": 2.0,
+        "verdict": None if exit_code else verdict,
+    }
 
 
 PLAY = ("backlash", "knee")
@@ -55,7 +77,9 @@ PLAY = ("backlash", "knee")
         (answer_of(status="nothing_missing"), False),
     ],
 )
-def test_what_is_outside_the_catalogue_is_unknown_or_called_what_a_person_would_call_it(answer, right):
+def test_what_is_outside_the_catalogue_is_unknown_or_called_what_a_person_would_call_it(
+    answer, right
+):
     truth = truth_of("outside", ("outside:dead_zone_damper", "knee"), kin=("quadratic_drag",))
     assert score(truth, answer).right is right
 
@@ -94,7 +118,9 @@ def test_silence_is_right_only_below_what_can_be_seen():
 def test_of_a_pair_both_have_to_be_named():
     truth = truth_of("pair", PLAY, ("cogging", "hip"))
     assert score(truth, answer_of(cause("cogging", "hip"), cause(*PLAY))).right
-    assert score(truth, answer_of(cause("cogging", "hip"), cause("joint_elasticity", "knee", PLAY))).right
+    assert score(
+        truth, answer_of(cause("cogging", "hip"), cause("joint_elasticity", "knee", PLAY))
+    ).right
     assert not score(truth, answer_of(cause("cogging", "hip"))).right
 
 
@@ -174,11 +200,14 @@ def test_the_diagnosis_gets_the_recordings_and_nothing_else(tmp_path):
     (tmp_path / "answers").mkdir()
     for name in ("run_2.parquet", "run_1.parquet"):
         (tmp_path / "sessions" / "s" / name).touch()
-    answer = diagnose(tmp_path / "sessions" / "s", tmp_path / "answers", (sys.executable, "-c", FAKE))
+    answer = diagnose(
+        tmp_path / "sessions" / "s", tmp_path / "answers", (sys.executable, "-c", FAKE)
+    )
     files = ["run_1.parquet", "run_2.parquet"]
     assert answer["verdict"] == {
-        "argv": ["diagnose", *files, "--out", str(tmp_path / "answers"), "--no-figures"], "there": files,
-    }  # fmt: skip
+        "argv": ["diagnose", *files, "--out", str(tmp_path / "answers"), "--no-figures"],
+        "there": files,
+    }
     assert answer["message"] == "a warning"
     assert answer["exit_code"] == 0
 
@@ -194,3 +223,79 @@ def test_what_can_be_seen_is_read_where_it_is_said(tmp_path):
         '{"causes": [{"effect": "base_tilt", "joint": null, "smallest_rms_nm": 0.4}]}'
     )
     assert smallest_visible(tmp_path) == {("base_tilt", None): 0.4}
+
+
+def finding(family, joint, probability=0.8):
+    return {"level": "family", "family": family, "joint": joint, "probability": probability}
+
+
+@pytest.mark.parametrize(
+    ("told", "right"),
+    [
+        ([finding("angle", "knee")], True),
+        ([finding("time", "hip"), finding("reversal", "knee")], True),
+        ([finding("angle", None)], True),
+        ([finding("angle", "hip")], False),
+        ([finding("speed", "knee")], False),
+        ([finding("angle", "knee", probability=0.4)], False),
+        ([], False),
+    ],
+)
+def test_a_family_is_right_at_its_joint_where_it_is_likely(told, right):
+    truth = truth_of("outside", ("outside:friction_by_other_joint", "knee"))
+    truth["hidden"][0]["families"] = ["angle", "reversal"]
+    answer = answer_of(status="unknown_cause")
+    answer["verdict"]["findings"] = told
+    assert score(truth, answer).family_right is right
+
+
+def test_a_verdict_without_findings_has_no_family():
+    truth = truth_of("outside", ("outside:tone", "knee"))
+    truth["hidden"][0]["families"] = ["time"]
+    assert score(truth, answer_of(status="unknown_cause")).family_right is None
+
+
+def test_an_unlikely_cause_beside_an_unknown_one_is_no_wrong_name():
+    truth = truth_of("outside", ("outside:tone", "knee"))
+    named = [cause("cogging", "knee", probability=p) for p in (0.3, 0.7)]
+    assert score(truth, answer_of(named[0], status="partly_explained")).right
+    assert not score(truth, answer_of(named[1], status="partly_explained")).right
+
+
+@pytest.mark.parametrize(
+    ("category", "hidden", "probability"),
+    [
+        ("none", (), 0.2),
+        ("single", (PLAY,), 0.7),
+        ("single", (("base_tilt", None),), 0.05),
+        ("single", (("cogging", "hip"),), 1e-4),
+        ("outside", (("outside:tone", "hip"),), 0.3),
+        ("pair", (PLAY, ("base_tilt", None)), (0.7 * 0.05) ** 0.5),
+    ],
+)
+def test_the_truths_probability_is_read_off_the_posterior(category, hidden, probability):
+    answer = answer_of(cause(*PLAY))
+    causes = {"backlash@knee": 0.7, "base_tilt": 0.05}
+    answer["verdict"]["posterior"] = {"nothing_missing": 0.2, "unlisted": 0.3, "causes": causes}
+    found = score(truth_of(category, *hidden), answer).log_probability
+    assert found == pytest.approx(math.log(probability))
+
+
+def test_a_gap_that_the_file_declares_is_no_false_alarm():
+    truth = truth_of("none") | {"with_gaps": ["run_1.parquet"]}
+    gap = {"file": "run_1.parquet", "channel": "time_s", "what": "2 gaps in the recording"}
+    other = gap | {"file": "run_2.parquet"}
+    assert score(truth, answer_of(status="nothing_missing", faults=[gap])).right
+    assert not score(truth, answer_of(status="nothing_missing", faults=[other])).right
+
+
+def test_the_report_shows_each_world():
+    planar = truth_of("single", PLAY)
+    planar["case"] |= {"world": "planar"}
+    scores = [
+        score(truth_of("single", PLAY), answer_of(cause(*PLAY))),
+        score(planar, answer_of(cause("cogging", "knee"))),
+    ]
+    tables = {page.title: page for page in pages(scores)}
+    assert tables["By world"].head == ("", "mujoco", "planar")
+    assert [cell[:5] for cell in tables["By world"].rows[0][1:]] == ["100.0", "0.0 %"]

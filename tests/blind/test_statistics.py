@@ -8,7 +8,12 @@ from tests.blind.statistics import Rate, brier, calibration_error, reliability
 @pytest.mark.parametrize(
     # Newcombe (1998), Statistics in Medicine 17, table I, method 3.
     ("hits", "cases", "low", "high"),
-    [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611), (1, 29, 0.0061, 0.1718)],
+    [
+        (81, 263, 0.2553, 0.3662),
+        (15, 148, 0.0624, 0.1605),
+        (0, 20, 0.0, 0.1611),
+        (1, 29, 0.0061, 0.1718),
+    ],
 )
 def test_wilsons_interval_is_the_published_one(hits, cases, low, high):
     assert Rate(hits, cases).interval == pytest.approx((low, high), abs=5e-5)

@@ -21,7 +21,9 @@ def test_the_table_has_what_causes_tell_and_nothing_else():
 
 
 def test_play_of_a_slide_is_a_length():
-    assert Units(torque=50.0, angle=0.2).converted("backlash", {"play": 0.03}) == {"play": pytest.approx(0.006)}
+    assert Units(torque=50.0, angle=0.2).converted("backlash", {"play": 0.03}) == {
+        "play": pytest.approx(0.006)
+    }
 
 
 def test_a_parameter_of_unknown_unit_is_refused():

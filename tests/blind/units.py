@@ -34,21 +34,35 @@ POWERS: dict[tuple[str, str], tuple[int, int]] = {
     ("spasticity", "gain"): (1, -1),
     ("spasticity", "threshold_velocity"): (0, 1),
     ("cuff_compliance", "stiffness"): (1, -1),
+    ("end_stop", "stiffness"): (1, -1),
+    ("end_stop", "contact_angle"): (0, 1),
+    ("position_dependent_friction", "slope"): (1, -1),
+    ("position_dependent_friction", "curvature"): (1, -2),
+    ("gain_drift", "rate"): (0, 0),
+    ("gain_drift", "time_constant"): (0, 0),
+    ("encoder_eccentricity", "amplitude"): (0, 1),
+    ("encoder_eccentricity", "amplitude_twice"): (0, 1),
+    ("torque_cross_talk", "coupling"): (0, 0),
 }
-"""Powers of torque and of angle of every parameter that a cause tells; a missing one is refused, not taken as it is."""
+"""Powers of torque and of angle of every parameter that a cause tells; a missing one is refused,
+not taken as it is."""
 
 
 @dataclass(frozen=True)
 class Units:
-    """What a simulated newton metre and a simulated radian are in the recording: N·m and rad, or N and m."""
+    """What a simulated newton metre and a simulated radian are in the recording: N·m and rad, or N
+    and m."""
 
     torque: float = 1.0
     angle: float = 1.0
 
     def converted(self, effect: str, parameters: dict[str, float]) -> dict[str, float]:
         """Return parameters as the recording's units have them."""
-        return {name: self.factor(*POWERS[effect, name]) * value for name, value in parameters.items()}
+        return {
+            name: self.factor(*POWERS[effect, name]) * value for name, value in parameters.items()
+        }
 
     def factor(self, torque: int, angle: int) -> float:
-        """Return what turns a simulated value into a recorded one whose unit has these powers of torque and angle."""
+        """Return what turns a simulated value into a recorded one whose unit has these powers of
+        torque and angle."""
         return self.torque**torque * self.angle**angle

@@ -18,7 +18,9 @@ def random_curve(rng: Generator, duration_s: float, smoothing_s: float) -> NDArr
     return walk / np.sqrt(np.mean(walk**2))
 
 
-def random_walk(rng: Generator, duration_s: float, smoothing_s: float) -> Callable[[NDArray], NDArray]:
+def random_walk(
+    rng: Generator, duration_s: float, smoothing_s: float
+) -> Callable[[NDArray], NDArray]:
     """Return ``random_curve`` as a function of time."""
     curve = random_curve(rng, duration_s, smoothing_s)
     return lambda t: np.interp(t, np.arange(len(curve)) / RATE_HZ, curve)

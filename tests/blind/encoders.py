@@ -1,0 +1,37 @@
+"""What encoders tell of an angle: an offset, and errors once, twice and three times a turn."""
+
+from math import cos, sin
+
+from tests.blind.compiled import njit
+
+WAVES = 3
+
+
+@njit()
+def reading(offset, wobble, theta):
+    """Return the angle told; ``wobble`` (6,) has amplitude and phase of each wave."""
+    told = theta + offset + wobble[0] * sin(theta + wobble[1])
+    for k in range(1, WAVES):
+        if wobble[2 * k] != 0.0:
+            told += wobble[2 * k] * sin((k + 1) * theta + wobble[2 * k + 1])
+    return told
+
+
+@njit()
+def slope(wobble, theta):
+    """Return by what factor a speed is told."""
+    told = 1.0
+    for k in range(WAVES):
+        if wobble[2 * k] != 0.0:
+            told += (k + 1) * wobble[2 * k] * cos((k + 1) * theta + wobble[2 * k + 1])
+    return told
+
+
+@njit()
+def curvature(wobble, theta):
+    """Return how that factor changes with the angle, 1/rad."""
+    told = 0.0
+    for k in range(WAVES):
+        if wobble[2 * k] != 0.0:
+            told -= (k + 1) ** 2 * wobble[2 * k] * sin((k + 1) * theta + wobble[2 * k + 1])
+    return told
