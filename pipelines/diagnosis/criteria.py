@@ -10,9 +10,9 @@ from dataclasses import dataclass
 class Criteria:
     """The hyper-parameters of the posterior over sets of causes and laws."""
 
-    drive_weight: float = 0.35
+    drive_weight: float = 0.6
     """How much of a drive row's likelihood counts: rows are not quite independent."""
-    cuff_weight: float = 0.2
+    cuff_weight: float = 0.4
     """The same of a cuff row."""
     form_misfit: float = 0.1
     """Share of a residual's rms that counts as noise: no form of any cause follows it exactly."""
@@ -28,7 +28,7 @@ class Criteria:
     """Share of a line over the angle or over time on a good rig."""
     amplitudes: tuple[float, float, float] = (0.03, 0.08, 0.2)
     """Shares that a cause or a law may have, equally likely: prior standard deviations."""
-    misfits: tuple[float, float, float] = (0.0, 0.03, 0.1)
+    misfits: tuple[float, float, float] = (0.0, 0.1, 0.3)
     """Shares of a cause's own size by which its true form may differ from ours, equally likely."""
     shape_sd: float = 0.3
     """Prior standard deviation of a shape about its best value, in its unit of change."""
