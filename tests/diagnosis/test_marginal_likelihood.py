@@ -25,7 +25,7 @@ def problem(seed: int = 0, strength: float = 0.0) -> tuple[np.ndarray, np.ndarra
         Element("drag@knee", "drag", "knee", "speed", False, [1], [1.0]),
         Element("law:angle@hip", "angle", "hip", "angle", True, [3, 4], [0.7, 0.3]),
     )
-    background = (("law", 5, 1.0), ("cuff", 6, 1.0), ("wander", 7, 1.0))
+    background = (("law", 5, 1.0, 0.0), ("cuff", 6, 1.0, 0.0), ("wander", 7, 1.0, 0.0))
     none = np.zeros((8, 8))
     return X, y, Evidence(X.T @ X, none, X.T @ y, np.zeros(8), elements, background, {})
 

@@ -21,7 +21,7 @@ def cause(name: str, columns: list[int]) -> Element:
 def evidence_from(X: np.ndarray, y: np.ndarray, elements: tuple[Element, ...], **more) -> Evidence:
     """Return the evidence of rows that are all of drives; the last column is a good rig's."""
     none = np.zeros((X.shape[1], X.shape[1]))
-    background = (("law", X.shape[1] - 1, 1.0),)
+    background = (("law", X.shape[1] - 1, 1.0, 0.0),)
     return Evidence(X.T @ X, none, X.T @ y, np.zeros(len(none)), elements, background, {}, **more)
 
 
@@ -68,7 +68,7 @@ def test_the_order_of_columns_changes_nothing():
         drives=evidence.drives[np.ix_(order, order)],
         drives_right=evidence.drives_right[order],
         elements=tuple(replace(e, columns=[place[c] for c in e.columns]) for e in evidence.elements),
-        background=tuple((kind, place[c], v) for kind, c, v in evidence.background),
+        background=tuple((kind, place[c], *sizes) for kind, c, *sizes in evidence.background),
     )
     ours, theirs = (by_labels(posterior(one, CRITERIA)) for one in (evidence, moved))
     assert theirs == pytest.approx(ours, rel=1e-9)
