@@ -5,9 +5,9 @@ from typing import Any
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.data_faults import Fault
 from pipelines.diagnosis.diagnosis import AT_FLOOR, EXPLAINED, Diagnosis
-from pipelines.diagnosis.selection.findings import Finding
 from pipelines.diagnosis.verdict.cause_evidence import doubt_of_gain
 from pipelines.diagnosis.verdict.caveats import floor_that_hides
+from pipelines.diagnosis.verdict.findings_in_words import thing
 from pipelines.diagnosis.verdict.unexplained import Unexplained
 from pipelines.label import amount, cause_label, effect_labelled, effect_told, in_words
 
@@ -15,17 +15,6 @@ MENTIONED = 3
 """Tied causes in the summary; ``indistinguishable_from`` has all."""
 CLOSEST = 0.05
 """Probability from which a listed cause is said to come closest."""
-FAMILY = {
-    "angle": "a law of {joint}'s angle",
-    "speed": "a law of {joint}'s speed",
-    "reversal": "friction of {joint} that remembers its reversals",
-    "load": "a law of {joint}'s load",
-    "time": "a torque at {joint} that changes with time",
-    "transmission": "something in {joint}'s transmission",
-    "sensor": "something in {joint}'s sensors",
-    "person": "something of the person at {joint}",
-}
-"""What an unlisted law is called by its family."""
 
 
 def summary(d: Diagnosis, causes: list[dict[str, Any]], left: Unexplained | None) -> str:
@@ -105,9 +94,9 @@ def _unlisted(d: Diagnosis) -> str:
     if not found:
         return "Something is missing, and no listed cause is likely."
     first, *more = found
-    also = "".join(f"; and {_thing(one)} ({one.probability:.2f})" for one in more)
+    also = "".join(f"; and {thing(one)} ({one.probability:.2f})" for one in more)
     said = (
-        f"Something is missing that no listed cause explains: {_thing(first)} "
+        f"Something is missing that no listed cause explains: {thing(first)} "
         f"(probability {first.probability:.2f}){also}."
     )
     close = [(label, p) for label, p in first.causes if p >= CLOSEST]
@@ -115,18 +104,6 @@ def _unlisted(d: Diagnosis) -> str:
         return said
     label, p = close[0]
     return f"{said} Of the listed causes {in_words(effect_labelled(label))} ({p:.2f}) comes closest."
-
-
-def _thing(finding: Finding) -> str:
-    """Return what is missing, as deep as it is known."""
-    joint = the(finding.joint) if finding.joint else "the machine"
-    if finding.level == "family":
-        return FAMILY[str(finding.family)].format(joint=joint)
-    if finding.level == "joint":
-        return f"something at {joint}"
-    if finding.repeats is None:
-        return "something that may repeat with the motion or not"
-    return "something that " + ("repeats" if finding.repeats else "does not repeat")
 
 
 def _named(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
@@ -145,7 +122,7 @@ def _named(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
         f"{amount(machine, joint, after[most])}, {_remains(d, most)}."
     )
     rest = [one for one in d.selected.findings if one.level != "cause"]
-    also = "".join(f" Also missing: {_thing(one)} ({one.probability:.2f})." for one in rest)
+    also = "".join(f" Also missing: {thing(one)} ({one.probability:.2f})." for one in rest)
     return f"Missing from the simulation: {named}. {gain}{also}"
 
 
