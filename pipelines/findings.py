@@ -12,6 +12,7 @@ LEAST = 0.01
 """Probability below which an alternative is not shown."""
 TIED = "one of these, which these data cannot tell apart"
 UNLISTED = "unlisted: "
+AGAINST = ", not named: the validation runs speak against it"
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ def _grow(root: Node, finding: Mapping[str, Any]) -> None:
     else:
         node.is_answer = True
         for cause in finding["causes"]:
-            _alternative(node, cause["words"], cause)
+            _alternative(node, cause["words"] + AGAINST * cause["dropped"], cause)
     for law in finding["laws"]:
         _alternative(node, UNLISTED + law["words"], law)
 

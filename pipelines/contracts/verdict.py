@@ -93,6 +93,8 @@ class Likely(_Object):
     family: str
     probability: Probability
     words: str
+    dropped: bool
+    """Whether the training runs would name it, and the validation runs speak against it."""
 
 
 class Law(_Object):

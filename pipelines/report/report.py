@@ -25,6 +25,7 @@ from pipelines.report.bars import (
 )
 from pipelines.report.chart import Chart, thinned_alike
 from pipelines.report.control import control_charts, loops
+from pipelines.report.decision import decision
 from pipelines.report.excitation import excitations
 from pipelines.report.lead import faults_in_short, lead
 from pipelines.report.measured import (
@@ -58,7 +59,7 @@ STATUS = {
     "nothing_missing": ("nothing missing", "good"),
 }
 HEADLINES = {
-    "unknown_cause": "Something is missing that no known cause explains",
+    "unknown_cause": "Something is missing that no listed cause explains",
     "nothing_missing": "Nothing is missing that these data could show",
 }
 TONES = {"named": "good", "indistinguishable": "warn", "absorbed": "", "rejected": ""}
@@ -122,6 +123,7 @@ def _page(session: Session, title: str | None, output: Path | None, values: int)
         "headline": headline(session),
         "verdict": verdict,
         "lead": lead(verdict) if verdict else "",
+        "decision": decision(verdict) if verdict else None,
         "faults": faults_in_short(verdict) if verdict else ("", 0),
         "with_causes": _with_causes(verdict) if verdict else "",
         "quantity": quantity,
@@ -191,6 +193,9 @@ def headline(session: Session) -> str:
     if verdict["causes"]:
         words = causes_in_words(verdict["causes"])
         return f"The simulation misses {words}"
+    found = verdict.get("findings")
+    if verdict["status"] == "unknown_cause" and found:
+        return f"The simulation misses {found[0]['words']}, and no listed cause explains it"
     return HEADLINES.get(verdict["status"], verdict["status"].replace("_", " "))
 
 

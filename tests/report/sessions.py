@@ -164,7 +164,8 @@ def decision_of(joints=LEG, ties=("parallel_spring",), law=0.02, nothing=0.03):
     finding = {
         "level": "cause", "repeats": True, "joint": last, "family": "angle", "probability": probability,
         "words": words["cogging"],
-        "causes": [{"effect": effect, "joint": last, "family": "angle", "probability": p, "words": words[effect]}
+        "causes": [{"effect": effect, "joint": last, "family": "angle", "probability": p, "words": words[effect],
+                    "dropped": False}
                    for effect, p in zip(effects, each, strict=True)],
         "laws": [{"law": "angle", "joint": last, "probability": law, "words": f"a law of the {last}'s angle"}],
         "path": [dict(zip(("level", "value", "probability", "words"), node, strict=True)) for node in path],

@@ -175,7 +175,7 @@ def knows(variable: Variable, runs: Iterable[Run], j: int) -> bool:
 
 
 def _sentence(joint: str, machine: Machine, words: str, share: float) -> str:
-    return f"{100 * share:.0f} % of what is left at {the(joint)} goes with {_words(joint, machine, words)}"
+    return f"{100 * share:.0f} % of what is left at {the(joint)} depends on {_words(joint, machine, words)}"
 
 
 def _words(joint: str, machine: Machine, words: str) -> str:
@@ -337,12 +337,11 @@ def describe(
     pair = max((t for t in together if t.joint == joint), key=lambda t: t.share, default=None)
     if pair and pair.share > MUCH_MORE * max(_rank(own[0]), LITTLE):
         words = " together with ".join(_words(joint, machine, variable.words) for variable in pair.variables)
-        return f"{100 * pair.share:.0f} % of what is left at {the(joint)} goes with {words}{where}."
+        return f"{100 * pair.share:.0f} % of what is left at {the(joint)} depends on {words}{where}."
     if own[0].share < LITTLE:
         return (
-            f"What is left at {the(joint)}{where}{',' * bool(where)} depends on nothing that was measured: neither "
-            f"motion, load and time nor a steady tone above {LOWEST_HZ:g} Hz that is no harmonic of the motion "
-            f"foretells {100 * LITTLE:.0f} % of it."
+            f"What is left at {the(joint)}{where}{',' * bool(where)} depends on nothing that was "
+            f"measured: no variable and no steady tone predicts {100 * LITTLE:.0f} % of it."
         )
     second = next((d for d in own[1:] if d.variable != "phase" and d.share > max(0.5 * own[0].share, LITTLE)), None)
     return own[0].sentence + where + "." + (f" Nearly as much: {second.sentence}." if second else "")

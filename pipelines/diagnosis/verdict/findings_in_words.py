@@ -1,15 +1,17 @@
 """``findings`` of the verdict: what is missing at the depth that the data support, in words.
 
-A node of a finding's path holds whatever could be the answer. Where tied causes belong to several
-families or joints, no family or joint holds them all, so the path has no such node.
+A path leads from level to level, and each of its nodes lies within the one above. Where tied causes
+belong to several families or joints, no family or joint holds them all, so the path has no such
+node.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.candidates.smooth_laws import IN_WORDS
 from pipelines.diagnosis.diagnosis import Diagnosis
+from pipelines.diagnosis.selection.answer import answer_of
 from pipelines.diagnosis.selection.evidence import Element
 from pipelines.diagnosis.selection.findings import Finding
 from pipelines.diagnosis.selection.posterior import Posterior
@@ -30,6 +32,7 @@ LAW = "law:"
 """What the label of an unlisted law begins with."""
 WORTH_A_LINE = 0.01
 """Probability below which a law is not listed with a finding."""
+Belongs = Callable[[Element], bool]
 
 
 def findings(d: Diagnosis) -> list[dict[str, Any]]:
@@ -38,15 +41,12 @@ def findings(d: Diagnosis) -> list[dict[str, Any]]:
     return [] if weighed is None else [_as_json(d, one, weighed) for one in d.selected.findings]
 
 
-def thing(finding: Finding) -> str:
-    """Return what is missing where no cause is named, as deep as it is known."""
-    if finding.level == "family":
-        return _family(finding.family, finding.joint)
-    if finding.level == "joint":
-        return _something_at(finding.joint)
-    if finding.repeats is None:
-        return "something that may repeat with the motion or not"
-    return _something_that_repeats(finding.repeats)
+def dropped(d: Diagnosis) -> frozenset[str]:
+    """Return labels that the training runs would name, and the validation runs speak against."""
+    weighed = d.selected.posterior
+    if weighed is None:
+        return frozenset()
+    return frozenset(one.element.label for one in answer_of(weighed).named) - set(d.causes)
 
 
 def label_in_words(label: str) -> str:
@@ -64,14 +64,55 @@ def family_of(label: str, weighed: Posterior) -> str:
 
 def _as_json(d: Diagnosis, finding: Finding, weighed: Posterior) -> dict[str, Any]:
     told = finding.as_json()
+    against = dropped(d)
     for cause, (label, _) in zip(told["causes"], finding.causes, strict=True):
         effect = d.effects.get(label) or d.effect_of(label)
-        cause |= {"family": family_of(label, weighed), "words": in_words(effect)}
-    path = [node for node in told["path"] if _holds_all(node, finding, weighed)]
+        cause |= {
+            "family": family_of(label, weighed), "words": in_words(effect),
+            "dropped": label in against,
+        }  # fmt: skip
+    told["path"] = list(_path(told["path"], finding, weighed))
+    told["laws"] = list(_laws(finding, weighed))
+    if finding.level != "cause":
+        told["probability"] = told["path"][-1]["probability"]
+    last = told["path"][-1]["words"]
+    # Where it is unknown whether it repeats, the path ends at its beginning.
+    told["words"] = last if len(told["path"]) > 1 else "something that may repeat or not"
+    return told
+
+
+def _path(
+    path: Sequence[dict[str, Any]], finding: Finding, weighed: Posterior
+) -> Iterator[dict[str, Any]]:
+    """Yield the nodes that hold all that could be the answer, each within those above it."""
+    labels = dict(finding.causes) if finding.level == "cause" else {}
+    members = [element for element in weighed.elements if element.label in labels]
+    above: list[Belongs] = []
     for node in path:
-        node["words"] = _node_in_words(node, finding)
-    words = told["causes"][0]["words"] if finding.level == "cause" else thing(finding)
-    return told | {"words": words, "path": path, "laws": list(_laws(finding, weighed))}
+        words = _node_in_words(node, finding)
+        if node["level"] in ("missing", "cause"):
+            yield node | {"words": words}
+            continue
+        belongs = _belongs(node["level"], finding)
+        if all(map(belongs, members)):
+            above.append(belongs)
+            yield node | {"probability": _chance(weighed, above), "words": words}
+
+
+def _chance(weighed: Posterior, nodes: Sequence[Belongs]) -> float:
+    """Return the probability that some element of the true set lies within all nodes."""
+    inside = {i for i, e in enumerate(weighed.elements) if all(node(e) for node in nodes)}
+    pairs = zip(weighed.sets, weighed.probabilities, strict=True)
+    return float(sum(p for chosen, p in pairs if not inside.isdisjoint(chosen)))
+
+
+def _belongs(level: str, finding: Finding) -> Belongs:
+    """Return whether an element lies within the node of a level on a finding's path."""
+    if level == "repeats":
+        return lambda e: e.repeats == finding.repeats
+    if level == "joint":
+        return lambda e: e.joint == finding.joint
+    return lambda e: (e.joint, e.family) == (finding.joint, finding.family)
 
 
 def _node_in_words(node: dict[str, Any], finding: Finding) -> str:
@@ -79,22 +120,13 @@ def _node_in_words(node: dict[str, Any], finding: Finding) -> str:
     if level == "missing":
         return "something is missing"
     if level == "repeats":
-        return _something_that_repeats(value)
+        return f"something that {'repeats' if value else 'does not repeat'} with the motion"
     if level == "joint":
-        return _something_at(value)
-    return _family(value, finding.joint) if level == "family" else label_in_words(value)
-
-
-def _something_that_repeats(repeats: bool) -> str:
-    return f"something that {'repeats' if repeats else 'does not repeat'} with the motion"
-
-
-def _something_at(joint: str | None) -> str:
-    return f"something at {the(joint)}" if joint else "something of no single joint"
-
-
-def _family(family: str | None, joint: str | None) -> str:
-    return FAMILIES[str(family)].format(joint=the(joint) if joint else "the machine")
+        return f"something at {the(value)}" if value else "something of no single joint"
+    if level == "family":
+        joint = the(finding.joint) if finding.joint else "the machine"
+        return FAMILIES[value].format(joint=joint)
+    return label_in_words(value)
 
 
 def _law_of(label: str) -> tuple[str, str]:
@@ -103,28 +135,10 @@ def _law_of(label: str) -> tuple[str, str]:
     return kind, joint
 
 
-def _belongs(level: str, finding: Finding) -> Callable[[Element], bool]:
-    """Return whether an element belongs to the node of a level on a finding's path."""
-    if level == "repeats":
-        return lambda e: e.repeats == finding.repeats
-    if level == "joint":
-        return lambda e: e.joint == finding.joint
-    if level == "family":
-        return lambda e: (e.joint, e.family) == (finding.joint, finding.family)
-    return lambda e: True
-
-
-def _holds_all(node: dict[str, Any], finding: Finding, weighed: Posterior) -> bool:
-    """Tell whether a node holds the named cause and all that are tied with it."""
-    if finding.level != "cause":
-        return True
-    labels, belongs = dict(finding.causes), _belongs(node["level"], finding)
-    return all(belongs(e) for e in weighed.elements if e.label in labels)
-
-
 def _laws(finding: Finding, weighed: Posterior) -> Iterator[dict[str, Any]]:
     """Yield the unlisted laws of the finding's deepest node above a cause."""
-    belongs = _belongs("family" if finding.level == "cause" else finding.level, finding)
+    level = "family" if finding.level == "cause" else finding.level
+    belongs = _belongs(level, finding) if finding.family or finding.joint else lambda e: True
     labels = {e.label for e in weighed.elements if e.is_law and belongs(e)}
     for label, p in weighed.marginals.items():
         if label in labels and p >= WORTH_A_LINE:
