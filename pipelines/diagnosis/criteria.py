@@ -24,6 +24,8 @@ class Criteria:
     """Share by which each smooth law of the cuffs' own is off on a good rig."""
     background_wander: float = 0.002
     """Share by which a good rig's torque wanders in each run."""
+    background_line: float = 0.003
+    """Share of a line over the angle or over time on a good rig."""
     amplitudes: tuple[float, float, float] = (0.03, 0.08, 0.2)
     """Shares that a cause or a law may have, equally likely: prior standard deviations."""
     misfits: tuple[float, float, float] = (0.0, 0.03, 0.1)

@@ -4,15 +4,12 @@ from collections.abc import Sequence
 
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.candidates.smooth_laws import HUM, law_label
 from pipelines.diagnosis.evidence.cuff_coherence import evidence_of_will
 from pipelines.diagnosis.evidence.impact_bursts import evidence_of_play
-from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.noise_floor import MOST_INDEPENDENT
 from pipelines.diagnosis.evidence.observed_run import Run
-from pipelines.diagnosis.evidence.order_tracking import JointLines
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
-from pipelines.effects import Backlash, Cogging, Effect, VoluntaryTorque
+from pipelines.effects import Backlash, Effect, VoluntaryTorque
 
 PERCEIVED = {
     Backlash.name: "bursts are heard where the load changes sign, as of teeth that cross their play; hardly any of it "
@@ -26,7 +23,7 @@ PERCEIVED = {
 def auxiliary_evidence(prepared: Prepared) -> dict[str, float]:
     """Return the log likelihood ratio of each label besides what it does to the mean torque."""
     runs, residuals = prepared.runs, prepared.residuals
-    return heard_in(runs, residuals) | felt_in(runs, residuals) | shown_by(runs, prepared.lines)
+    return heard_in(runs, residuals) | felt_in(runs, residuals)
 
 
 def heard_in(runs: Sequence[Run], residuals: Sequence[NDArray]) -> dict[str, float]:
@@ -37,18 +34,6 @@ def heard_in(runs: Sequence[Run], residuals: Sequence[NDArray]) -> dict[str, flo
 def felt_in(runs: Sequence[Run], residuals: Sequence[NDArray]) -> dict[str, float]:
     """Return that of a wearer's pushes, of residuals (m, O). A rhythm fitted to them explains some of it too."""
     return _by_label(VoluntaryTorque, runs, evidence_of_will(runs, residuals))
-
-
-def shown_by(runs: Sequence[Run], lines: Sequence[JointLines]) -> dict[str, float]:
-    """Return that of ripples over the angle and of tones over time, by label."""
-    joints = runs[0].motion.joints
-    found = {}
-    for j, (name, joint) in enumerate(zip(joints, lines, strict=True)):
-        labels = {Kind.ANGLE: Cogging(joint=name).label, Kind.TIME: law_label(HUM, j, joints)}
-        for kind, label in labels.items():
-            if of_kind := joint.of_kind(kind):
-                found[label] = sum(line.log_likelihood_ratio for line in of_kind)
-    return found
 
 
 def _by_label(effect: type[Effect], runs: Sequence[Run], gains: NDArray) -> dict[str, float]:

@@ -1,4 +1,8 @@
-"""A candidate's rows in the decision regression, at block rate where that is near enough."""
+"""A candidate's rows in the decision regression, computed once a block.
+
+The decision band is slow enough for that (tests/diagnosis/test_block_rate.py), but for waves over
+the angle that go by within a few blocks.
+"""
 
 from collections.abc import Sequence
 
@@ -9,7 +13,7 @@ from pipelines.diagnosis.candidates.candidate import TURNS, Candidate
 from pipelines.diagnosis.candidates.columns import torque_columns
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.baseline_columns import columns_under
-from pipelines.diagnosis.evidence.block_rate import at_block_rate, needs_full_rate
+from pipelines.diagnosis.evidence.block_rate import at_block_rate
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.evidence.observed_run import Run
 
@@ -25,36 +29,32 @@ class CandidateRows:
     def __init__(self, runs: Sequence[Run], baseline: Baseline, regression: DecisionRegression) -> None:
         """Prepare the runs at both rates."""
         self._baseline, self._regression = baseline, regression
-        slow = [at_block_rate(run) for run in runs]
-        self._runs = {True: list(runs), False: slow}
-        plain = [columns_under((), run, baseline)[0] for run in slow]
-        self._plain = regression.rows(plain)
+        self._runs, self._slow = list(runs), [at_block_rate(run) for run in runs]
+        self._plain = [columns_under((), run, baseline) for run in self._slow]
+        self._plain_rows = regression.rows([columns for columns, _ in self._plain])
         names = runs[0].motion.joints
         steps = np.max([np.quantile(np.abs(np.diff(run.state[0], axis=0)), 0.9, axis=0) for run in runs], axis=0)
         self._steps = dict(zip(names, steps, strict=True))
         self._kinds = [run.motion.run for run in runs]
 
-    def __call__(self, candidate: Candidate, beside: NDArray | None = None, *, rough: bool = False) -> NDArray | None:
+    def __call__(self, candidate: Candidate, beside: NDArray | None = None) -> NDArray | None:
         """Return a candidate's rows; None where they are not finite.
 
         Parameters
         ----------
         beside : (N, b) array, optional
             Rows of what else is fitted with the baseline where the candidate transforms the motion.
-        rough : bool
-            At block rate in any case, near enough to choose where to look.
         """
-        full = (needs_full_rate(candidate.effect) and not rough) or self._ripples_within_blocks(candidate)
         if not candidate.bends:
-            runs = self._runs[full]
+            runs = self._runs if self._ripples_within_blocks(candidate) else self._slow
             parts = [torque_columns(candidate, r, run) for r, run in enumerate(runs)]
             rows = self._regression.rows(self._expanded(candidate, parts))
         elif candidate.directions:
             shapes = ((shape,) * len(self._kinds) for shape in candidate.directions)
             single = [Candidate(candidate.effect, own) for own in shapes]
-            rows = np.hstack([self._transformed(one, full, beside) for one in single])
+            rows = np.hstack([self._transformed(one, beside) for one in single])
         else:
-            rows = self._transformed(candidate, full, beside)
+            rows = self._transformed(candidate, beside)
         return rows if np.isfinite(rows).all() else None
 
     def _ripples_within_blocks(self, candidate: Candidate) -> bool:
@@ -69,22 +69,23 @@ class CandidateRows:
         own = candidate.columns_in(self._kinds)
         return [own.expand(part, r) for r, part in enumerate(parts)]
 
-    def _transformed(self, candidate: Candidate, full: bool, beside: NDArray | None) -> NDArray:
+    def _transformed(self, candidate: Candidate, beside: NDArray | None) -> NDArray:
         """Return what the transformed baseline adds to the plain one, under the values it then has.
 
         Each run has a column of its own where its shape is its own.
         """
-        regression, runs, slow = self._regression, self._runs[full], self._runs[False]
-        at = slow if full else [None] * len(slow)
+        regression, runs = self._regression, self._slow
         acting = [candidate.effect.explains(run.motion) for run in runs]
-        terms = [[candidate.term(r)] * acts for r, acts in enumerate(acting)]
-        made = [columns_under(t, run, self._baseline, s) for t, run, s in zip(terms, runs, at, strict=True)]
+        made = [
+            columns_under([candidate.term(r)], run, self._baseline) if acts else self._plain[r]
+            for r, (run, acts) in enumerate(zip(runs, acting, strict=True))
+        ]
         columns = regression.rows([c for c, _ in made])
-        change = regression.rows([(y - run.measured)[:, :, np.newaxis] for (_, y), run in zip(made, slow, strict=True)])
+        change = regression.rows([(y - run.measured)[:, :, np.newaxis] for (_, y), run in zip(made, runs, strict=True)])
         target = regression.torque_rows + change[:, 0]
         wide = columns if beside is None else np.hstack([columns, beside])
         values = _least_squares(wide, target)[: columns.shape[1]]
-        row = ((columns - self._plain) @ values)[:, np.newaxis] - change
+        row = ((columns - self._plain_rows) @ values)[:, np.newaxis] - change
         if not candidate.effect.per_run:
             return row
         numbers = [r for r, acts in enumerate(acting) if acts]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.candidates.candidate import proposals
+from pipelines.diagnosis.candidates.candidate import Candidate, proposals
 from pipelines.diagnosis.candidates.candidate_rows import CandidateRows
 from pipelines.diagnosis.candidates.cause import Cause, towards
 from pipelines.diagnosis.candidates.law_rows import curve_rows, law_rows
@@ -20,8 +20,9 @@ from pipelines.diagnosis.candidates.shape_refinement import Fitted, ShapeRefinem
 from pipelines.diagnosis.candidates.smooth_laws import TIME, LawColumn, law_label
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
+from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
-from pipelines.effects import Effect
+from pipelines.effects import Cogging, Effect
 
 ALTERNATIVES = 2
 """Shapes of a cause besides its best one."""
@@ -143,11 +144,12 @@ def build_library(prepared: Prepared, report: Report = silent) -> Library:
     effects = _effects(prepared)
     for number, effect in enumerate(effects):
         report(number / len(effects), effect.label)
-        fits = screened(effect, alone, prepared, regression)
+        fits = screened(effect, alone, prepared.runs, regression)
         shapes = _shapes(fits, alone, regression)
         causes += shapes
         grids += [tuple(fits)] if fits else []
         left_out += [] if shapes else [effect.label]
+    causes += _ripples(prepared, alone, regression)
     laws, law_columns = law_rows(prepared, regression)
     curves, curve_columns = curve_rows(prepared, regression)
     return Library(
@@ -163,12 +165,30 @@ def _effects(prepared: Prepared) -> list[Effect]:
     return [effect for effect in listed if effect.shows_in(motions)]
 
 
+def _ripples(prepared: Prepared, alone: ShapeRefinement, regression: DecisionRegression) -> list[Cause]:
+    """Return each joint's ripple as order tracking has it, at the full sampling rate."""
+    found, machine = [], prepared.baseline.machine
+    for joint in prepared.baseline.joints:
+        if orders := orders_of(joint, prepared):
+            effect = Cogging(joint, on=machine, lines=len(orders))
+            fitted = alone.fit(Candidate(effect, (orders,) * len(prepared.runs)))
+            if fitted is not None:
+                none = np.zeros((len(fitted.columns), 0))
+                found.append(Cause.of(fitted, none, regression, first=True))
+    return [cause for cause in found if cause is not None]
+
+
+def orders_of(joint: str, prepared: Prepared) -> tuple[float, ...]:
+    """Return the cycles a turn of a joint's ripple, known at the full sampling rate."""
+    lines = prepared.lines[prepared.baseline.joints.index(joint)]
+    return tuple(line.cycles for line in lines.of_kind(Kind.ANGLE))
+
+
 def _shapes(fits: Sequence[Fitted], alone: ShapeRefinement, regression: DecisionRegression) -> list[Cause]:
     """Return an effect at its best shape, refined, and at the next best of the coarse search."""
-    start = alone.fit(fits[0].candidate) if fits else None
-    if start is None:
+    if not fits:
         return []
-    best, slopes = alone.refined(start)
+    best, slopes = alone.refined(fits[0])
     others = others_of(fits, best, ALTERNATIVES)
     if forms := _other_forms(best, alone):
         other = max(forms, key=lambda fitted: fitted.gain_as_is)

@@ -2,8 +2,6 @@
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +9,9 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.candidates.candidate import TURNS, Candidate, bends_motion, lowest
 from pipelines.diagnosis.candidates.shape_refinement import TONE_STEP_HZ, Fitted, ShapeRefinement
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
-from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.observed_run import Run
-from pipelines.diagnosis.evidence.prepared_runs import Prepared
 from pipelines.diagnosis.fit.change_point import ALWAYS
-from pipelines.effects import Cogging, Effect, Parameter
+from pipelines.effects import Effect, Parameter
 
 VALUES = 8
 """Values of a shape parameter in a grid."""
@@ -23,6 +19,8 @@ BENDING = 2
 """Values of one whose effect is nearly in proportion to it."""
 HARDENING = ("1/rad²", "1/m²")
 """Units of a form that only bends a spring: left to the refinement."""
+SLOW_WAVES = 4.0
+"""Times the fewest waves of a ripple, up to which block averages are searched for one."""
 OSCILLATING = {"Hz", *TURNS}
 """Units of parameters along which an effect has many maxima."""
 APART = 2
@@ -32,29 +30,17 @@ Fit = Callable[[Candidate], Fitted | None]
 
 
 def screened(
-    effect: Effect, alone: ShapeRefinement, prepared: Prepared, regression: DecisionRegression
+    effect: Effect, alone: ShapeRefinement, runs: Sequence[Run], regression: DecisionRegression
 ) -> list[Fitted]:
     """Return the fits of an effect's grid, those that explain most first."""
-    fit, runs = partial(alone.fit, rough=True), prepared.runs
     if chosen := effect.directions([run.motion for run in runs]):
         starts = [_along(effect, directions, len(runs)) for directions in chosen]
-    elif lines := _lines_of(effect, prepared):
-        several = replace(effect, lines=len(lines))
-        starts = [Candidate(several, (lines,) * len(runs))]
     elif any(p.per_run for p in effect.shape) and not bends_motion(effect):
         starts = [_from_the_begin(effect, len(runs))]
     else:
         starts = [Candidate(effect, (shape,) * len(runs)) for shape in _grid(effect, runs, regression)]
-    fits = [fitted for start in starts if (fitted := fit(start)) is not None]
+    fits = [fitted for start in starts if (fitted := alone.fit(start)) is not None]
     return sorted(fits, key=lambda fitted: -fitted.gain)
-
-
-def _lines_of(effect: Effect, prepared: Prepared) -> tuple[float, ...]:
-    """Return the cycles a turn of a gear's ripple, known at the full sampling rate."""
-    if not isinstance(effect, Cogging):
-        return ()
-    joint = prepared.lines[effect.column(prepared.runs[0].motion)]
-    return tuple(line.cycles for line in joint.of_kind(Kind.ANGLE))
 
 
 def _along(effect: Effect, directions: Sequence[tuple[float, ...]], runs: int) -> Candidate:
@@ -103,7 +89,10 @@ def _tried(effect: Effect, parameter: Parameter, few: int, runs: Sequence[Run]) 
     if effect.swings and parameter.unit in HARDENING:
         return np.array([parameter.default])
     values = values_in(effect, parameter, few, runs)
-    return values[values >= lowest(effect, parameter, runs)]
+    least = lowest(effect, parameter, runs)
+    # Faster waves are lines, known at the full sampling rate.
+    most = SLOW_WAVES * least if parameter.unit in TURNS else np.inf
+    return values[(values >= least) & (values <= most)]
 
 
 def values_in(effect: Effect, parameter: Parameter, count: int, runs: Sequence[Run]) -> NDArray:

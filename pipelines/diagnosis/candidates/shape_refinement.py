@@ -86,9 +86,9 @@ class ShapeRefinement:
         size = np.linalg.norm(rows, axis=0)
         return np.where(np.linalg.norm(plain, axis=0) > ROUNDING * size, plain, 0.0)
 
-    def fit(self, candidate: Candidate, *, rough: bool = False) -> Fitted | None:
+    def fit(self, candidate: Candidate) -> Fitted | None:
         """Fit a candidate's amplitudes; None where its rows are not finite."""
-        columns = self._rows(candidate, self._beside, rough=rough)
+        columns = self._rows(candidate, self._beside)
         if columns is None:
             return None
         plain = self._project(columns)

@@ -28,6 +28,7 @@ from pipelines.diagnosis.candidates.shape_grid import BENDING, values_in, values
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.baseline import Baseline, baseline_of, with_load
 from pipelines.diagnosis.evidence.baseline_columns import columns_under, gram_of_runs
+from pipelines.diagnosis.evidence.block_rate import at_block_rate
 from pipelines.diagnosis.evidence.downsampling import thinned
 from pipelines.diagnosis.evidence.eligibility import refuse_unfit
 from pipelines.diagnosis.evidence.gram import solve
@@ -224,7 +225,7 @@ def detectability(
     power : chance with which an effect of the smallest size is found
     report : told the share done and the cause at hand
     """
-    sight = Sight.of(runs, baseline, floor)
+    sight = Sight.of([at_block_rate(run) for run in runs], baseline, floor)
     # What the wearer may carry instead of the machine goes by the same name; the machine's is reported.
     motions = [run.motion for run in runs]
     effects = [

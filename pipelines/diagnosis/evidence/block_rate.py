@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from pipelines.diagnosis.evidence.observed_run import Run
-from pipelines.effects import Effect
 from pipelines.signals.blocks import BlockAverage
 
 
@@ -30,8 +29,3 @@ def at_block_rate(run: Run) -> Run:
         metadata={**motion.metadata, "regression_filter": block.as_metadata(rate_hz)},
     )  # fmt: skip
     return replace(run, motion=slow, block=block, starts=np.arange(len(run.time)), fast=None)
-
-
-def needs_full_rate(effect: Effect) -> bool:
-    """Tell whether an effect remembers what happens within a block, or swings faster."""
-    return effect.swings or effect.states > 0 or effect.reading_states > 0

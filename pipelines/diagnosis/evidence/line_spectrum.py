@@ -18,8 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
-from scipy.stats import f as f_distribution
-from scipy.stats import gamma
+from scipy.special import fdtrc, gammaincinv
 
 from pipelines.diagnosis.evidence.whitened_residual import TINY, Channel
 
@@ -74,7 +73,7 @@ class Spectrum:
         # The level is an estimate, too, so that the ratio is distributed as F; a median of k has
         # half the efficiency of their mean.
         around = AROUND_IN_ANGLE if self.kind is Kind.ANGLE else AROUND_IN_TIME
-        tail = f_distribution.sf(ratio / self.phases, 2 * self.phases, around)
+        tail = float(fdtrc(2 * self.phases, around, ratio / self.phases))
         # A maximum between independent places is higher than those at them.
         places = 2.5 * (1.0 + (self.cycles[-1] - self.cycles[0]) / self.width)
         return float(-np.expm1(searches * places * np.log1p(-min(tail, 1.0 - 1e-12))))
@@ -164,7 +163,7 @@ def _level(ratio: NDArray, around: int, phases: int) -> NDArray:
     edges = np.linspace(0, len(ratio), max(1, len(ratio) // around) + 1).astype(int)
     medians = [np.median(ratio[a:b]) for a, b in pairwise(edges)]
     middle = 0.5 * (edges[:-1] + edges[1:])
-    level = np.interp(np.arange(len(ratio)), middle, medians) / gamma.median(phases)
+    level = np.interp(np.arange(len(ratio)), middle, medians) / float(gammaincinv(phases, 0.5))
     return np.maximum(level, 1.0)
 
 

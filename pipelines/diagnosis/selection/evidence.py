@@ -13,9 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates.cause import Cause
-from pipelines.diagnosis.candidates.library import Library
+from pipelines.diagnosis.candidates.library import Library, orders_of
 from pipelines.diagnosis.candidates.smooth_laws import FAMILIES, HUM, TIME, LawColumn, law_label
-from pipelines.effects import Effect
+from pipelines.diagnosis.evidence.line_spectrum import Kind
+from pipelines.diagnosis.evidence.prepared_runs import Prepared
+from pipelines.effects import Cogging, Effect
+
+Shown = tuple[float, float, int]
+"""A line's log likelihood ratio, its share of the torque, and the phases that it has."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +57,8 @@ class Element:
     place: int = -1
     """Of a cause: its number in the library."""
 
+    shown: list[Shown] = field(default_factory=list)
+    """Of a ripple or a tone: its lines at the full sampling rate."""
     context: int = -1
     """Of a cause: the set beside whose others it was refined; -1 where it was refined alone."""
 
@@ -163,12 +170,15 @@ def _elements(library: Library, at: _Places) -> list[Element]:
         own = [(int(p), c[2]) for p, c in zip(at.curves, library.curves, strict=True) if c[0] == j]
         laws[TIME, j, "all"] = own
     two = any(wearer == "human" for _, _, wearer in laws)
-    elements = [_of_cause(number, cause, at, laws, names, two) for number, cause in enumerate(library.causes)]
+    elements = [
+        _of_cause(number, cause, at, laws, library.prepared, two) for number, cause in enumerate(library.causes)
+    ]
     elements += [
         Element(
             law_label(kind, j, names), kind, names[j], FAMILIES[kind], True,
             [int(p) for p, _ in own], _normalised([v for _, v in own]),
             repeats=FAMILIES[kind] != TIME, wearer=wearer,
+            shown=_shown(Kind.TIME, j, library.prepared) if kind == HUM else [],
         )
         for (kind, j, wearer), own in laws.items() if wearer != "cuffs"
     ]  # fmt: skip
@@ -190,8 +200,17 @@ def _normalised(variance: Sequence[float]) -> list[float]:
     return [v / total for v in variance]
 
 
-def _of_cause(number: int, cause: Cause, at: _Places, laws: Laws, names: Sequence[str], two: bool) -> Element:
-    effect = cause.candidate.effect
+def _shown(kind: Kind, joint: int, prepared: Prepared) -> list[Shown]:
+    """Return what a joint's lines of one kind tell."""
+    phases = 1 if kind is Kind.ANGLE else len(prepared.runs)
+    lines = prepared.lines[joint].of_kind(kind)
+    rms = np.sqrt(2.0) * float(prepared.torque[joint])
+    return [(line.log_likelihood_ratio, line.amplitude / rms, phases) for line in lines]
+
+
+def _of_cause(number: int, cause: Cause, at: _Places, laws: Laws, prepared: Prepared, two: bool) -> Element:
+    effect, names = cause.candidate.effect, prepared.baseline.joints
+    tracked = isinstance(effect, Cogging) and cause.candidate.shapes[0] == orders_of(effect.joint, prepared)
     places = at.causes[number].tolist()
     resembles = list(_resembled(effect, laws, names, two))
     total = sum(v for _, v in resembles)
@@ -202,6 +221,7 @@ def _of_cause(number: int, cause: Cause, at: _Places, laws: Laws, names: Sequenc
         cause.amplitudes[_positive(cause)].tolist(),
         not effect.goes_with_time and effect.family != TIME, cause.first, effect.each_run,
         effect.run is not None, place=number, context=cause.context,
+        shown=_shown(Kind.ANGLE, names.index(effect.joint), prepared) if tracked else [],
     )  # fmt: skip
 
 
