@@ -81,9 +81,7 @@ def _as_json(d: Diagnosis, finding: Finding, weighed: Posterior) -> dict[str, An
     return told
 
 
-def _path(
-    path: Sequence[dict[str, Any]], finding: Finding, weighed: Posterior
-) -> Iterator[dict[str, Any]]:
+def _path(path: Sequence[dict[str, Any]], finding: Finding, weighed: Posterior) -> Iterator[dict[str, Any]]:
     """Yield the nodes that hold all that could be the answer, each within those above it."""
     labels = dict(finding.causes) if finding.level == "cause" else {}
     members = [element for element in weighed.elements if element.label in labels]

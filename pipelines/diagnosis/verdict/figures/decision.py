@@ -74,9 +74,7 @@ def _shares(axis: Axes, said: Mapping[str, Any]) -> None:
         start = 0.0
         for part in ORDER:
             share = told[part] or 0.0
-            axis.barh(
-                row, share, left=start, color=COLOURS[part], height=0.6, edgecolor="white", lw=0.8
-            )
+            axis.barh(row, share, left=start, color=COLOURS[part], height=0.6, edgecolor="white", lw=0.8)
             if share > TEXT:
                 _number(axis, row, start, share, part)
             if share > NEGLIGIBLE:
@@ -164,7 +162,9 @@ def _bars(d: Diagnosis) -> list[Bar]:
     bars = [Bar(p, tuple(_elements(d, labels))) for labels, p in shown]
     rest = 1.0 - sum(p for _, p in shown)
     if rest >= 0.5 * LEAST:
-        bars.append(Bar(rest, ((f"{len(ranked) - len(shown)} other sets", None, False, False),)))
+        others = len(ranked) - len(shown)
+        words = f"{others} other set{'s' * (others > 1)}"
+        bars.append(Bar(rest, ((words, None, False, False),)))
     return bars
 
 
