@@ -257,7 +257,7 @@ def write_session(folder, joints=LEG, shift=0.0, **metadata):
     extended = write_parameters(folder, joints, extended=True, shift=shift, inputs=[recording])
     write_residuals(folder, joints, inputs=[recording])
     write_candidates(folder, joints)
-    write_verdict(folder, joints, inputs=[recording])
+    write_verdict(folder, joints, inputs=[recording], **decision_of(joints))
     for parameters, off in ((baseline, 0.05), (extended, 0.02)):
         write_replay(folder, parameters, recording, joints, off=off)
         write_loop(folder, parameters, joints)
