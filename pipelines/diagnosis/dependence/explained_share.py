@@ -159,8 +159,8 @@ def dependences(runs: Sequence[Run], residuals: Sequence[NDArray]) -> list[Depen
         kind = (
             "above the motion's own band, in step with its period" if in_step else "that is no harmonic of the motion"
         )
-        words = f"a tone of {frequency:.2f} Hz {kind}"
-        made.append(Dependence(joint, "tone", share, _sentence(joint, machine, words, share)))
+        said = f"{_left(joint, share)} is a tone of {frequency:.2f} Hz {kind}"
+        made.append(Dependence(joint, "tone", share, said))
         found += sorted(made, key=_rank, reverse=True)
     return found
 
@@ -175,7 +175,11 @@ def knows(variable: Variable, runs: Iterable[Run], j: int) -> bool:
 
 
 def _sentence(joint: str, machine: Machine, words: str, share: float) -> str:
-    return f"{100 * share:.0f} % of what is left at {the(joint)} depends on {_words(joint, machine, words)}"
+    return f"{_left(joint, share)} depends on {_words(joint, machine, words)}"
+
+
+def _left(joint: str, share: float) -> str:
+    return f"{100 * share:.0f} % of what is left at {the(joint)}"
 
 
 def _words(joint: str, machine: Machine, words: str) -> str:
