@@ -28,7 +28,7 @@ class Criteria:
     """Share of a line over the angle or over time on a good rig."""
     amplitudes: tuple[float, float, float] = (0.03, 0.08, 0.2)
     """Shares that a cause or a law may have, equally likely: prior standard deviations."""
-    misfits: tuple[float, float, float] = (0.0, 0.03, 0.1)
+    misfits: tuple[float, float, float] = (0.0, 0.1, 0.3)
     """Shares of a cause's own size by which its true form may differ from ours, equally likely."""
     shape_sd: float = 0.3
     """Prior standard deviation of a shape about its best value, in its unit of change."""

@@ -27,7 +27,12 @@ from pipelines.diagnosis.fit.validation import Validated, log_likelihood_ratio, 
 from pipelines.diagnosis.selection.answer import Answer, answer_of
 from pipelines.diagnosis.selection.evidence import Evidence
 from pipelines.diagnosis.selection.findings import findings
-from pipelines.diagnosis.selection.posterior import likely_contexts, posterior, strongest
+from pipelines.diagnosis.selection.posterior import (
+    Posterior,
+    likely_contexts,
+    posterior,
+    strongest,
+)
 from pipelines.mechanics.motion import Motion
 
 LIBRARY_SHARE, FIT_SHARE = 0.6, 0.75
@@ -68,14 +73,12 @@ def evidence_of(motions: Sequence[Motion], known: Sequence[str] = ()) -> Evidenc
     """Return what the decision needs of a session."""
     data = training_data(motions, known)
     prepared = prepare(data.train, data.baseline)
-    return _evidence(prepared, silent)[1]
+    return _weighed(prepared, silent)[1]
 
 
 def select(prepared: Prepared, report: Report = silent) -> Selected:
     """Weigh all sets of causes and laws, and read the answer off the posterior."""
-    library, evidence = _evidence(prepared, report)
-    report(LIBRARY_SHARE, "posterior")
-    weighed = posterior(evidence)
+    library, evidence, weighed = _weighed(prepared, report)
     answer = answer_of(weighed)
     found = tuple(findings(weighed, answer))
     return Selected(library, evidence, weighed, answer, found, _router(prepared))
@@ -86,15 +89,24 @@ def nothing_selected(prepared: Prepared) -> Selected:
     return Selected(None, None, None, Answer((), 0.0, 0.0), (), _router(prepared))
 
 
-def _evidence(prepared: Prepared, report: Report) -> tuple[Library, Evidence]:
-    """Return the library, causes refined beside the others of likely sets, and its evidence."""
+def _weighed(prepared: Prepared, report: Report) -> tuple[Library, Evidence, Posterior]:
+    """Return the library, its evidence, and how probable each set is.
+
+    Causes are refined alone first, then beside the others of likely sets.
+    """
     library = build_library(prepared, lambda share, what: report(LIBRARY_SHARE * share, what))
+    report(LIBRARY_SHARE, "posterior")
     heard = auxiliary_evidence(prepared)
-    weighed = posterior(Evidence.of(library, heard))
+    evidence = Evidence.of(library, heard)
+    weighed = posterior(evidence)
+    refined = library
     for number in strongest(weighed):
-        library = library.with_partners(number, PARTNERS)
-    library = library.refined_together(likely_contexts(weighed))
-    return library, Evidence.of(library, heard)
+        refined = refined.with_partners(number, PARTNERS)
+    refined = refined.refined_together(likely_contexts(weighed))
+    if refined is library:
+        return library, evidence, weighed
+    evidence = Evidence.of(refined, heard)
+    return refined, evidence, posterior(evidence)
 
 
 def _router(prepared: Prepared) -> tuple[ResidualShares, ...]:
@@ -114,15 +126,14 @@ def _validated(data: TrainingData, prepared: Prepared, selected: Selected) -> Di
         after, without = _fitted(selected, refine, prepared, before)
     known = uncertainty(after.fit, prepared.runs, baseline, imperfection(prepared.runs))
     parameters, covariance = parameter_rows.parameters(after.fit, baseline, known)
+    drift = simulation_error(before.fit, validate, baseline)
+    after_drift = drift if after is before else simulation_error(after.fit, validate, baseline)
     residuals = {"baseline": before.residuals, "extended": after.residuals}
     reversals = [] if data.spoilt else built_up(after.fit, baseline, prepared.runs, validate)
     return Diagnosis(
         data, selected, before, after, without, noise_floor(validate, after.residuals), known,
         parameters, covariance, parameter_rows.residual_table(validate, residuals), tuple(reversals),
-        {
-            "baseline": simulation_error(before.fit, validate, baseline),
-            "extended": simulation_error(after.fit, validate, baseline),
-        },
+        {"baseline": drift, "extended": after_drift},
     )  # fmt: skip
 
 

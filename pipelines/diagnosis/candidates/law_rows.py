@@ -9,11 +9,13 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.candidates.smooth_laws import (
     HUM,
     IN_CUFFS,
+    Curve,
     LawColumn,
     Spans,
     curves_of_time,
     smooth_laws,
 )
+from pipelines.diagnosis.evidence.decision_band import LENGTH_S
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
@@ -63,14 +65,19 @@ def _both(drives: Sequence[NDArray], cuffs: Sequence[NDArray]) -> list[NDArray]:
     return [np.concatenate([d, c], axis=1) for d, c in zip(drives, cuffs, strict=True)]
 
 
-def curve_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list[tuple[int, int, float]], NDArray]:
-    """Return joint, run and prior variance of every curve of time, and their rows (N, t)."""
+def curve_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list[Curve], NDArray]:
+    """Return every curve of time, and their rows (N, t)."""
     told, rows = [], []
     for r, run in enumerate(prepared.runs):
         curves, variance = curves_of_time(run)
+        # Noise of a density adds twice that over the duration to the square of a cosine's amplitude.
+        duration = max(float(run.time[-1] - run.time[0]), LENGTH_S)
+        hz = np.maximum(np.arange(len(variance)), 1) / (2.0 * duration)
+        noise = 2.0 * prepared.noise.excess(hz)[: regression.joints] / duration
         for j in range(regression.joints):
             parts = [np.zeros((*other.measured.shape, len(variance))) for other in prepared.runs]
             parts[r][:, j] = curves * prepared.torque[j]
-            told += [(j, r, float(v)) for v in variance]
+            share = np.nan_to_num(noise[j] / prepared.torque[j] ** 2)
+            told += [Curve(j, r, float(v), float(s)) for v, s in zip(variance, share, strict=True)]
             rows.append(regression.project(regression.rows(parts)))
     return told, np.hstack(rows)

@@ -17,7 +17,7 @@ from pipelines.diagnosis.candidates.cause import Cause, towards
 from pipelines.diagnosis.candidates.law_rows import curve_rows, law_rows
 from pipelines.diagnosis.candidates.shape_grid import others_of, screened
 from pipelines.diagnosis.candidates.shape_refinement import Fitted, ShapeRefinement, has_shapes
-from pipelines.diagnosis.candidates.smooth_laws import TIME, LawColumn, law_label
+from pipelines.diagnosis.candidates.smooth_laws import TIME, Curve, LawColumn, law_label
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.evidence.line_spectrum import Kind
@@ -56,8 +56,8 @@ class Library:
     laws: tuple[LawColumn, ...]
     law_columns: NDArray
     """(N, l)."""
-    curves: tuple[tuple[int, int, float], ...]
-    """Joint, run and relative prior variance of each curve of time."""
+    curves: tuple[Curve, ...]
+    """The curves of time."""
     curve_columns: NDArray
     """(N, t)."""
     left_out: tuple[str, ...] = ()
@@ -128,7 +128,7 @@ class Library:
         own = [law.variant(names) == variant for law in self.laws]
         if any(own):
             return self.law_columns[:, own]
-        joint = [law_label(TIME, j, names) == variant for j, _, _ in self.curves]
+        joint = [law_label(TIME, curve.joint, names) == variant for curve in self.curves]
         return self.curve_columns[:, joint]
 
 

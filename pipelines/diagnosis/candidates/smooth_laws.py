@@ -7,6 +7,7 @@ dimensionless and of order one, so that its coefficient is a share of the joint'
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
@@ -74,6 +75,17 @@ class LawColumn:
     def variant(self, joints: Sequence[str]) -> str:
         """Return the law's label, and whose share it is."""
         return law_label(self.kind, self.joint, joints, self.wearer)
+
+
+class Curve(NamedTuple):
+    """A cosine over one run, by which a joint's torque may wander."""
+
+    joint: int
+    run: int
+    variance: float
+    """Prior variance of its coefficient relative to the others'."""
+    noise: float
+    """Variance of its coefficient in slow noise, in squared shares of the joint's rms torque."""
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,13 @@
 """The noise of each output as a spectrum, known without a model of the machine.
 
 Differences of adjacent periods at the same phase hold noise and whatever wanders. What wanders is
-slow, so the noise is read off above the band in which things wander and extended downwards by its
-spectrum: first-order noise has the density S0 / (1 + (2 pi f tau)^2). Without periods the noise is
-what lies above the motion's own band. S0, the density at low frequencies, is what the decision
-needs, since columns of a model are slow: it counts coloured noise as it acts there.
+slower than the noise is measured at. The noise is the sum of first-order noise and of pink noise,
+
+    S(f) = S0 (1 / (1 + (2 pi f tau)^2) + pink F / f),  F = 1.5 Hz.
+
+Without periods it is read off above the motion's own band, where it cannot be told how pink it is.
+Averages count with the density at the frequencies that columns of a model have; what is slower and
+pink is background that a torque which wanders has to exceed.
 """
 
 from collections.abc import Sequence
@@ -17,7 +20,7 @@ from pipelines.diagnosis.dependence.spectral_lines import above_the_motion_hz
 from pipelines.diagnosis.evidence.noise_floor import scatter
 from pipelines.diagnosis.evidence.observed_run import Run
 
-WANDER_HZ = 1.5
+WANDER_HZ = 0.25
 """Below it differences between periods hold what wanders, not only noise, Hz."""
 HIGHEST_HZ = 6.0
 """Highest frequency of the fit, Hz: blocks of 25 ms pass it, and impacts are mostly above."""
@@ -25,27 +28,48 @@ WITHOUT_PERIODS_HZ = (4.0, 8.0)
 """Without periods: where the band begins at the latest, and where it ends, Hz."""
 CORRELATION_S = np.concatenate([[0.0], np.geomspace(0.005, 0.25, 24)])
 """Correlation times tried, s. Noise of sensors and drives is no slower; what is slower wanders."""
+PINK_HZ = 1.5
+"""Where pink noise is measured against first-order noise, Hz."""
+PINK = np.array([0.0, 0.1, 0.2, 0.35, 0.6, 1.0, 1.7, 3.0])
+"""Ratios of the two tried."""
+UNKNOWN_PINK = 0.2
+"""The ratio where it cannot be measured."""
+ACTING_HZ = 0.7
+"""A frequency at which columns of a model move, Hz."""
 PIECE_S = 20.0
 """Length of the pieces of a series whose spectra are taken, s."""
 SHORTEST = 64
 """Blocks that a series must have for its spectrum to count."""
+UNLIKE = 3.0
+"""Times the median of all pieces, from which a piece holds what came or went, not noise."""
 
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """First-order noise of each output, (O,) each; NaN where it is not known."""
+    """Noise of each output, (O,) each; NaN where it is not known."""
 
     density: NDArray
-    """Two-sided power density at low frequencies, (N·m)²/Hz."""
+    """Two-sided power density S0 of the first-order noise at low frequencies, (N·m)²/Hz."""
     correlation_s: NDArray
+    pink: NDArray
+    """Ratio of pink to first-order noise at ``PINK_HZ``."""
     from_periods: bool
+
+    def at(self, hz: NDArray | float) -> NDArray:
+        """Return the density at frequencies (k,) below those of first-order noise, (O, k)."""
+        pink = np.multiply.outer(self.pink, PINK_HZ / np.asarray(hz, dtype=float))
+        return (self.density * (1.0 + pink).T).T
 
     def sigma(self, length_s: float) -> NDArray:
         """Return the standard deviation that averages over ``length_s`` act with, (O,) N·m.
 
-        It is that of white noise with the density which the noise has at low frequencies.
+        It is that of white noise with the density which the noise has where columns move.
         """
-        return np.sqrt(self.density / length_s)
+        return np.sqrt(self.at(ACTING_HZ) / length_s)
+
+    def excess(self, hz: NDArray) -> NDArray:
+        """Return by how much slow noise exceeds what averages count with, (O, k) (N·m)²/Hz."""
+        return np.maximum(self.at(hz) - self.at(ACTING_HZ)[:, np.newaxis], 0.0)
 
 
 def noise_model(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NoiseModel:
@@ -53,42 +77,44 @@ def noise_model(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NoiseModel
     differences = [scatter(run, residual) for run, residual in zip(runs, residuals, strict=True)]
     from_periods = any(len(one) for one in differences)
     if from_periods:
-        series, band = differences, (WANDER_HZ, HIGHEST_HZ)
+        series, band, pink = differences, (WANDER_HZ, HIGHEST_HZ), PINK
     else:
         series = [np.where(run.usable, residual, np.nan) for run, residual in zip(runs, residuals, strict=True)]
         above = max(above_the_motion_hz(run) for run in runs)
         latest, highest = WITHOUT_PERIODS_HZ
-        band = (min(above, latest), highest)
+        band, pink = (min(above, latest), highest), np.array([UNKNOWN_PINK])
     rate_hz = runs[0].motion.sample_rate_hz / runs[0].block.decimation
-    fits = [
-        _first_order([one[:, o] for one in series if len(one)], rate_hz, band) for o in range(residuals[0].shape[1])
-    ]
-    density, correlation_s = np.array(fits).T
-    return NoiseModel(density, correlation_s, from_periods)
+    outputs = range(residuals[0].shape[1])
+    fits = [_spectrum_of([one[:, o] for one in series if len(one)], rate_hz, band, pink) for o in outputs]
+    return NoiseModel(*np.array(fits).T, from_periods)
 
 
-def _first_order(series: Sequence[NDArray], rate_hz: float, band: tuple[float, float]) -> tuple[float, float]:
-    """Fit first-order noise to series with NaN where they are not usable; return S0 and tau.
+def _spectrum_of(
+    series: Sequence[NDArray], rate_hz: float, band: tuple[float, float], pink: NDArray = PINK
+) -> tuple[float, float, float]:
+    """Fit noise to series with NaN where they are not usable; return S0, tau and the pink share.
 
     Maximum likelihood of the periodogram (Whittle, 1953, Arkiv för Matematik 2(23)).
     """
-    spectra = [_periodogram(x, rate_hz, band) for x in series]
-    frequency = np.concatenate([f for f, _ in spectra] or [np.zeros(0)])
-    power = np.concatenate([p for _, p in spectra] or [np.zeros(0)])
-    if not power.any():
-        return np.nan, np.nan
-    shapes = 1.0 / (1.0 + (2.0 * np.pi * np.outer(CORRELATION_S, frequency)) ** 2)
-    densities = np.mean(power / shapes, axis=1)
-    misfit = len(power) * np.log(densities) + np.sum(np.log(shapes), axis=1)
-    best = int(np.argmin(misfit))
-    return float(densities[best]), float(CORRELATION_S[best])
+    pieces = [piece for x in series for piece in _pieces(x, rate_hz, band)]
+    sizes = np.array([power.mean() for _, power in pieces])
+    if not sizes.any():
+        return np.nan, np.nan, np.nan
+    alike = sizes <= UNLIKE * np.median(sizes)
+    frequency, power = (np.concatenate([p[k] for p, a in zip(pieces, alike, strict=True) if a]) for k in (0, 1))
+    first = 1.0 / (1.0 + (2.0 * np.pi * np.outer(CORRELATION_S, frequency)) ** 2)
+    shapes = first[:, np.newaxis] + pink[:, np.newaxis] * PINK_HZ / frequency
+    densities = np.mean(power / shapes, axis=2)
+    misfit = len(power) * np.log(densities) + np.sum(np.log(shapes), axis=2)
+    t, p = np.unravel_index(np.argmin(misfit), misfit.shape)
+    return float(densities[t, p]), float(CORRELATION_S[t]), float(pink[p])
 
 
-def _periodogram(x: NDArray, rate_hz: float, band: tuple[float, float]) -> tuple[NDArray, NDArray]:
-    """Return frequencies (Hz) and two-sided densities of a series (n,) within a band."""
+def _pieces(x: NDArray, rate_hz: float, band: tuple[float, float]) -> list[tuple[NDArray, NDArray]]:
+    """Return frequencies (Hz) and two-sided densities of each piece of a series within a band."""
     pieces = np.array_split(x, max(1, round(len(x) / (PIECE_S * rate_hz))))
     found = [_of_piece(piece, rate_hz, band) for piece in pieces]
-    return np.concatenate([f for f, _ in found]), np.concatenate([p for _, p in found])
+    return [piece for piece in found if len(piece[0])]
 
 
 def _of_piece(x: NDArray, rate_hz: float, band: tuple[float, float]) -> tuple[NDArray, NDArray]:

@@ -9,19 +9,19 @@ from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit.fitted_model import model_of_run
 from pipelines.diagnosis.fit.joint_fit import Fit
-from pipelines.dynamics.replay import replay
+from pipelines.dynamics.replay import WINDOW_S, replay
 from pipelines.errors import ExoidError
 
 
 def simulation_error(made: Fit, runs: Sequence[Run], baseline: Baseline) -> NDArray | None:
-    """Return the rms angle error of 1 s simulations over all runs, (J,) rad.
+    """Return the rms angle error of 1 s simulations, one after the other, over all runs, (J,) rad.
 
     None where the forward dynamics cannot hold the fitted model, or runs away.
     """
     squares, count = 0.0, 0
     for run in runs:
         try:
-            result = replay(model_of_run(made, baseline, run), run.motion)
+            result = replay(model_of_run(made, baseline, run), run.motion, WINDOW_S, WINDOW_S)
         except (ExoidError, ZeroDivisionError):
             return None
         with np.errstate(over="ignore"):

@@ -82,8 +82,9 @@ class Evidence:
     """(n,) with the measured torque."""
     cuffs_right: NDArray
     elements: tuple[Element, ...]
-    background: tuple[tuple[str, int, float], ...]
-    """What a good rig has: kind (``law``, ``cuff``, ``wander``, ``cause``), column, variance."""
+    background: tuple[tuple[str, int, float, float], ...]
+    """What a good rig has: kind (``law``, ``cuff``, ``wander``, ``cause``), column, its variance relative
+    to others of the kind, and that of noise besides."""
     heard: Mapping[str, float]
     """Log likelihood of causes besides what they do to the mean torque, by label."""
     contexts: tuple[tuple[int, ...], ...] = ()
@@ -130,7 +131,7 @@ class Evidence:
         return cls(
             _symmetric(row["drives"], n), _symmetric(row["cuffs"], n), right[:n], right[n:],
             tuple(Element(**one) for one in text["elements"]),
-            tuple((kind, place, v) for kind, place, v in text["background"]),
+            tuple((kind, place, v, noise) for kind, place, v, noise in text["background"]),
             text["heard"], tuple(map(tuple, text["contexts"])), text["about"],
         )  # fmt: skip
 
@@ -167,7 +168,7 @@ def _elements(library: Library, at: _Places) -> list[Element]:
     names = library.prepared.baseline.joints
     laws = _laws_by_kind(library.laws, at.laws)
     for j in range(len(names)):
-        own = [(int(p), c[2]) for p, c in zip(at.curves, library.curves, strict=True) if c[0] == j]
+        own = [(int(p), c.variance) for p, c in zip(at.curves, library.curves, strict=True) if c.joint == j]
         laws[TIME, j, "all"] = own
     two = any(wearer == "human" for _, _, wearer in laws)
     elements = [
@@ -249,18 +250,18 @@ def _resembled(effect: Effect, laws: Laws, names: Sequence[str], two: bool):
 
 
 def _background(library: Library, at: _Places):
-    """Yield what a good rig has: kind, column and relative variance."""
+    """Yield what a good rig has: kind, column, relative variance, and the variance of noise."""
     for law, place in zip(library.laws, at.laws, strict=True):
         if law.kind == HUM:
             continue
-        yield "cuff" if law.wearer == "cuffs" else "law", int(place), law.variance
-    for (_, _, variance), place in zip(library.curves, at.curves, strict=True):
-        yield "wander", int(place), variance
+        yield "cuff" if law.wearer == "cuffs" else "law", int(place), law.variance, 0.0
+    for curve, place in zip(library.curves, at.curves, strict=True):
+        yield "wander", int(place), curve.variance, curve.noise
     for cause, places in zip(library.causes, at.causes, strict=True):
         effect = cause.candidate.effect
         alone = cause.first and cause.context < 0
         if alone and not effect.each_run and effect.run is None:
-            yield from (("cause", int(place), 1.0 / len(places)) for place in places)
+            yield from (("cause", int(place), 1.0 / len(places), 0.0) for place in places)
 
 
 def _contexts(library: Library, elements: Sequence[Element]):
@@ -276,6 +277,7 @@ def _about(library: Library) -> dict[str, Any]:
         "kinds": [run.motion.run for run in prepared.runs],
         "density": prepared.noise.density.tolist(),
         "correlation_s": prepared.noise.correlation_s.tolist(),
+        "pink": prepared.noise.pink.tolist(),
         "from_periods": prepared.noise.from_periods,
         "torque": prepared.torque.tolist(),
         "shapes": [[list(map(float, s)) for s in c.candidate.shapes] for c in library.causes],

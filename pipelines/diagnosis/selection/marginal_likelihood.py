@@ -50,8 +50,8 @@ class MarginalLikelihood:
             "wander": c.background_wander, "cause": c.background_cause,
         }  # fmt: skip
         told = self.evidence.background
-        sd = [share[kind] * np.sqrt(variance) for kind, _, variance in told]
-        return np.array([place for _, place, _ in told], dtype=int), np.array(sd)
+        sd = [np.sqrt(share[kind] ** 2 * variance + noise) for kind, _, variance, noise in told]
+        return np.array([place for _, place, _, _ in told], dtype=int), np.array(sd)
 
     def _log_prior(self, element: Element) -> float:
         """Return an element's prior log odds, and what is heard and felt of it."""

@@ -91,7 +91,7 @@ def _ordered(chosen: Sequence[int]) -> Set:
 
 
 def likely_contexts(weighed: Posterior) -> list[Context]:
-    """Return the most probable sets of several elements whose causes may be refined together."""
+    """Return the sets of several elements, more probable than nothing, to refine their causes together."""
     found: dict[frozenset[str], Context] = {}
     for chosen in weighed.sets:
         elements = [weighed.elements[i] for i in chosen]
@@ -99,7 +99,7 @@ def likely_contexts(weighed: Posterior) -> list[Context]:
         if len(elements) > 1 and causes:
             laws = tuple(e.variant for e in elements if e.is_law)
             found.setdefault(frozenset(e.variant for e in elements), Context(causes, laws))
-        if len(found) == CONTEXTS:
+        if not chosen or len(found) == CONTEXTS:
             break
     return list(found.values())
 
