@@ -4,7 +4,7 @@ import numpy as np
 
 from pipelines.contracts.table import Table
 from pipelines.diagnosis.diagnose import diagnose
-from pipelines.diagnosis.verdict import verdict
+from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table

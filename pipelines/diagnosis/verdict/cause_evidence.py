@@ -3,7 +3,7 @@
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.selection.answer import Named
-from pipelines.effects import Backlash, Cogging, Effect, VoluntaryTorque
+from pipelines.effects import Backlash, Effect, VoluntaryTorque
 from pipelines.label import amount, effect_labelled, in_words, number
 
 CERTAIN = 1000.0
@@ -15,7 +15,6 @@ AUXILIARY = {
     "of which hardly anything shows in the mean torque",
     VoluntaryTorque.name: "cycle-to-cycle differences appear in cuff forces and drive torque "
     "alike, so they come from the wearer",
-    Cogging.name: "its lines stand out in the residual's spectrum over the angle, at the full sampling rate",
 }
 """What auxiliary evidence is, by effect (``candidates/auxiliary_evidence.py``)."""
 
@@ -39,6 +38,9 @@ def cause_evidence(d: Diagnosis, named: Named) -> list[str]:
     assert d.selected.evidence is not None
     if d.selected.evidence.heard.get(label, 0.0) > HEARD:
         sentences.append(AUXILIARY[effect.name])
+    if lines := len(named.element.shown):
+        plural = "s stand" if lines > 1 else " stands"
+        sentences.append(f"{lines} line{plural} out over the angle at the full sampling rate")
     if rival := _next(d, named):
         sentences.append(rival)
     return [*sentences, f"it looks like {effect.looks_like}", f"to make sure: {effect.confirm}"]
