@@ -9,6 +9,13 @@ from exoid_cli.verdict_view import ERRORS, _in_words, show_verdict
 from pipelines.contracts import HIP_AND_KNEE, Joint
 from tests.report.sessions import decision_of, verdict_of
 
+
+@pytest.fixture(autouse=True)
+def a_person_reads_along():
+    """Whatever options a command of another test was given."""
+    console.configure()
+
+
 ROW = re.compile(r"^( *)(\w.*?) +([01]\.\d\d)$", flags=re.MULTILINE)
 """A line of a table of probabilities."""
 
