@@ -24,7 +24,7 @@ from pipelines.plots import BLUE, GREY, ORANGE, STYLE, save
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
 from pipelines.settings.filter import FilterSettings
-from pipelines.settings.plant import PlantSettings
+from pipelines.settings.plant import PlantSettings, TemperatureSettings
 from tests.effects.catalogue import places, sized
 
 EXCITATION = FourierTrajectory(
@@ -35,16 +35,19 @@ EXCITATION = FourierTrajectory(
 )
 """Moves both joints both ways through most of their range."""
 SECONDS = 20.0
-QUIET = PlantSettings(ripple_nm=(0.1, 0.1))
-"""Less noise than a rig has: the figure is of the effect."""
+QUIET = PlantSettings(ripple_nm=(0.1, 0.1), temperature=TemperatureSettings(heating_c_nm2=0.05, time_constant_s=10.0))
+"""Less noise than a rig has, and drives that warm at once: the figure is of the effect."""
 LARGE = {
     "backlash": (0.05,),
     "cuff_compliance": (60.0,),
+    "encoder_eccentricity": (0.09, 0.06, 0.0, 0.0),
     "joint_elasticity": (150.0,),
     "rotor_inertia": (0.6,),
     "time_delay": (0.05,),
 }
 """Sizes of effects that hide in the baseline where they are small, other than the catalogue's."""
+LONGEST_TITLE = 48
+"""Characters of sizes beside the legend."""
 LEAST_NM = 0.5
 """Half the height of a figure at least: where nothing is left, noise does not fill it."""
 
@@ -73,6 +76,8 @@ class Signature:
         effect = self.term.effect
         values = zip(effect.parameters, effect.physical(self.term.values), strict=True)
         sizes = [f"{p.name} {v:.3g}{'' if p.unit == '1' else ' ' + p.unit}" for p, v in values if v != p.default]
+        while len(sizes) > 1 and len(", ".join(sizes)) > LONGEST_TITLE:
+            sizes.pop()
         return f"{f'at the {effect.joint}, ' if effect.joint else ''}{', '.join(sizes)}".replace("_", " ")
 
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 class Criteria:
     """The hyper-parameters of the posterior over sets of causes and laws."""
 
-    drive_weight: float = 0.35
+    drive_weight: float = 0.6
     """How much of a drive row's likelihood counts: rows are not quite independent."""
-    cuff_weight: float = 0.2
+    cuff_weight: float = 0.4
     """The same of a cuff row."""
     form_misfit: float = 0.1
     """Share of a residual's rms that counts as noise: no form of any cause follows it exactly."""

@@ -405,13 +405,13 @@ class Effect(ABC):
         linear, shape = np.split(np.asarray(values, dtype=float), [len(self.linear)])
         return self.columns(motion, shape) @ linear
 
-    def cuff_columns(self, motion: Motion, columns: NDArray) -> NDArray:
-        """Return the torque that the cuffs measure of the effect per unit of each linear parameter, (n, J, p).
+    def cuff_columns(self, motion: Motion, columns: NDArray) -> NDArray | None:
+        """Return the torque that the cuffs measure of the effect per unit of each linear parameter.
 
         ``columns``, (n, J, p), is what the drives measure of it along the same motion. Cuffs measure
-        what is on the wearer's side of them, and nothing else.
+        what is on the wearer's side of them, (n, J, p) too, and nothing else: then it is None.
         """
-        return columns if self.on_limb else np.zeros_like(columns)
+        return columns if self.on_limb else None
 
     def observed(self, columns: NDArray, motion: Motion, shape: NDArray | tuple[float, ...] = ()) -> NDArray:
         """Return what the torque sensors make of torques that the drives deliver, both (n, J, p).

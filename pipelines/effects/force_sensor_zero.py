@@ -29,8 +29,6 @@ class ForceSensorZero(Effect):
     def cuff_columns(self, motion: Motion, columns: NDArray) -> NDArray:
         """Return the torque of unit forces about each joint, (n, 2, 3) N·m per N."""
         out = np.zeros_like(columns)
-        if not self.explains(motion):
-            return out
         geometry, knee = motion.geometry, motion.q[:, 1]
         thigh, shank = geometry.thigh_cuff_distance_m or 0.0, geometry.shank_cuff_distance_m or 0.0
         out[:, 0, 0] = geometry.thigh_length_m * np.sin(knee)

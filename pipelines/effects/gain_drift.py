@@ -16,7 +16,8 @@ class GainDrift(Effect):
     """A torque constant that fades as the magnets warm, or a sensor whose gain drifts.
 
     It changes with the time since the run began, evenly or towards a limit, or with the recorded
-    temperature. At the run's begin, and at 25 °C, the gain is 1.
+    temperature. At the run's begin, and at 25 °C, the gain is 1; a temperature that was not
+    recorded counts as 25 °C.
     """
 
     name = "gain_drift"
@@ -60,9 +61,10 @@ class GainDrift(Effect):
         if values[1] > 0.0:
             since = values[1] * (1.0 - exp(-(t / values[1])))
         gain = 1.0 + values[0] * since
-        # A temperature that nobody read is no number, and zero times it is none either.
-        if values[2] != 0.0:
-            gain += values[2] * (temperature[joint] - REFERENCE_C)
+        above = temperature[joint] - REFERENCE_C
+        # A temperature that nobody read is NaN, which differs from itself.
+        if values[2] != 0.0 and above == above:
+            gain += values[2] * above
         torque[joint] *= gain
 
     def directions(self, motions: Sequence[Motion]) -> tuple[tuple[tuple[float, ...], ...], ...]:

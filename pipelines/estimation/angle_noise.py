@@ -31,7 +31,7 @@ def is_loud(runs: Sequence[Run]) -> bool:
     """Tell whether noise of the angles outdoes, at any joint of the runs to train, all else that a fit leaves."""
     effects = baseline(runs[0].machine, kinds_of(runs))
     model, layout = Model.of(effects), ParameterLayout.of(effects)
-    body = np.concatenate(layout.bodies)
+    body = layout.bodies.ravel()
     grams = []
     for piece in (piece for run in runs for piece in _beginning(run)):
         if piece.motion.cutoff_hz <= CUTOFF_HZ:

@@ -163,14 +163,17 @@ class Model:
         terms = zip(self.terms, self._columns, strict=True)
         for term, own in sorted(terms, key=lambda one: one[0].effect.side is Side.SENSOR):
             effect, shape = term.effect, term.shape
+            if not effect.explains(motion):
+                continue
             at = limb if effect.on_limb else motor if effect.side is Side.DRIVE else link
             # Columns that are still to come are in there too: they are written over.
             measured = effect.observed(drives, motion, shape)
             if measured is not drives:
                 drives[:] = measured
             drives[:, :, own] = columns = effect.columns(at, shape)
-            if cuffs:
-                out[:, joints:, own] = effect.cuff_columns(at, columns)
+            in_cuffs = effect.cuff_columns(at, columns) if cuffs else None
+            if in_cuffs is not None:
+                out[:, joints:, own] = in_cuffs
         return out
 
     def observed(self, columns: NDArray, motion: Motion) -> NDArray:

@@ -83,7 +83,7 @@ class TermColumns:
         return np.where(places < 0, otherwise, values[places])
 
     def expand(self, columns: NDArray, run: int) -> NDArray:
-        """Put the term's columns in one run, (..., k), where they belong, (..., width)."""
+        """Put the term's columns in one run, (m, O, k), where they belong, (m, O, width)."""
         places = self.places(run)
         return _spread(columns, np.where(places < 0, -1, places - self.start), self.width)
 
@@ -157,14 +157,13 @@ class ParameterLayout:
         return np.array([own for term in self.terms for own in term.per_run], dtype=bool)
 
     @property
-    def bodies(self) -> list[NDArray]:
-        """Columns of each rigid body, the machine's first."""
-        bodies = (term for term in self.terms if isinstance(term.effect, RigidBody))
-        return [np.arange(term.start, term.start + term.width) for term in bodies]
+    def bodies(self) -> NDArray:
+        """Columns of each rigid body, (bodies, parameters), the machine's first."""
+        return np.array([t.places(None) for t in self.terms if isinstance(t.effect, RigidBody)])
 
     def bodies_in(self, kind: str) -> NDArray:
         """Return the columns of each body that moves in a kind of run, (bodies, parameters)."""
-        return np.array(self.bodies if kind == "with_human" else self.bodies[:1])
+        return self.bodies if kind == "with_human" else self.bodies[:1]
 
     def column_of(self, effect: str, joint: str | None, parameter: str) -> int:
         """Return the first column of a parameter, by its name and its effect's."""
@@ -196,7 +195,7 @@ class ParameterLayout:
         run: int | None,
         terms: Iterable[int] | None = None,
     ) -> NDArray:
-        """Put the columns of one run's regressor, (..., q), where they belong, (..., p).
+        """Put the columns of one run's regressor, (m, O, q), where they belong, (m, O, p).
 
         ``terms`` are the numbers of the terms that the regressor has, all unless given; ``run`` is
         None for a run that was not fitted.
@@ -207,7 +206,7 @@ class ParameterLayout:
 
 
 def _spread(columns: NDArray, places: NDArray, width: int) -> NDArray:
-    """Put columns, (..., k), in places, (k,), among others that are zero, (..., width).
+    """Put columns, (m, O, k), in places, (k,), among others that are zero, (m, O, width).
 
     Those whose place is -1 are left out.
     """

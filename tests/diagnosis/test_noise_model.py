@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pipelines.diagnosis.evidence.noise_model import ACTING_HZ, PINK_HZ, _spectrum_of
+from pipelines.diagnosis.evidence.noise_model import NoiseModel, _spectrum_of
 
 RATE_HZ = 40.0
+ACTING_HZ = 0.7
 
 
 def coloured(rng: np.random.Generator, n: int, rms: float, tau: float) -> np.ndarray:
@@ -17,15 +18,16 @@ def coloured(rng: np.random.Generator, n: int, rms: float, tau: float) -> np.nda
 
 
 def density(rms: float, tau: float) -> float:
-    """Return the density at low frequencies of the same, sampled."""
+    """Return the density of the same where columns move."""
     memory = np.exp(-1.0 / (RATE_HZ * tau)) if tau else 0.0
-    return rms**2 * (1.0 + memory) / (1.0 - memory) / RATE_HZ
+    zero = rms**2 * (1.0 + memory) / (1.0 - memory) / RATE_HZ
+    return zero / (1.0 + (2.0 * np.pi * ACTING_HZ * tau) ** 2)
 
 
 def acting(series: list[np.ndarray]) -> float:
     """Return the density that the model finds where columns move."""
-    density, _, pink = _spectrum_of(series, RATE_HZ, (0.25, 6.0))
-    return density * (1.0 + pink * PINK_HZ / ACTING_HZ)
+    found = np.array(_spectrum_of(series, RATE_HZ, (0.25, 6.0)))[:, np.newaxis]
+    return float(NoiseModel(*found, from_periods=True).at(np.array([ACTING_HZ]))[0, 0])
 
 
 @pytest.mark.parametrize("tau", [0.0, 0.02, 0.06])

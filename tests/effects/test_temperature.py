@@ -96,6 +96,14 @@ def test_a_motor_that_was_never_read_explains_nothing(with_human):
     assert FrictionTemperature("hip").explains(motion)
 
 
+def test_a_gain_whose_temperature_was_not_read_is_that_at_the_reference(with_human):
+    ones = np.ones((*with_human.q.shape, 1))
+    warm = (0.0, 0.0, 0.01)
+    unread = replace(with_human, temperature=None)
+    assert_allclose(GainDrift("hip").observed(ones, unread, warm), ones)
+    assert GainDrift("hip").observed(ones, with_human, warm)[-1, 0, 0] > 1.05
+
+
 @pytest.mark.parametrize("time_constant", [0.0, 8.0])
 def test_a_gain_drifts_evenly_or_towards_a_limit(with_human, time_constant):
     ones = np.ones((*with_human.q.shape, 1))

@@ -13,6 +13,7 @@ from pipelines.effects.friction import Friction
 from pipelines.effects.kernel import Instant
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.export import exported
+from pipelines.export.exported import shift_of
 from pipelines.mechanics.motion import Motion
 from pipelines.model import Model, Term
 from tests.effects.catalogue import TERMS
@@ -81,7 +82,11 @@ def torque(made, states, *, measured=False, memory=0.3):
     ``measured`` asks for what the torque channels say instead. Memories hold ``memory``.
     """
     untold = ("spring", "reading_states", "needs_temperature")
-    terms = [t for t in made.model if not any(getattr(t.effect, what) for what in untold)]
+    terms = [
+        t
+        for t in made.model
+        if not any(getattr(t.effect, what) for what in untold) and (t.effect.reading is None or shift_of(t) is not None)
+    ]
     names = [joint.name for joint in made.joints]
     on_links = [t for t in terms if t.effect.side in (Side.STRUCTURE, Side.HUMAN)]
     on_drives = [t for t in terms if t.effect.side is Side.DRIVE]

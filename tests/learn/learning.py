@@ -4,7 +4,7 @@ import json
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -13,10 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.criteria import Criteria
+from pipelines.diagnosis.selection.prior import FEATURES, weights
 from tests.blind.splits import fold_of
-from tests.learn.objective import Scores, Session, reduced, rows
-from tests.learn.search import ODDS, ascend
-from tests.learn.vector import from_vector, names, plain_values, to_vector
+from tests.learn.objective import LogEvidence, Session, padded, reduced, rows
+from tests.learn.prior_fit import Sets
+from tests.learn.search import ascend
+from tests.learn.vector import from_vector, names, to_vector
 
 ROUNDS = 2
 """Times that the sets which matter are sought anew, under the criteria learned so far."""
@@ -31,10 +33,9 @@ def learn(
     for _ in range(ROUNDS):
         with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
             sessions = list(_sessions(root, worlds, left_out, most, pool, criteria))
-        weights, scores = _weights(sessions), Scores(sessions, workers)
-        before = float(weights @ scores(criteria))
-        criteria, after = _ascended(scores, weights, criteria)
-        scores.close()
+        weigh = LogEvidence(sessions, workers)
+        criteria, before, after = _ascended(weigh, sets_of(sessions), criteria)
+        weigh.close()
         history.append({"sessions": len(sessions), "before": before, "after": after})
         print(f"{len(sessions)} sessions: {before:.4f} -> {after:.4f}", flush=True)
     return {
@@ -70,6 +71,13 @@ def _reduced(job: tuple[dict[str, Any], Criteria, set[int]]) -> Session | None:
     return reduced(row, criteria)
 
 
+def sets_of(sessions: Sequence[Session]) -> Sets:
+    """Return what the prior's fit needs of sessions."""
+    told = padded([session.features for session in sessions], 0.0)
+    right = padded([session.right.astype(float) for session in sessions], 0.0)
+    return Sets(told, right, _weights(sessions))
+
+
 def _weights(sessions: Sequence[Session]) -> NDArray:
     """Return weights that give each world the same say, (n,); they add up to one."""
     worlds = [session.world for session in sessions]
@@ -77,16 +85,21 @@ def _weights(sessions: Sequence[Session]) -> NDArray:
     return np.array([1.0 / (len(counts) * counts[world]) for world in worlds])
 
 
-def _ascended(scores: Scores, weights: NDArray, criteria: Criteria) -> tuple[Criteria, float]:
-    scale = np.where([value < 0.0 for value in plain_values(criteria)], ODDS, 1.0)
-
-    def score(vector: NDArray) -> float:
-        return float(weights @ scores(from_vector(vector, criteria)))
-
+def _ascended(
+    weigh: LogEvidence, sets: Sets, criteria: Criteria
+) -> tuple[Criteria, float, float]:
+    """Return the best criteria found, and the scores at first and at last."""
+    prior = weights(criteria)
+    first = float(sets.weights @ sets.scores(weigh(criteria), prior))
     began, places = time.monotonic(), names()
+
+    def score(vector: NDArray) -> tuple[float, NDArray]:
+        found, value = sets.fit(weigh(from_vector(vector, criteria)), prior)
+        return value, found
 
     def report(place: int, value: float) -> None:
         print(f"{time.monotonic() - began:6.0f} s {places[place]:24s} {value:.4f}", flush=True)
 
-    best, value = ascend(score, to_vector(criteria), scale, report)
-    return from_vector(best, criteria), value
+    best, value, prior = ascend(score, to_vector(criteria), report)
+    learned = dict(zip(FEATURES, prior.tolist(), strict=True))
+    return replace(from_vector(best, criteria), **learned), first, value

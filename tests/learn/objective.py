@@ -1,4 +1,4 @@
-"""The score that learning raises: the log probability that the posterior gives to the truth.
+"""What learning needs of sessions: the sets that matter, and their evidence under some criteria.
 
 The sets of a session that matter are found once under reference criteria; under others only these
 are weighed again, so that thousands of sessions can be scored many times.
@@ -19,11 +19,10 @@ from pipelines.diagnosis.criteria import Criteria
 from pipelines.diagnosis.selection.evidence import Evidence
 from pipelines.diagnosis.selection.marginal_likelihood import MarginalLikelihood
 from pipelines.diagnosis.selection.posterior import Posterior, Set, posterior
+from pipelines.diagnosis.selection.prior import features, of_set
 from tests.learn.truth import Right, right_sets
 
-FLOOR = 1e-4
-"""Probability below which a truth counts the same: one hopeless session must not decide."""
-SETS = 120
+SETS = 80
 """Sets of a session that are weighed again."""
 
 
@@ -38,6 +37,8 @@ class Session:
     sets: tuple[Set, ...]
     right: NDArray
     """(sets,) bool."""
+    features: NDArray
+    """(sets, features) by which the prior knows them."""
 
     @property
     def forms(self) -> tuple[str, ...]:
@@ -73,10 +74,12 @@ def _kept(found: Posterior, right: Right) -> list[Set]:
     return list(dict.fromkeys((*found.sets[:SETS], *true, ())))
 
 
-def _compact(evidence: Evidence, sets: Sequence[Set], right: Right) -> tuple[Evidence, tuple[Set, ...], NDArray]:
+def _compact(
+    evidence: Evidence, sets: Sequence[Set], right: Right
+) -> tuple[Evidence, tuple[Set, ...], NDArray, NDArray]:
     """Keep the elements and columns that sets need, and the background's."""
     elements = sorted({i for chosen in sets for i in chosen})
-    columns = {place for _, place, _ in evidence.background}
+    columns = {place for _, place, *_ in evidence.background}
     for i in elements:
         e = evidence.elements[i]
         columns.update((*e.columns, *e.derivative, *e.resembles))
@@ -96,24 +99,24 @@ def _compact(evidence: Evidence, sets: Sequence[Set], right: Right) -> tuple[Evi
         evidence, drives=evidence.drives[square].astype(np.float32),
         cuffs=evidence.cuffs[square].astype(np.float32),
         drives_right=evidence.drives_right[kept], cuffs_right=evidence.cuffs_right[kept],
-        elements=own, background=tuple((k, new[p], v) for k, p, v in evidence.background),
+        elements=own, background=tuple((k, new[p], v, n) for k, p, v, n in evidence.background),
     )  # fmt: skip
     number = {i: n for n, i in enumerate(elements)}
     chosen = tuple(tuple(number[i] for i in s) for s in sets)
     true = np.array([right(frozenset(own[i].label for i in s)) for s in chosen])
-    return small, chosen, true
+    of_elements = [features(e, evidence.heard) for e in own]
+    told = np.array([of_set([of_elements[i] for i in s]) for s in chosen])
+    return small, chosen, true, told
 
 
-def score(session: Session, criteria: Criteria) -> float:
-    """Return the log probability of the truth."""
+def log_evidence(session: Session, criteria: Criteria) -> NDArray:
+    """Return the log Bayes factor of each set, (sets,)."""
     weigh = MarginalLikelihood(session.evidence, criteria)
-    odds = np.array([weigh(chosen) for chosen in session.sets])
-    p = np.exp(odds - odds.max())
-    return float(np.log(max(p[session.right].sum() / p.sum(), FLOOR)))
+    return np.array([weigh.log_evidence(chosen) for chosen in session.sets])
 
 
-class Scores:
-    """Scores many sessions on several processes, which have them from the beginning."""
+class LogEvidence:
+    """Weighs many sessions on several processes, which have them from the beginning."""
 
     def __init__(self, sessions: Sequence[Session], workers: int) -> None:
         """Fork the processes: what they would otherwise be sent at each call is gigabytes."""
@@ -123,9 +126,9 @@ class Scores:
         self._count = len(sessions)
 
     def __call__(self, criteria: Criteria) -> NDArray:
-        """Return the score of each session, (n,)."""
+        """Return the log Bayes factors of all sessions' sets, (sessions, sets)."""
         jobs = [(i, criteria) for i in range(self._count)]
-        return np.array(self._pool.map(_scored, jobs, chunksize=4))
+        return padded(self._pool.map(_weighed, jobs, chunksize=4), -np.inf)
 
     def close(self) -> None:
         """End the processes."""
@@ -133,9 +136,18 @@ class Scores:
         self._pool.join()
 
 
+def padded(rows: Sequence[NDArray], value: float) -> NDArray:
+    """Put arrays (k, ...) of different lengths over one another, (rows, longest, ...)."""
+    longest = max(len(row) for row in rows)
+    out = np.full((len(rows), longest, *rows[0].shape[1:]), value)
+    for own, row in zip(out, rows, strict=True):
+        own[: len(row)] = row
+    return out
+
+
 _SESSIONS: Sequence[Session] = ()
 
 
-def _scored(job: tuple[int, Criteria]) -> float:
+def _weighed(job: tuple[int, Criteria]) -> NDArray:
     number, criteria = job
-    return score(_SESSIONS[number], criteria)
+    return log_evidence(_SESSIONS[number], criteria)

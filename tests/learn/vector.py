@@ -1,62 +1,46 @@
-"""Criteria as a vector of numbers on scales where equal steps mean alike."""
+"""The criteria of the likelihood as a vector of logarithms."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.criteria import Criteria
+from pipelines.diagnosis.selection.prior import FEATURES
+
+BEFORE = ("form_misfit",)
+"""What acts before the evidence is stored."""
 
 
 def names() -> list[str]:
     """Return what each place of the vector is."""
-    found = []
-    for field in fields(Criteria):
-        value = getattr(Criteria(), field.name)
-        if isinstance(value, tuple):
-            found += [f"{field.name}[{k}]" for k in range(len(value)) if _free(field.name, k)]
-        else:
-            found.append(field.name)
-    return found
-
-
-def _free(name: str, k: int) -> bool:
-    """Tell whether a place is learned: the first misfit is none at all."""
-    return not (name == "misfits" and k == 0)
+    return [f"{name}[{k}]" if several else name for name, k, several, _ in _places(Criteria())]
 
 
 def to_vector(criteria: Criteria) -> NDArray:
-    """Return logarithms of positive numbers, and log odds as they are."""
-    return np.array([_scaled(value) for value in plain_values(criteria)])
-
-
-def plain_values(criteria: Criteria) -> list[float]:
-    found: list[float] = []
-    for field in fields(Criteria):
-        value = getattr(criteria, field.name)
-        if isinstance(value, tuple):
-            found += [v for k, v in enumerate(value) if _free(field.name, k)]
-        else:
-            found.append(value)
-    return found
-
-
-def _scaled(value: float) -> float:
-    return float(np.log(value)) if value > 0.0 else value
+    """Return the logarithm of each number."""
+    return np.log([value for *_, value in _places(criteria)])
 
 
 def from_vector(vector: NDArray, like: Criteria) -> Criteria:
-    """Return the criteria of a vector; ``like`` tells which are log odds."""
-    at = iter(vector)
-    changed = {}
-    for field in fields(Criteria):
-        value = getattr(like, field.name)
-        if isinstance(value, tuple):
-            changed[field.name] = tuple(_back(next(at), v) if _free(field.name, k) else v for k, v in enumerate(value))
+    """Return criteria with a vector's numbers, the rest as in ``like``."""
+    changed: dict[str, float | tuple[float, ...]] = {}
+    for (name, k, several, _), value in zip(_places(like), np.exp(vector).tolist(), strict=True):
+        if several:
+            old = changed.get(name, getattr(like, name))
+            changed[name] = (*old[:k], value, *old[k + 1 :])
         else:
-            changed[field.name] = _back(next(at), value)
-    return Criteria(**changed)
+            changed[name] = value
+    return replace(like, **changed)
 
 
-def _back(scaled: float, like: float) -> float:
-    return float(np.exp(scaled)) if like > 0.0 else min(float(scaled), 0.0)
+def _places(criteria: Criteria) -> list[tuple[str, int, bool, float]]:
+    """Return name, number, whether there are several, and value; the first misfit is none at all."""
+    found = []
+    for field in fields(Criteria):
+        value = getattr(criteria, field.name)
+        if field.name in (*FEATURES, *BEFORE):
+            continue
+        several = isinstance(value, tuple)
+        found += [(field.name, k, several, v) for k, v in enumerate(value if several else (value,)) if v > 0.0]
+    return found

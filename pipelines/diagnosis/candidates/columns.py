@@ -59,4 +59,5 @@ def torque_columns(candidate: Candidate, number: int, run: Run) -> NDArray:
     # As Model.regressor has it of one term that transforms nothing, which is called thousands of times.
     columns = candidate.effect.columns(run.motion, candidate.shapes[number])
     cuffs = candidate.effect.cuff_columns(run.motion, columns)
+    cuffs = np.zeros_like(columns) if cuffs is None else cuffs
     return run.average(np.concatenate([columns, cuffs], axis=1))

@@ -73,7 +73,7 @@ def curve_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list
         # Noise of a density adds twice that over the duration to the square of a cosine's amplitude.
         duration = max(float(run.time[-1] - run.time[0]), LENGTH_S)
         hz = np.maximum(np.arange(len(variance)), 1) / (2.0 * duration)
-        noise = 2.0 * prepared.noise.excess(hz)[: regression.joints] / duration
+        noise = 2.0 * prepared.noise.excess(hz, LENGTH_S)[: regression.joints] / duration
         for j in range(regression.joints):
             parts = [np.zeros((*other.measured.shape, len(variance))) for other in prepared.runs]
             parts[r][:, j] = curves * prepared.torque[j]

@@ -1,7 +1,7 @@
 """All training runs in the decision band as one weighted regression, the baseline projected out.
 
-Rows are averages over 0.1 s of every output of every run, each divided by the noise that it acts
-with; so the squared length of a residual is a chi-square. What the baseline can imitate is
+Rows are averages over 0.1 s of every output of every run, divided by their noise and whitened as
+noise of first order; so the squared length of a residual is a chi-square. What the baseline can imitate is
 projected out of everything, which is the same as a flat prior on its parameters.
 """
 
@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.linalg import SuperLU, splu
 
 from pipelines.diagnosis.evidence.decision_band import LENGTH_S, DecisionBand
 from pipelines.diagnosis.evidence.noise_model import NoiseModel
@@ -30,6 +31,8 @@ class DecisionRegression:
     """(M, O) of each run: the root of each row's weight over its noise, 1/(N·m)."""
     operator: sparse.csr_matrix
     """(N, sum of m O): takes the blocks of all runs to weighted rows; those without weight are left out."""
+    whitening: sparse.csr_matrix
+    """(N, N): takes from each average what the one before it foretells of its noise."""
     weighty: NDArray
     """(rows,) whether a row has any weight; N of them do."""
     output: NDArray
@@ -69,16 +72,19 @@ class DecisionRegression:
             What counts as noise besides, for no form of a cause is exact, N·m.
         """
         bands = tuple(DecisionBand.of(run) for run in runs)
-        sigma = np.hypot(noise.sigma(LENGTH_S), misfit)
+        sd, memory = noise.averaged(LENGTH_S)
+        sigma = np.hypot(sd, misfit)
         precision = np.where(sigma > 0.0, 1.0 / np.where(sigma > 0.0, sigma, 1.0), 0.0)
         roots = tuple(np.sqrt(band.weight) * precision for band in bands)
         weighty = np.concatenate([root.ravel() for root in roots]) > 0.0
         output = np.concatenate([np.tile(np.arange(len(torque)), len(root)) for root in roots])
-        operator = sparse.block_diag([_operator(b, r) for b, r in zip(bands, roots, strict=True)])
-        operator = operator.tocsr()[weighty]
+        averaging = sparse.block_diag([_operator(b, r) for b, r in zip(bands, roots, strict=True)])
+        # What counts as noise besides is white.
+        whitening = _whitening(bands, weighty, memory * (sd / sigma) ** 2)
+        operator = whitening @ averaging.tocsr()[weighty]
         operator.eliminate_zeros()
         empty = [np.zeros(0)] * 4
-        blank = cls(bands, roots, operator, weighty, output[weighty], torque, *empty)
+        blank = cls(bands, roots, operator, whitening, weighty, output[weighty], torque, *empty)
         rows = blank.rows(baseline)
         measured = blank.rows([run.measured[:, :, np.newaxis] for run in runs])[:, 0]
         basis = _orthonormal(rows)
@@ -125,18 +131,46 @@ class DecisionRegression:
             known = band.weight[:, output] > 0.0
             yield band.time[known], values[a:b].reshape(band.weight.shape)[known, output]
 
+    @cached_property
+    def _coloured(self) -> SuperLU:
+        """Undoes the whitening."""
+        return splu(self.whitening.tocsc(), permc_spec="NATURAL")
+
     def shares(self, columns: NDArray) -> NDArray:
         """Return rows (R, k) whose squares add up to a column's squared share of the drives' torque.
 
         The share at a joint is the column's rms over the drive's rms torque.
         """
-        use = self.of_drives
+        use, columns = self.of_drives, self._coloured.solve(columns)
         roots = np.concatenate([root.ravel() for root in self.roots])[self.weighty][use]
         weight = np.concatenate([band.weight.ravel() for band in self.bands])[self.weighty][use]
         output = self.output[use]
         total = np.bincount(output, weight, minlength=self.joints)[output]
         scale = np.sqrt(weight / total) / self.torque[output] / roots
         return columns[use] * scale[:, np.newaxis]
+
+
+def _whitening(bands: Sequence[DecisionBand], weighty: NDArray, memory: NDArray) -> sparse.csr_matrix:
+    """Return what whitens averages whose noise resembles that of the average before, (N, N).
+
+    Parameters
+    ----------
+    weighty : (rows,) bool
+        Rows of all averages and outputs that count.
+    memory : (O,) array
+        Correlation of adjacent averages.
+    """
+    outputs, number = len(memory), np.cumsum(weighty) - 1
+    follows = np.concatenate([np.diff(b.time, prepend=-np.inf) < 1.5 * LENGTH_S for b in bands])
+    row = np.flatnonzero(weighty)
+    before = np.maximum(row - outputs, 0)
+    has = follows[row // outputs] & weighty[before]
+    r = np.where(has, np.nan_to_num(memory)[row % outputs], 0.0)
+    own = 1.0 / np.sqrt(1.0 - r**2)
+    N = len(row)
+    there = np.flatnonzero(has)
+    of_before = sparse.csr_matrix((-(r * own)[there], (there, number[before[there]])), shape=(N, N))
+    return (sparse.diags(own) + of_before).tocsr()
 
 
 def _operator(band: DecisionBand, root: NDArray) -> sparse.csr_matrix:

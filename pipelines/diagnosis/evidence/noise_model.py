@@ -6,8 +6,8 @@ slower than the noise is measured at. The noise is the sum of first-order noise 
     S(f) = S0 (1 / (1 + (2 pi f tau)^2) + pink F / f),  F = 1.5 Hz.
 
 Without periods it is read off above the motion's own band, where it cannot be told how pink it is.
-Averages count with the density at the frequencies that columns of a model have; what is slower and
-pink is background that a torque which wanders has to exceed.
+Averages are whitened as noise of first order; what is slower and pink is background that a torque
+which wanders has to exceed.
 """
 
 from collections.abc import Sequence
@@ -34,8 +34,8 @@ PINK = np.array([0.0, 0.1, 0.2, 0.35, 0.6, 1.0, 1.7, 3.0])
 """Ratios of the two tried."""
 UNKNOWN_PINK = 0.2
 """The ratio where it cannot be measured."""
-ACTING_HZ = 0.7
-"""A frequency at which columns of a model move, Hz."""
+TINY_HZ = 1e-3
+"""Slower than any run, Hz."""
 PIECE_S = 20.0
 """Length of the pieces of a series whose spectra are taken, s."""
 SHORTEST = 64
@@ -55,21 +55,34 @@ class NoiseModel:
     """Ratio of pink to first-order noise at ``PINK_HZ``."""
     from_periods: bool
 
-    def at(self, hz: NDArray | float) -> NDArray:
-        """Return the density at frequencies (k,) below those of first-order noise, (O, k)."""
-        pink = np.multiply.outer(self.pink, PINK_HZ / np.asarray(hz, dtype=float))
-        return (self.density * (1.0 + pink).T).T
+    def at(self, hz: NDArray) -> NDArray:
+        """Return the density at frequencies (k,), (O, k); below ``WANDER_HZ`` it is not known to grow."""
+        first = 1.0 / (1.0 + (2.0 * np.pi * np.multiply.outer(self.correlation_s, hz)) ** 2)
+        pink = np.multiply.outer(self.pink, PINK_HZ / np.maximum(hz, TINY_HZ))
+        return (self.density * (first + pink).T).T
+
+    def averaged(self, length_s: float) -> tuple[NDArray, NDArray]:
+        """Return standard deviation and correlation of adjacent averages over a length, (O,) each.
+
+        What is slower than ``WANDER_HZ`` counts as if it were as fast.
+        """
+        hz = np.linspace(0.0, 4.0 / length_s, 2001)
+        passed = self.at(np.maximum(hz, WANDER_HZ)) * np.sinc(hz * length_s) ** 2
+        variance = 2.0 * np.trapezoid(passed, hz, axis=1)
+        adjacent = 2.0 * np.trapezoid(passed * np.cos(2.0 * np.pi * hz * length_s), hz, axis=1)
+        return np.sqrt(variance), np.maximum(adjacent / variance, 0.0)
 
     def sigma(self, length_s: float) -> NDArray:
-        """Return the standard deviation that averages over ``length_s`` act with, (O,) N·m.
+        """Return the standard deviation that averages act with where what they hold is slow, (O,) N·m."""
+        sd, memory = self.averaged(length_s)
+        return np.asarray(sd * np.sqrt((1.0 + memory) / (1.0 - memory)))
 
-        It is that of white noise with the density which the noise has where columns move.
-        """
-        return np.sqrt(self.at(ACTING_HZ) / length_s)
-
-    def excess(self, hz: NDArray) -> NDArray:
-        """Return by how much slow noise exceeds what averages count with, (O, k) (N·m)²/Hz."""
-        return np.maximum(self.at(hz) - self.at(ACTING_HZ)[:, np.newaxis], 0.0)
+    def excess(self, hz: NDArray, length_s: float) -> NDArray:
+        """Return by how much slow noise exceeds that of averages of first order, (O, k) (N·m)²/Hz."""
+        sd, memory = self.averaged(length_s)
+        turn = np.multiply.outer(memory, np.cos(2.0 * np.pi * hz * length_s))
+        of_order_one = (sd**2 * (1.0 - memory**2) * length_s) / (1.0 + memory**2 - 2.0 * turn.T)
+        return np.maximum(self.at(hz) - of_order_one.T, 0.0)
 
 
 def noise_model(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NoiseModel:

@@ -61,7 +61,7 @@ def _of_joint(j: int, bands: Sequence[DecisionBand], averaged: Sequence[NDArray]
     total = float(np.mean(everything**2)) if len(everything) else 0.0
     if not total > 0.0:
         return ResidualShares(0.0, 1.0, None, None, 0.0, 0.0, None)
-    noisy = min(_averaged_variance(noise.density[j], noise.correlation_s[j]), total)
+    noisy = min(float(np.nan_to_num(noise.averaged(LENGTH_S)[0][j])) ** 2, total)
     means = np.array([v.mean() if len(v) else 0.0 for v in values])
     counts = np.array([len(v) for v in values])
     grand = float(means @ counts) / counts.sum()
@@ -81,15 +81,6 @@ def _of_joint(j: int, bands: Sequence[DecisionBand], averaged: Sequence[NDArray]
         np.sqrt(total), noisy / total, (repeats - between) / total, (above - repeats) / total,
         between / total, 0.0, _with_person_only(bands, repeated, total),
     )  # fmt: skip
-
-
-def _averaged_variance(density: float, tau: float) -> float:
-    """Return the variance of averages over ``LENGTH_S`` of first-order noise, (N·m)²."""
-    if not np.isfinite(density):
-        return 0.0
-    ratio = tau / LENGTH_S
-    decayed = 1.0 - ratio * (1.0 - np.exp(-1.0 / ratio)) if ratio > 0.0 else 1.0
-    return float(density / LENGTH_S * decayed)
 
 
 def _repeating(band: DecisionBand, values: NDArray, known: NDArray) -> NDArray:

@@ -90,7 +90,7 @@ class Fit:
         """Tell whether the machine, or machine and person together, plainly have a least inertia below nought."""
         inverse = np.linalg.pinv(self.normal, hermitian=True)
         for number in range(1, len(self.layout.bodies) + 1):
-            bodies = np.array(self.layout.bodies[:number])
+            bodies = self.layout.bodies[:number]
             X = self.values[bodies].sum(axis=0)
             least, largest, slope = baseline.machine.mechanism.least_inertia(X, geometry)
             along, own = np.tile(slope, len(bodies)), bodies.ravel()

@@ -18,6 +18,7 @@ from scipy.special import log_ndtr, logsumexp
 
 from pipelines.diagnosis.criteria import Criteria
 from pipelines.diagnosis.selection.evidence import Element, Evidence
+from pipelines.diagnosis.selection.prior import features, of_set, weights
 
 ROUGH_SHARE = 0.08
 """Prior share with which sets are screened before each is weighed in full."""
@@ -41,7 +42,9 @@ class MarginalLikelihood:
         right = drive * evidence.drives_right + cuff * evidence.cuffs_right
         self.gram, self.right = _without(gram, right, *self._background())
         self.parts = [np.array([*e.columns, *e.derivative], dtype=int) for e in evidence.elements]
-        self.log_prior = np.array([self._log_prior(e) for e in evidence.elements])
+        self.features = np.array([features(e, evidence.heard) for e in evidence.elements])
+        self._weights = weights(criteria)
+        self.lines = np.array([_shown(e, criteria) for e in evidence.elements])
 
     def _background(self) -> tuple[NDArray, NDArray]:
         c = self.criteria
@@ -53,40 +56,28 @@ class MarginalLikelihood:
         sd = [np.sqrt(share[kind] ** 2 * variance + noise) for kind, _, variance, noise in told]
         return np.array([place for _, place, _, _ in told], dtype=int), np.array(sd)
 
-    def _log_prior(self, element: Element) -> float:
-        """Return an element's prior log odds, and what is heard and felt of it."""
-        c = self.criteria
-        heard = self._heard(element) + _shown(element, c)
-        if element.is_law:
-            return c.law + heard
-        return (
-            c.cause + c.other_shape * (not element.first) + c.each_run * element.each_run
-            + c.worn * element.worn + heard
-        )  # fmt: skip
-
-    def _heard(self, element: Element) -> float:
-        """Return how much of what is heard or felt of an element counts."""
-        c = self.criteria
-        share = {"backlash": c.impacts, "voluntary_torque": c.coherence}.get(element.name, 0.0)
-        return share * self.evidence.heard.get(element.label, 0.0)
-
     def prior(self, chosen: Sequence[int]) -> float:
         """Return the prior log odds of a set against the empty one."""
-        return float(self.log_prior[list(chosen)].sum()) + self.criteria.further * (len(chosen) - 1)
+        return float(of_set([self.features[i] for i in chosen]) @ self._weights)
 
     def __call__(self, chosen: Sequence[int]) -> float:
-        """Return the log posterior odds of a set against the empty one.
+        """Return the log posterior odds of a set against the empty one."""
+        return self.log_evidence(chosen) + self.prior(chosen)
+
+    def log_evidence(self, chosen: Sequence[int]) -> float:
+        """Return the log Bayes factor of a set against the empty one.
 
         Minus infinity where rounding makes its matrix not positive definite.
         """
         if not chosen:
             return 0.0
         try:
-            return self._log_odds(chosen)
+            return self._mixed(chosen) + float(self.lines[list(chosen)].sum())
         except np.linalg.LinAlgError:
             return -np.inf
 
-    def _log_odds(self, chosen: Sequence[int]) -> float:
+    def _mixed(self, chosen: Sequence[int]) -> float:
+        """Return the log Bayes factor over all sizes and misfits."""
         elements = [self.evidence.elements[i] for i in chosen]
         sizes = self.sizes(chosen)
         amplitudes = np.array(self.criteria.amplitudes)
@@ -104,7 +95,7 @@ class MarginalLikelihood:
             for share in misfits
         ]
         mixture = -np.log(len(amplitudes)) * len(chosen) - np.log(len(misfits))
-        return float(logsumexp(weighed)) + mixture + self.prior(chosen)
+        return float(logsumexp(weighed)) + mixture
 
     def _variance(self, element: Element, amplitude: float) -> NDArray:
         """Return the prior variances of an element's columns and derivatives."""
@@ -156,8 +147,9 @@ class MarginalLikelihood:
                     c = np.hstack([columns[one[some], :a], columns[other[some], :b]])
                     s = np.hstack([sd[one[some], :a], sd[other[some], :b]])
                     odds[some] = self._rough(c, s)
-        odds += self.log_prior[chosen[one]] + self.log_prior[chosen[other]]
-        return np.column_stack([chosen[one], chosen[other]]), odds + self.criteria.further
+        own = self.lines + self.features @ self._weights
+        odds += own[chosen[one]] + own[chosen[other]] + self.criteria.further
+        return np.column_stack([chosen[one], chosen[other]]), odds
 
     def _padded(self, chosen: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Return elements' columns and prior sds padded to one width, and the width that counts."""
@@ -189,7 +181,7 @@ class MarginalLikelihood:
         elements = [self.evidence.elements[i] for i in chosen]
         variance = np.concatenate([self._variance(e, ROUGH_SHARE**2) for e in elements])
         value = self._rough(columns[np.newaxis], np.sqrt(variance)[np.newaxis])[0]
-        return float(value) + self.prior(chosen)
+        return float(value) + float(self.lines[list(chosen)].sum()) + self.prior(chosen)
 
     @cached_property
     def alone(self) -> NDArray:

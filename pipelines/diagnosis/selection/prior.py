@@ -1,0 +1,43 @@
+"""The prior over sets of elements: log odds that are linear in what a set has."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.diagnosis.criteria import Criteria
+from pipelines.diagnosis.selection.evidence import Element
+
+FEATURES = ("cause", "law", "further", "other_shape", "each_run", "worn", "impacts", "coherence")
+"""Names of the criteria that the features of a set are multiplied by."""
+HEARD_BY = {"backlash": "impacts", "voluntary_torque": "coherence"}
+"""The criterion by which what is heard or felt of an effect counts."""
+
+
+def features(element: Element, heard: Mapping[str, float]) -> NDArray:
+    """Return the features of one element, in the order of ``FEATURES``.
+
+    Parameters
+    ----------
+    heard : mapping
+        Log likelihood of causes besides what they do to the mean torque, by label.
+    """
+    own = dict.fromkeys(FEATURES, 0.0)
+    own["law" if element.is_law else "cause"] = 1.0
+    own["other_shape"] = float(not element.first)
+    own["each_run"], own["worn"] = float(element.each_run), float(element.worn)
+    if element.name in HEARD_BY:
+        own[HEARD_BY[element.name]] = heard.get(element.label, 0.0)
+    return np.array(list(own.values()))
+
+
+def of_set(chosen: Sequence[NDArray]) -> NDArray:
+    """Return the features of a set from those of its elements."""
+    total = np.sum(chosen, axis=0) if len(chosen) else np.zeros(len(FEATURES))
+    total[FEATURES.index("further")] = max(len(chosen) - 1, 0)
+    return total
+
+
+def weights(criteria: Criteria) -> NDArray:
+    """Return the log odds of one unit of each feature."""
+    return np.array([getattr(criteria, name) for name in FEATURES])
