@@ -98,13 +98,18 @@ def rows(verdict: Mapping[str, Any]) -> list[Row]:
 def shares(verdict: Mapping[str, Any]) -> list[Shares]:
     """Return how each joint's residual splits."""
     found = []
+    slides = all(of["angle"] == "m" for of in verdict["units"].values())
     for joint, told in (verdict.get("router") or {}).items():
         depends = {one["variable"]: one["share_before"] for one in verdict["depends_on"][joint]}
         found.append(
             Shares(
                 joint, told["rms_nm"], {part: told[part] or 0.0 for part in PARTS},
                 told["with_person_only"],
-                {name: depends[name] for name in VARIABLES if name in depends},
+                {
+                    "position" if slides and name == "angle" else name: depends[name]
+                    for name in VARIABLES
+                    if name in depends
+                },
             )
         )  # fmt: skip
     return found

@@ -154,3 +154,9 @@ def test_a_fault_of_acquisition_says_that_no_cause_was_looked_for_and_lists_ever
 
 def test_a_verdict_of_an_older_version_is_shown_without_findings(capsys):
     assert "is anything missing?" not in shown(capsys)
+
+
+def test_what_slides_depends_on_its_position(capsys):
+    joints = (Joint("axis", "prismatic"),)
+    show_verdict(verdict_of(joints, **decision_of(joints)), joints)
+    assert "per run  position  speed\n" in capsys.readouterr().out

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pipelines.contracts import HIP_AND_KNEE, Joint
 from pipelines.diagnosis.selection.answer import answer_of
 from pipelines.diagnosis.selection.evidence import Element
 from pipelines.diagnosis.selection.findings import findings as read_off
@@ -36,7 +37,7 @@ ELEMENTS = (
 SPEED, OFFSET, TILT, ANGLE, HUM, COGGING, PAYLOAD = range(len(ELEMENTS))
 
 
-def diagnosed(sets, ratios=()):
+def diagnosed(sets, ratios=(), joints=HIP_AND_KNEE):
     """Return what is read of a diagnosis, of sets with their probabilities."""
     order = sorted(sets, key=lambda chosen: -sets[chosen])
     p = np.array([sets[chosen] for chosen in order])
@@ -45,6 +46,7 @@ def diagnosed(sets, ratios=()):
     labels = tuple(one.element.label for one in answer.named)
     return SimpleNamespace(
         selected=SimpleNamespace(posterior=weighed, answer=answer, findings=tuple(read_off(weighed, answer))),
+        baseline=SimpleNamespace(machine=SimpleNamespace(joint={joint.name: joint for joint in joints}.get)),
         effects={label: effect_labelled(label) for label in labels},
         effect_of=effect_labelled,
         causes=labels,
@@ -93,6 +95,13 @@ def test_an_unlisted_law_is_said_in_words_with_the_closest_listed_cause():
     assert unlisted["words"] == "a law of the knee's angle"
     assert unlisted["probability"] == pytest.approx(0.7)
     assert [(one["words"], one["dropped"]) for one in found["causes"]] == [("cogging at the knee", False)]
+
+
+def test_a_joint_that_slides_has_a_law_of_its_position_and_a_force():
+    slides = Joint("hip"), Joint("knee", "prismatic")
+    (found,) = findings(diagnosed({(ANGLE,): 0.7, (HUM,): 0.2, (): 0.1}, joints=slides))
+    assert found["words"] == "a law of the knee's position"
+    assert found["laws"][0]["words"] == "a law of the knee's position"
 
 
 def test_a_cause_that_does_harm_on_the_validation_runs_is_said_to_be_dropped():

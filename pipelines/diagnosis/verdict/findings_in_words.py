@@ -16,6 +16,7 @@ from pipelines.diagnosis.selection.evidence import Element
 from pipelines.diagnosis.selection.findings import Finding
 from pipelines.diagnosis.selection.posterior import Posterior
 from pipelines.label import effect_labelled, in_words
+from pipelines.mechanics.machine import Machine
 
 FAMILIES = {
     "angle": "a law of {joint}'s angle",
@@ -49,12 +50,18 @@ def dropped(d: Diagnosis) -> frozenset[str]:
     return frozenset(one.element.label for one in answer_of(weighed).named) - set(d.causes)
 
 
-def label_in_words(label: str) -> str:
+def label_in_words(label: str, machine: Machine) -> str:
     """Return a cause, or an unlisted law by its label, as a sentence says it."""
     if not label.startswith(LAW):
         return in_words(effect_labelled(label))
     kind, joint = _law_of(label)
-    return IN_WORDS[kind].format(joint=the(joint))
+    return _said_of(IN_WORDS[kind], joint, machine)
+
+
+def _said_of(words: str, joint: str, machine: Machine) -> str:
+    """Return words about a joint; one that slides has a position and a force."""
+    own = machine.joint(joint)
+    return words.replace("angle", own.place).replace("torque", own.effort).format(joint=the(joint))
 
 
 def family_of(label: str, weighed: Posterior) -> str:
@@ -63,7 +70,7 @@ def family_of(label: str, weighed: Posterior) -> str:
 
 
 def _as_json(d: Diagnosis, finding: Finding, weighed: Posterior) -> dict[str, Any]:
-    told = finding.as_json()
+    told, machine = finding.as_json(), d.baseline.machine
     against = dropped(d)
     for cause, (label, _) in zip(told["causes"], finding.causes, strict=True):
         effect = d.effects.get(label) or d.effect_of(label)
@@ -71,8 +78,9 @@ def _as_json(d: Diagnosis, finding: Finding, weighed: Posterior) -> dict[str, An
             "family": family_of(label, weighed), "words": in_words(effect),
             "dropped": label in against,
         }  # fmt: skip
-    told["path"] = list(_path(told["path"], finding, weighed))
-    told["laws"] = list(_laws(finding, weighed))
+    path = _path(finding, weighed)
+    told["path"] = [node | {"words": _node_in_words(node, told, machine)} for node in path]
+    told["laws"] = list(_laws(finding, weighed, machine))
     if finding.level != "cause":
         told["probability"] = told["path"][-1]["probability"]
     last = told["path"][-1]["words"]
@@ -81,20 +89,19 @@ def _as_json(d: Diagnosis, finding: Finding, weighed: Posterior) -> dict[str, An
     return told
 
 
-def _path(path: Sequence[dict[str, Any]], finding: Finding, weighed: Posterior) -> Iterator[dict[str, Any]]:
+def _path(finding: Finding, weighed: Posterior) -> Iterator[dict[str, Any]]:
     """Yield the nodes that hold all that could be the answer, each within those above it."""
     labels = dict(finding.causes) if finding.level == "cause" else {}
     members = [element for element in weighed.elements if element.label in labels]
     above: list[Belongs] = []
-    for node in path:
-        words = _node_in_words(node, finding)
+    for node in finding.as_json()["path"]:
         if node["level"] in ("missing", "cause"):
-            yield node | {"words": words}
+            yield node
             continue
         belongs = _belongs(node["level"], finding)
         if all(map(belongs, members)):
             above.append(belongs)
-            yield node | {"probability": _chance(weighed, above), "words": words}
+            yield node | {"probability": _chance(weighed, above)}
 
 
 def _chance(weighed: Posterior, nodes: Sequence[Belongs]) -> float:
@@ -113,7 +120,7 @@ def _belongs(level: str, finding: Finding) -> Belongs:
     return lambda e: (e.joint, e.family) == (finding.joint, finding.family)
 
 
-def _node_in_words(node: dict[str, Any], finding: Finding) -> str:
+def _node_in_words(node: dict[str, Any], finding: dict[str, Any], machine: Machine) -> str:
     level, value = node["level"], node["value"]
     if level == "missing":
         return "something is missing"
@@ -122,9 +129,10 @@ def _node_in_words(node: dict[str, Any], finding: Finding) -> str:
     if level == "joint":
         return f"something at {the(value)}" if value else "something of no single joint"
     if level == "family":
-        joint = the(finding.joint) if finding.joint else "the machine"
-        return FAMILIES[value].format(joint=joint)
-    return label_in_words(value)
+        if not finding["joint"]:
+            return FAMILIES[value].format(joint="the machine")
+        return _said_of(FAMILIES[value], finding["joint"], machine)
+    return str(finding["causes"][0]["words"])
 
 
 def _law_of(label: str) -> tuple[str, str]:
@@ -133,7 +141,7 @@ def _law_of(label: str) -> tuple[str, str]:
     return kind, joint
 
 
-def _laws(finding: Finding, weighed: Posterior) -> Iterator[dict[str, Any]]:
+def _laws(finding: Finding, weighed: Posterior, machine: Machine) -> Iterator[dict[str, Any]]:
     """Yield the unlisted laws of the finding's deepest node above a cause."""
     level = "family" if finding.level == "cause" else finding.level
     belongs = _belongs(level, finding) if finding.family or finding.joint else lambda e: True
@@ -141,4 +149,5 @@ def _laws(finding: Finding, weighed: Posterior) -> Iterator[dict[str, Any]]:
     for label, p in weighed.marginals.items():
         if label in labels and p >= WORTH_A_LINE:
             kind, joint = _law_of(label)
-            yield {"law": kind, "joint": joint, "probability": p, "words": label_in_words(label)}
+            words = label_in_words(label, machine)
+            yield {"law": kind, "joint": joint, "probability": p, "words": words}

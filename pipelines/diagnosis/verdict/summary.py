@@ -121,7 +121,7 @@ def _dropped(d: Diagnosis) -> str:
     labels = sorted(dropped(d))
     if not labels:
         return ""
-    words = " and ".join(map(label_in_words, labels))
+    words = " and ".join(label_in_words(label, d.baseline.machine) for label in labels)
     plural = len(labels) > 1
     return (
         f" {words[:1].upper()}{words[1:]} would explain the training runs, but "

@@ -50,6 +50,8 @@ LINE_IN, SMALLEST_IN, FEWEST = 0.17, 4.4, 17
 """Height of a line of a label, least height of the figure, and lines that it has room for."""
 SHADES = LinearSegmentedColormap.from_list("shares", ["#ffffff", BLUE])
 NOTHING = "nothing is missing"
+PROBABILITY = "probability of each set of causes and laws; bold: named, or tied with it"
+BAR: dict[str, Any] = {"height": 0.6, "edgecolor": "white", "lw": 0.8}
 AGAINST = " (validation runs against it)"
 
 
@@ -74,13 +76,14 @@ def _shares(axis: Axes, said: Mapping[str, Any]) -> None:
         start = 0.0
         for part in ORDER:
             share = told[part] or 0.0
-            axis.barh(row, share, left=start, color=COLOURS[part], height=0.6, edgecolor="white", lw=0.8)
+            axis.barh(row, share, left=start, color=COLOURS[part], **BAR)
             if share > TEXT:
                 _number(axis, row, start, share, part)
             if share > NEGLIGIBLE:
                 seen[PARTS[part]] = Patch(color=COLOURS[part])
             start += share
-            if part == "repeats" and (person := min(told["with_person_only"] or 0.0, share)) > NEGLIGIBLE:
+            person = min(told["with_person_only"] or 0.0, share) if part == "repeats" else 0.0
+            if person > NEGLIGIBLE:
                 axis.barh(
                     row, person, left=start - person, height=0.6, fill=False, hatch="..",
                     edgecolor="white", lw=0,
@@ -176,8 +179,9 @@ def _elements(d: Diagnosis, labels: frozenset[str]) -> Iterator[tuple[str, str |
     against = dropped(d)
     for label in sorted(labels, key=lambda one: (one.startswith(LAW), one)):
         assert weighed is not None
-        words = fill(label_in_words(label) + AGAINST * (label in against), LABEL)
-        yield words, family_of(label, weighed), label.startswith(LAW), label in answers
+        words = label_in_words(label, d.baseline.machine) + AGAINST * (label in against)
+        family, unlisted = family_of(label, weighed), label.startswith(LAW)
+        yield fill(words, LABEL), family, unlisted, label in answers
 
 
 def _height(bar: Bar) -> float:
@@ -217,7 +221,7 @@ def _sets(axis: Axes, bars: list[Bar]) -> None:
     axis.grid(axis="y", visible=False)
     axis.set_axisbelow(True)
     axis.tick_params(axis="y", length=0)
-    axis.set_xlabel("probability of each set of causes and laws; bold: named, or tied with it", fontsize=8)
+    axis.set_xlabel(PROBABILITY, fontsize=8)
     if any(unlisted for bar in bars for _, _, unlisted, _ in bar.elements):
         families["unlisted law"] = Patch(facecolor=GREY, hatch=UNLISTED, edgecolor="white")
     axis.legend(
