@@ -20,6 +20,22 @@ def drawn():
     plt.close(made)
 
 
+def test_the_bar_of_a_joint_is_cut_into_its_residuals_shares(drawn):
+    told = decision_of()["router"]["hip"]
+    widths = [bar.get_width() for bar in drawn.axes[0].patches if bar.get_fill()]
+    first, second = widths[: len(widths) // 2], widths[len(widths) // 2 :]
+    assert first == second
+    assert sum(first) == pytest.approx(1.0)
+    assert [width for width in first if width] == [
+        told[part] for part in ("noise", "wanders", "between_runs", "repeats")
+    ]
+
+
+def test_what_is_there_with_a_person_only_is_marked_at_the_end_of_what_repeats(drawn):
+    marks = [bar for bar in drawn.axes[0].patches if not bar.get_fill()]
+    assert [(mark.get_x(), mark.get_width()) for mark in marks] == [(pytest.approx(0.9), pytest.approx(0.1))] * 2
+
+
 def test_bars_fall_and_with_that_of_all_others_they_add_up_to_one():
     bars = _bars(diagnosed(SETS))
     likely = [bar.probability for bar in bars]
