@@ -82,6 +82,8 @@ docs: $(INSTALLED) ## bring the generated pages up to date, and make the site of
 	$(BIN)/python -m pipelines.settings.map_reference > docs/import-map.md
 	$(BIN)/python -m pipelines.effects.reference docs/effects
 	$(BIN)/python -m pipelines.export.reference docs/export.md
+	$(BIN)/python -m pipelines.diagnosis.reference docs/criteria.md
+	$(BIN)/python docs/site/example_verdict.py
 	$(BIN)/sphinx-build --quiet --write-all --fail-on-warning --keep-going -c docs/site -d build/doctrees docs build/site
 
 lock: ## pin the newest versions that fit pyproject.toml, in requirements.lock

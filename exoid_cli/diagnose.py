@@ -33,7 +33,7 @@ def diagnose(
     known: Annotated[
         list[str] | None,
         typer.Option(
-            help="What drawings show beside rigid body and friction, as rotor_inertia@knee; more than once for more.",
+            help="Effect known to be present, as rotor_inertia@knee; repeatable.",
             show_default="[diagnose] known, nothing",
         ),
     ] = None,

@@ -1,6 +1,8 @@
-"""A verdict as a person reads it: the sentence, the errors, each cause with its numbers and its evidence."""
+"""A verdict as a person reads it: what is missing and how sure that is, the errors, each cause."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 from exoid_cli.console import console
@@ -15,45 +17,148 @@ ERRORS = {
     "baseline_rmse_nm": "rigid + friction",
     "extended_rmse_nm": "with the causes",
 }
+ROUTER = {
+    "noise": "noise", "repeats": "repeats", "wanders": "wanders", "between_runs": "per run",
+    "unsplit": "beyond noise",
+}  # fmt: skip
+"""Headings of the residual's parts; one that is zero at every joint has no column."""
+MISSING, WHAT = "is anything missing?", "what is missing, and where"
+FAULTS = 5
+"""Faults of acquisition that are listed."""
 
 
 def show_verdict(said: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
     """Print a verdict/1 document about a machine of these joints."""
-    from pipelines.contracts.joints import HIP_AND_KNEE, either
-    from pipelines.label import cause_label
+    from pipelines.contracts.joints import HIP_AND_KNEE
 
     console.say(said["summary"])
+    _show_findings(said)
+    _show_faults(said)
     for caveat in said["caveats"]:
-        console.say(f"But {caveat}.")
+        console.say(f"\nBut {caveat}.")
+    _show_router(said)
+    _show_errors(said, joints)
+    for known in said.get("known", ()):
+        _show_known(known)
+    for cause in said["causes"]:
+        _show_cause(cause)
+    # The gait that would be followed is a leg's.
+    if said["causes"] and tuple(joints) == HIP_AND_KNEE:
+        _show_control(said["control"])
+
+
+def _show_faults(said: Mapping[str, Any]) -> None:
+    """List faults of acquisition where the summary has room for the first one only."""
+    faults = said["data_faults"]
+    if said.get("acquisition_at_fault"):
+        console.say("\nNo cause was looked for. Mend acquisition, and record again.")
+    if len(faults) < 2:
+        return
+    console.say("\nFaults of acquisition")
+    for fault in faults[:FAULTS]:
+        console.note(f"- {fault['file']}, {fault['channel']}: {fault['what']}")
+    if len(faults) > FAULTS:
+        console.note(f"- {len(faults) - FAULTS} more, in data_faults of verdict.json")
+
+
+def _show_findings(said: Mapping[str, Any]) -> None:
+    """Print how probable it is that something is missing, and the path to what it is."""
+    from pipelines.findings import outcomes, rows
+
+    cases, tree = outcomes(said), rows(said)
+    if not cases:
+        return
+    shown = [_broken(row.words, row.depth) for row in tree]
+    width = max(map(len, chain([MISSING, WHAT], *shown)))
+    for heading, lines in (
+        (MISSING, [(case.words, f"{case.probability:.2f}") for case in cases]),
+        (WHAT, [
+            ("\n".join(words), f"{row.probability:.2f}")
+            for words, row in zip(shown, tree, strict=True)
+        ]),
+    ):  # fmt: skip
+        if lines:
+            console.say("")
+            console.table((heading.ljust(width), "probability"), lines, numbers="probability")
+
+
+def _broken(words: str, depth: int) -> list[str]:
+    """Return words as lines that leave room for the probability, set in by their depth."""
+    indent = "  " * depth
+    room = console.out.width - len("  probability")
+    return wrap(words, room, initial_indent=indent, subsequent_indent=f"{indent}    ")
+
+
+def _show_router(said: Mapping[str, Any]) -> None:
+    """Print what the residual of each joint is made of, and what it depends on."""
+    from pipelines.findings import shares
+
+    joints = shares(said)
+    if not joints or said.get("acquisition_at_fault"):
+        return
+    parts = {part: words for part, words in ROUTER.items() if any(j.parts[part] for j in joints)}
+    variables = list(joints[0].predicted)
+    headings = ("joint", *parts.values(), *variables)
     console.say("")
+    console.table(
+        headings,
+        [
+            (
+                one.joint, *(f"{one.parts[part]:.0%}" for part in parts),
+                *(f"{one.predicted[name]:.0%}" for name in variables),
+            )
+            for one in joints
+        ],
+        title="where the error of rigid body and friction comes from",
+        numbers=", ".join(headings[1:]),
+    )  # fmt: skip
+    console.note(
+        f"{_listed(parts.values())}: parts of the mean square, training runs. "
+        f"{_listed(variables)}: what a curve of it alone predicts, validation runs."
+    )
+
+
+def _listed(words: Iterable[str]) -> str:
+    *most, last = words
+    return f"{', '.join(most)} and {last}" if most else last
+
+
+def _show_errors(said: Mapping[str, Any], joints: "Sequence[Joint]") -> None:
+    from pipelines.contracts.joints import HIP_AND_KNEE, either
+
     digits = ".3f" if tuple(joints) == HIP_AND_KNEE else ".4g"
     told = {key: words for key, words in ERRORS.items() if key in said}  # of older files one lacks
+    if not said["causes"]:
+        del told["extended_rmse_nm"]
+    headings = ("joint", *told.values(), *["excess left"] * bool(said["causes"]))
+    console.say("")
     console.table(
-        ("joint", *told.values(), "excess left"),
+        headings,
         [
-            (joint.name, *(f"{said[key][joint.name]:{digits}}" for key in told), _excess_left(said, joint.name))
+            (
+                joint.name, *(f"{said[key][joint.name]:{digits}}" for key in told),
+                *[_excess_left(said, joint.name)] * bool(said["causes"]),
+            )
             for joint in joints
         ],
         title=f"{either(joint.effort for joint in joints)} error on runs no fit has seen, "
         f"{either(joint.unit('torque') for joint in joints)}",
-        numbers=", ".join((*told.values(), "excess left")),
-    )
-    for told in said.get("known", ()):
-        console.say(f"\n{cause_label(told)}, known beforehand")
-        for parameter in told["parameters"]:
-            console.note(_in_words(parameter))
-    for cause in said["causes"]:
-        _show_cause(cause)
-    if said["causes"] and tuple(joints) == HIP_AND_KNEE:  # the gait that would be followed is a leg's
-        _show_control(said["control"])
+        numbers=", ".join(headings[1:]),
+    )  # fmt: skip
 
 
 def _excess_left(said: Mapping[str, Any], joint: str) -> str:
-    """Return the share of a joint's error beyond noise that is left; none is told where nothing is missing."""
+    """Return the share of a joint's error beyond noise that is left."""
     share = said["unexplained"][joint]
-    if share is None:
-        return "at the floor"
-    return "too little" if said["status"] == "nothing_missing" else f"{share:.0%}"
+    return "at the floor" if share is None else f"{share:.0%}"
+
+
+def _show_known(known: Mapping[str, Any]) -> None:
+    from pipelines.label import cause_label
+
+    console.say(f"\n{cause_label(known)}, assumed present")
+    for parameter in known["parameters"]:
+        console.note(_in_words(parameter))
 
 
 def _show_cause(cause: Mapping[str, Any]) -> None:
@@ -61,7 +166,9 @@ def _show_cause(cause: Mapping[str, Any]) -> None:
     from pipelines.label import cause_label
 
     where = f" at {the(cause['joint'])}" if cause["joint"] else ""
-    console.say(f"\n{cause['effect']}{where} ({cause['side']}), probability {cause['probability']:.2f}")
+    likely = f"probability {cause['probability']:.2f}"
+    together = " with its ties" if cause["indistinguishable_from"] else ""
+    console.say(f"\n{cause['effect']}{where} ({cause['side']}), {likely}{together}")
     of = next((f", of {one['file']}" for one in cause.get("each_run", ())), "")
     for p in cause["parameters"]:
         console.note(_in_words(p) + of * (p["name"] in cause.get("fitted_on_validate", ())))
@@ -73,7 +180,7 @@ def _show_cause(cause: Mapping[str, Any]) -> None:
 
 
 def _in_words(parameter: Mapping[str, Any]) -> str:
-    """Return a parameter with its interval; what was assumed, or chosen among a few values, has none."""
+    """Return a parameter with its interval; what was assumed, or chosen among a few, has none."""
     low, high = parameter["ci95"]
     unit = "" if parameter["unit"] == "1" else f" {parameter['unit']}"
     sure = "taken, not fitted" if low == high else f"{low:.4g} … {high:.4g}"
@@ -98,4 +205,4 @@ def _show_control(said: Mapping[str, Any]) -> None:
         title="tracking error and peak torque under adaptive control, without and with the causes",
         numbers=", ".join(headings[1:]),
     )  # fmt: skip
-    console.note("What each model promises; the one with the causes may well promise worse.")
+    console.note("Predicted by simulation. The model with the causes may predict worse tracking.")

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
@@ -13,6 +13,8 @@ from pipelines.validation import explain
 Number = Annotated[FiniteFloat, Field(strict=True)]
 ByJoint = dict[str, Number]
 Interval = Annotated[list[Number], Field(min_length=2, max_length=2)]
+Probability = Annotated[Number, Field(ge=0.0, le=1.0 + 1e-9)]
+"""Sums of probabilities exceed one by rounding."""
 
 
 class _Object(BaseModel):
@@ -74,13 +76,78 @@ class Cause(_Object):
     effect: str
     joint: str | None
     side: str
-    probability: Annotated[Number, Field(ge=0.0, le=1.0)]
+    probability: Probability
     parameters: list[Parameter]
     gain: Gain
     indistinguishable_from: list[Tie]
     evidence: list[str]
     each_run: list[OneRun] = []
     """Empty where all runs share everything; files of older versions lack it."""
+
+
+class Likely(_Object):
+    """A listed cause that a finding could be."""
+
+    effect: str
+    joint: str | None
+    family: str
+    probability: Probability
+    words: str
+    dropped: bool
+    """Whether the training runs would name it, and the validation runs speak against it."""
+
+
+class Law(_Object):
+    """An unlisted law that a finding could be."""
+
+    law: str
+    joint: str
+    probability: Probability
+    words: str
+
+
+class Node(_Object):
+    """A level on the way to a finding."""
+
+    level: Literal["missing", "repeats", "joint", "family", "cause"]
+    value: bool | str | None
+    probability: Probability
+    words: str
+
+
+class Finding(_Object):
+    """One thing that is missing, at the deepest level that the data support."""
+
+    level: Literal["repeatability", "joint", "family", "cause"]
+    repeats: bool | None
+    joint: str | None
+    family: str | None
+    probability: Probability
+    words: str
+    causes: list[Likely]
+    laws: list[Law]
+    path: list[Node] = Field(min_length=1)
+
+
+class Shares(_Object):
+    """How one joint's residual repeats, as shares of its mean square."""
+
+    rms_nm: Number
+    noise: Number
+    repeats: Number | None
+    wanders: Number | None
+    between_runs: Number
+    unsplit: Number
+    with_person_only: Number | None
+
+
+class Posterior(_Object):
+    """Probabilities after all sets of causes and unlisted laws were weighed."""
+
+    nothing_missing: Probability
+    unlisted: Probability
+    causes: dict[str, Probability]
+    laws: dict[str, Probability]
 
 
 class Loop(_Object):
@@ -154,6 +221,11 @@ class Verdict(_Object):
     finding: str | None = None
     """The summary without what it says of acquisition and of the floor; None where acquisition is at fault."""
     acquisition_at_fault: bool = False
+    findings: list[Finding] = []
+    """Empty where nothing is missing; files of older versions lack it, as they do the next two."""
+    router: dict[str, Shares] = {}
+    posterior: Posterior | None = None
+    """None where acquisition is at fault."""
     caveats: list[str]
     scoring: dict[str, Any]
     torque_rms_nm: ByJoint | None = None
@@ -190,6 +262,9 @@ class Verdict(_Object):
         for number, cause in enumerate(self.causes):
             if cause.gain.joint not in joints:
                 raise ValueError(f"causes[{number}].gain.joint is {cause.gain.joint!r}, no joint of noise_floor_nm")
+        for number, finding in enumerate(self.findings):
+            if finding.joint is not None and finding.joint not in joints:
+                raise ValueError(f"findings[{number}].joint is {finding.joint!r}, no joint of noise_floor_nm")
         return self
 
     def _tables(self) -> Iterator[tuple[str, Mapping[str, Any]]]:
@@ -197,6 +272,8 @@ class Verdict(_Object):
                     "baseline_simulation_rmse_rad", "extended_simulation_rmse_rad", "unexplained", "error_budget",
                     "depends_on", "units"):  # fmt: skip
             yield key, getattr(self, key)
+        if self.router:
+            yield "router", self.router
         if self.torque_rms_nm is not None:
             yield "torque_rms_nm", self.torque_rms_nm
         for key, loop in (("without", self.control.without), ("with", self.control.with_)):

@@ -22,7 +22,7 @@ INTRODUCTION = """\
 For those who want to know why a verdict came out as it did, or who change the decision.
 Written by `make docs` from `pipelines/diagnosis/criteria.py`. `make learn` sets the values: they
 maximise the log probability that the posterior gives to the truth, over simulated sessions.
-[science.md](science.md#the-decision) has the equations in which they stand.
+[science.md](science.md#9-the-decision) has the equations in which they stand.
 """
 
 

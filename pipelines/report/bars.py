@@ -15,6 +15,8 @@ TONES = {"noise_floor": "noise", "repeatable_unexplained": "left", "not_repeatab
 """Names of the colours of what is no cause."""
 CAUSES = 3
 """Colours that there are for causes."""
+LAW = "law:"
+"""What the label of an unlisted law begins with."""
 
 
 @dataclass(frozen=True)
@@ -130,10 +132,12 @@ def torque_unit(verdict: dict[str, Any], joint: str) -> str:
 
 def label_in_words(label: str) -> str:
     """Return ``cogging@knee`` as a sentence says it; an effect that is not known here by its name."""
+    name, _, joint = label.partition("@")
+    if name.startswith(LAW):
+        return f"unlisted law at {the(joint)}: {name.removeprefix(LAW).replace('_', ' ')}"
     try:
         return in_words(effect_labelled(label))
     except InputError:
-        name, _, joint = label.partition("@")
         return name.replace("_", " ") + (f" at {the(joint)}" if joint else "")
 
 

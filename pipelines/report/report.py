@@ -25,6 +25,7 @@ from pipelines.report.bars import (
 )
 from pipelines.report.chart import Chart, thinned_alike
 from pipelines.report.control import control_charts, loops
+from pipelines.report.decision import decision
 from pipelines.report.excitation import excitations
 from pipelines.report.lead import faults_in_short, lead
 from pipelines.report.measured import (
@@ -58,7 +59,7 @@ STATUS = {
     "nothing_missing": ("nothing missing", "good"),
 }
 HEADLINES = {
-    "unknown_cause": "Something is missing that no known cause explains",
+    "unknown_cause": "Something is missing that no listed cause explains",
     "nothing_missing": "Nothing is missing that these data could show",
 }
 TONES = {"named": "good", "indistinguishable": "warn", "absorbed": "", "rejected": ""}
@@ -122,6 +123,7 @@ def _page(session: Session, title: str | None, output: Path | None, values: int)
         "headline": headline(session),
         "verdict": verdict,
         "lead": lead(verdict) if verdict else "",
+        "decision": decision(verdict) if verdict else None,
         "faults": faults_in_short(verdict) if verdict else ("", 0),
         "with_causes": _with_causes(verdict) if verdict else "",
         "quantity": quantity,
@@ -191,6 +193,9 @@ def headline(session: Session) -> str:
     if verdict["causes"]:
         words = causes_in_words(verdict["causes"])
         return f"The simulation misses {words}"
+    found = verdict.get("findings")
+    if verdict["status"] == "unknown_cause" and found:
+        return f"The simulation misses {found[0]['words']}, and no listed cause explains it"
     return HEADLINES.get(verdict["status"], verdict["status"].replace("_", " "))
 
 
@@ -247,8 +252,8 @@ def _about_run(session: Session, name: str) -> str:
 
 
 @dataclass(frozen=True)
-class Foretold:
-    """A variable and the share of the error that it foretells."""
+class Predicted:
+    """A variable and the share of the error that it predicts."""
 
     words: str
     before: float
@@ -257,11 +262,11 @@ class Foretold:
 
 @dataclass(frozen=True)
 class JointResiduals:
-    """One joint's residual charts, and what its error goes with."""
+    """One joint's residual charts, and what its error depends on."""
 
     name: str
     charts: tuple[Chart, ...]
-    depends: tuple[Foretold, ...]
+    depends: tuple[Predicted, ...]
 
 
 def _residuals(session: Session, drawn: Sequence[Chart]) -> list[JointResiduals]:
@@ -269,16 +274,16 @@ def _residuals(session: Session, drawn: Sequence[Chart]) -> list[JointResiduals]
     for joint in session.joints:
         own = tuple(chart for chart in drawn if chart.key.startswith(f"residual-{joint.name}-"))
         if own:
-            found.append(JointResiduals(joint.name, own, tuple(_foretold(session, joint))))
+            found.append(JointResiduals(joint.name, own, tuple(_predicted(session, joint))))
     return found
 
 
-def _foretold(session: Session, joint: Joint) -> list[Foretold]:
+def _predicted(session: Session, joint: Joint) -> list[Predicted]:
     verdict = session.verdict or {}
     words = {one.variable: one.title for one in against(session, joint)}
     named = bool(verdict.get("causes"))
     return [
-        Foretold(
+        Predicted(
             words.get(one["variable"], one["variable"].replace("_", " ")),
             one["share_before"],
             one["share_after"] if named else None,
@@ -320,6 +325,7 @@ def _candidates(session: Session) -> list[dict[str, Any]]:
                 told.get(row["verdict"], {}).get(label) or label_in_words(label)
                 for label in (row["causes"] if more is None else more)
             ],
+            "probability": _likely(row["probability"]),
             "verdict": row["verdict"],
             "tone": TONES.get(row["verdict"], ""),
             "falls": [
@@ -328,8 +334,7 @@ def _candidates(session: Session) -> list[dict[str, Any]]:
                 if np.isfinite(row[joint.column("rmse_after")])
             ],
             "taken": _taken(row) if more is None or named is None else _gain(session, named, row),
-            # Whose reason it is, the row says.
-            "reason": labels_in_words(row["reason"].removeprefix(f"{' and '.join(sorted(more or ()))} "), labels),
+            "reason": labels_in_words(_reason(row["reason"], more or ()), labels),
         }
         for row in rows
     ]
@@ -340,6 +345,20 @@ def _beyond(row: dict[Any, Any], named: dict[Any, Any] | None) -> list[str] | No
     if named is None or not set(named["causes"]) < set(row["causes"]):
         return None
     return [label for label in row["causes"] if label not in set(named["causes"])]
+
+
+def _reason(reason: str, more: Sequence[str]) -> str:
+    """Return why a set is not named, without its probability, which has a column, and whose reason it is."""
+    first, _, others = reason.partition("; ")
+    told = others if first.startswith("its probability is ") else reason
+    return told.removeprefix(f"{' and '.join(sorted(more))} ")
+
+
+def _likely(probability: float) -> str:
+    """Return a probability; a dash for what was not weighed."""
+    if not np.isfinite(probability):
+        return "–"
+    return f"{probability:.2f}" if probability >= 0.005 else "< 0.01"
 
 
 def _gain(session: Session, less: dict[Any, Any], more: dict[Any, Any]) -> str:

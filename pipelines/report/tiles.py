@@ -29,7 +29,9 @@ def tiles(session: Session) -> list[Tile]:
     verdict = session.verdict
     if not verdict:
         return []
-    found = [tile for cause in verdict["causes"][:2] for tile in _cause_tiles(verdict, cause)]
+    # The tree of findings tells how probable each cause is; older verdicts have none.
+    skipped = bool(verdict.get("findings"))
+    found = [tile for cause in verdict["causes"][:2] for tile in _cause_tiles(verdict, cause)[skipped:]]
     for fall in falls(verdict):
         if fall.unexplained is not None:
             after = "" if fall.after is None else f" → {digits(fall.after / fall.floor)}"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.contracts import CONTRACTS
+from pipelines.contracts import CONTRACTS, verdict
 from pipelines.contracts.joints import QUANTITIES
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -30,3 +30,13 @@ def test_every_page_stands_in_the_index():
     pages = {path.name for path in DOCS.glob("*.md")} - {"README.md"}
     index = (DOCS / "README.md").read_text(encoding="utf-8")
     assert {page for page in pages if f"({page})" not in index} == set()
+
+
+DECISION = (verdict.Finding, verdict.Likely, verdict.Law, verdict.Node, verdict.Shares, verdict.Posterior)
+
+
+@pytest.mark.parametrize(
+    "key", sorted({name for model in DECISION for name in model.model_fields} | {"findings", "router", "posterior"})
+)
+def test_every_key_of_the_decision_is_documented(key):
+    assert re.search(rf"`(?:\w+(?:\[\])?\.)?{key}`", PAGE)

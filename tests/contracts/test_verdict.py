@@ -7,7 +7,7 @@ import pytest
 
 from pipelines.contracts import verdict
 from pipelines.errors import ContractError
-from tests.report.sessions import AXIS, LEG, verdict_of
+from tests.report.sessions import AXIS, LEG, decision_of, verdict_of
 
 NAN = float("nan")
 HOLES = {
@@ -22,19 +22,38 @@ HOLES = {
     "unexplained": lambda said: said["unexplained"].pop("hip"),
     "units": lambda said: said.update(units={}),
     "torque_rms_nm": lambda said: said.update(torque_rms_nm={"knee": 12.0}),
+    "findings[0].joint": lambda said: said["findings"][0].update(joint="ankle"),
+    "findings[0].path[1].probability": lambda said: said["findings"][0]["path"][1].update(probability=NAN),
+    "findings[0].causes[1].words": lambda said: said["findings"][0]["causes"][1].pop("words"),
+    "findings[0].level": lambda said: said["findings"][0].update(level="guess"),
+    "posterior.unlisted": lambda said: said["posterior"].update(unlisted=1.2),
+    "posterior.causes.cogging@knee": lambda said: said["posterior"]["causes"].update({"cogging@knee": "0.9"}),
+    "router": lambda said: said["router"].pop("hip"),
+    "router.knee.noise": lambda said: said["router"]["knee"].update(noise=None),
 }
 
 
 @pytest.mark.parametrize("joints", [LEG, AXIS])
 def test_a_whole_verdict_is_read_as_it_stands(tmp_path, joints):
     path = tmp_path / "verdict.json"
-    path.write_text(json.dumps(verdict_of(joints)))
-    assert verdict.read(path) == verdict_of(joints)
+    whole = verdict_of(joints, **decision_of(joints))
+    path.write_text(json.dumps(whole))
+    assert verdict.read(path) == whole
+
+
+def test_a_verdict_of_an_older_version_has_no_findings_and_is_read():
+    verdict.check(verdict_of(), "older")
+
+
+def test_where_acquisition_is_at_fault_there_is_no_posterior():
+    told = decision_of() | {"findings": [], "posterior": None}
+    verdict.check(verdict_of(acquisition_at_fault=True, causes=[], **told), "faulty")
 
 
 @pytest.mark.parametrize("key", HOLES)
 def test_a_hole_is_named_by_its_key(key):
-    said = {k: deepcopy(value) for k, value in verdict_of().items()}  # no two of its tables are one object then
+    whole = verdict_of(**decision_of())
+    said = {k: deepcopy(value) for k, value in whole.items()}  # no two tables are one object then
     HOLES[key](said)
     with pytest.raises(ContractError) as refusal:
         verdict.check(said, "verdict.json")

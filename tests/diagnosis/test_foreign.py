@@ -55,7 +55,7 @@ def test_what_a_cause_of_another_form_leaves_is_told_with_what_it_goes_with(kind
     (joint,) = said["unexplained"]
     assert said["status"] == "explained" and said["extended_rmse_nm"][joint] > 1.1 * said["noise_floor_nm"][joint]
     assert said["residual"]["depends_on"][0]["variable"] == "speed"
-    assert f"of what is left at the {joint} goes with the {joint}'s speed" in said["summary"]
+    assert f"of what is left at the {joint} depends on the {joint}'s speed" in said["summary"]
 
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])
@@ -78,7 +78,7 @@ def test_a_lifts_weight_hides_nothing_for_what_is_off_varies_with_the_force():
     error, floor, force = (said[key]["carriage"] for key in ("baseline_rmse_nm", "noise_floor_nm", "torque_rms_nm"))
     assert np.sqrt(error**2 - floor**2) < 0.015 * force
     assert said["status"] == "unknown_cause"
-    assert "goes with the force that the carriage passes on" in said["summary"]
+    assert "depends on the force that the carriage passes on" in said["summary"]
 
 
 def test_an_error_that_is_no_noise_but_as_small_as_on_a_good_rig_is_nothing_missing():

@@ -145,6 +145,46 @@ def verdict_of(joints=LEG, **changes):
     return told | changes
 
 
+def decision_of(joints=LEG, ties=("parallel_spring",), law=0.02, nothing=0.03):
+    """What a verdict of the decision says besides: cogging at the last joint, and what is tied with it."""
+    last = joints[-1].name
+    effects = ("cogging", *ties)
+    # The named cause is twice as probable as each that is tied with it.
+    parts = [2.0, *([1.0] * len(ties))]
+    each = [(1.0 - nothing - law) * part / sum(parts) for part in parts]
+    probability = sum(each)
+    words = {effect: f"{effect.replace('_', ' ')} at the {last}" for effect in effects}
+    path = [
+        ("missing", True, 1.0 - nothing, "something is missing"),
+        ("repeats", True, 1.0 - nothing, "something that repeats with the motion"),
+        ("joint", last, 1.0 - nothing, f"something at the {last}"),
+        ("family", "angle", 1.0 - nothing, f"a law of the {last}'s angle"),
+        ("cause", f"cogging@{last}", probability, words["cogging"]),
+    ]
+    finding = {
+        "level": "cause", "repeats": True, "joint": last, "family": "angle", "probability": probability,
+        "words": words["cogging"],
+        "causes": [{"effect": effect, "joint": last, "family": "angle", "probability": p, "words": words[effect],
+                    "dropped": False}
+                   for effect, p in zip(effects, each, strict=True)],
+        "laws": [{"law": "angle", "joint": last, "probability": law, "words": f"a law of the {last}'s angle"}],
+        "path": [dict(zip(("level", "value", "probability", "words"), node, strict=True)) for node in path],
+    }  # fmt: skip
+    shares = {
+        "rms_nm": 0.7, "noise": 0.2, "repeats": 0.7, "wanders": 0.08, "between_runs": 0.02, "unsplit": 0.0,
+        "with_person_only": 0.1,
+    }  # fmt: skip
+    return {
+        "findings": [finding],
+        "router": {joint.name: dict(shares) for joint in joints},
+        "posterior": {
+            "nothing_missing": nothing, "unlisted": law,
+            "causes": {f"{effect}@{last}": p for effect, p in zip(effects, each, strict=True)},
+            "laws": {f"law:angle@{last}": law},
+        },
+    }  # fmt: skip
+
+
 def write_verdict(folder, joints=LEG, inputs=(), **changes):
     said = verdict_of(joints, **changes) | {"provenance": {"joints": named(joints)} | describe(inputs)}
     (folder / "diagnosed").mkdir(parents=True, exist_ok=True)
@@ -217,7 +257,7 @@ def write_session(folder, joints=LEG, shift=0.0, **metadata):
     extended = write_parameters(folder, joints, extended=True, shift=shift, inputs=[recording])
     write_residuals(folder, joints, inputs=[recording])
     write_candidates(folder, joints)
-    write_verdict(folder, joints, inputs=[recording])
+    write_verdict(folder, joints, inputs=[recording], **decision_of(joints))
     for parameters, off in ((baseline, 0.05), (extended, 0.02)):
         write_replay(folder, parameters, recording, joints, off=off)
         write_loop(folder, parameters, joints)

@@ -1,12 +1,14 @@
 """The first screen: it claims what the data say, ties included, and says it in a few words."""
 
+import re
+
 import pytest
 
 from pipelines.report.bars import causes_in_words, labels_in_words
 from pipelines.report.report import report
 from pipelines.report.session import find
 from pipelines.report.tiles import tiles
-from tests.report.sessions import AXIS, verdict_of, write_session, write_verdict
+from tests.report.sessions import AXIS, decision_of, verdict_of, write_session, write_verdict
 
 FAULT = {"file": "run_1.parquet", "channel": "hip_angle_rad", "what": "the hip's angle is stuck"}
 
@@ -105,6 +107,60 @@ def test_a_gain_is_of_the_error_that_the_other_causes_leave(tmp_path):
     assert alone.small == "0.818 → 0.314 N·m at the knee; 95 %: 0.450 … 0.550"
     of_two, _ = gains(folder, cause() | {"gain": cause()["gain"] | {"rmse_reduction_nm": 0.1}}, cause("backlash"))
     assert of_two.small.startswith("0.414 → 0.314 N·m at the knee, beside the other causes;")
+
+
+def text_of(part):
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", part))
+
+
+def test_the_path_and_the_three_cases_stand_on_the_first_screen(tmp_path):
+    folder = write_session(tmp_path / "leg")
+    shown = text_of(top(folder))
+    assert "nothing 0.03" in shown
+    assert "listed causes only 0.95" in shown
+    assert "something unlisted 0.02" in shown
+    path = [
+        "something that repeats with the motion 0.97", "something at the knee 0.97",
+        "a law of the knee&#39;s angle 0.97",
+        "one of these, which these data cannot tell apart 0.95", "cogging at the knee 0.63",
+        "parallel spring at the knee 0.32",
+    ]  # fmt: skip
+    at = [shown.index(words) for words in path]
+    assert at == sorted(at)
+
+
+def test_the_first_screen_tells_what_repeats_and_on_what_it_depends(tmp_path):
+    shown = text_of(top(write_session(tmp_path / "leg")))
+    assert "repeats with the motion 70% , 10% only with a person" in shown
+    assert "a curve of it predicts angle speed hip 80% 20% knee 80% 20%" in shown
+
+
+def test_where_nothing_is_missing_the_first_screen_says_how_sure_that_is(tmp_path):
+    folder = write_session(tmp_path / "leg")
+    told = decision_of(nothing=0.95, law=0.01) | {"findings": []}
+    write_verdict(folder, status="nothing_missing", causes=[], **told)
+    shown = text_of(top(folder))
+    assert "nothing 0.95" in shown
+    assert "What, and where" not in shown
+    assert "detectability.json tells how large each cause must be" in shown
+
+
+def test_of_an_unlisted_law_the_headline_says_what_it_is_a_law_of(tmp_path):
+    folder = write_session(tmp_path / "leg")
+    told = decision_of()
+    found = told["findings"][0] | {
+        "level": "family",
+        "words": "a law of the knee's angle",
+        "path": told["findings"][0]["path"][:4],
+    }
+    write_verdict(folder, status="unknown_cause", causes=[], **told | {"findings": [found]})
+    assert "The simulation misses a law of the knee&#39;s angle, and no listed cause explains it" in top(folder)
+
+
+def test_a_verdict_of_an_older_version_has_no_cards_of_the_decision(tmp_path):
+    folder = write_session(tmp_path / "leg")
+    write_verdict(folder)
+    assert "Is anything missing?" not in top(folder)
 
 
 RIGHT_EDGES = """() => {

@@ -351,7 +351,9 @@ def test_a_cause_that_differs_from_run_to_run_is_called_so_and_every_run_s_value
     assert "<h1>The simulation misses per-run encoder offset at the knee</h1>" in page
     assert "Why per-run encoder offset at the knee" in page
     assert '<li class="key cause1">per-run encoder offset at the knee: ' in page
-    assert re.search('<td>per-run encoder offset at the knee</td><td><span class="pill [^"]*">named', page)
+    assert re.search(
+        '<td>per-run encoder offset at the knee</td><td class="n">0.90</td><td><span class="pill [^"]*">named', page
+    )
     shown = told(page)
     assert shown["each_run:encoder_offset/knee/first.parquet/offset"] == (0.0612, "0.061")
     assert shown["each_run:encoder_offset/knee/judged.parquet/offset"][0] == -0.0503
@@ -362,3 +364,16 @@ def test_a_cause_that_differs_from_run_to_run_is_called_so_and_every_run_s_value
     # The model's table holds the first run's: it says so of that value, and of no other.
     assert re.findall('<td class="nowrap">([^<]*|<abbr[^>]*>[^<]*</abbr>) <small>encoder offset</small>', page)
     assert page.count("(per run: the first training run") == 1
+
+
+def test_an_unlisted_law_among_the_sets_is_called_so_and_a_set_has_its_probability_once(tmp_path):
+    folder = write_session(tmp_path / "leg")
+    tried = CANDIDATES.read(folder / "diagnosed" / "candidates.parquet")
+    tried.frame["causes"] = [["cogging@knee"], ["law:friction_by_angle@hip", "cogging@knee"]]
+    tried.frame["probability"] = [0.9, 0.0012]
+    tried.frame["reason"] = ["its causes are the most probable", "its probability is 0.0012; it holds a law"]
+    CANDIDATES.write(folder / "diagnosed" / "candidates.parquet", tried.frame, tried.metadata)
+    page = report(find([folder]))
+    assert "unlisted law at the hip: friction by angle" in page
+    assert '<td class="n">&lt; 0.01</td>' in page
+    assert '<td class="reason">it holds a law</td>' in page

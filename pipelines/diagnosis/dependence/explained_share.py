@@ -159,8 +159,8 @@ def dependences(runs: Sequence[Run], residuals: Sequence[NDArray]) -> list[Depen
         kind = (
             "above the motion's own band, in step with its period" if in_step else "that is no harmonic of the motion"
         )
-        words = f"a tone of {frequency:.2f} Hz {kind}"
-        made.append(Dependence(joint, "tone", share, _sentence(joint, machine, words, share)))
+        said = f"{_left(joint, share)} is a tone of {frequency:.2f} Hz {kind}"
+        made.append(Dependence(joint, "tone", share, said))
         found += sorted(made, key=_rank, reverse=True)
     return found
 
@@ -175,7 +175,11 @@ def knows(variable: Variable, runs: Iterable[Run], j: int) -> bool:
 
 
 def _sentence(joint: str, machine: Machine, words: str, share: float) -> str:
-    return f"{100 * share:.0f} % of what is left at {the(joint)} goes with {_words(joint, machine, words)}"
+    return f"{_left(joint, share)} depends on {_words(joint, machine, words)}"
+
+
+def _left(joint: str, share: float) -> str:
+    return f"{100 * share:.0f} % of what is left at {the(joint)}"
 
 
 def _words(joint: str, machine: Machine, words: str) -> str:
@@ -337,12 +341,11 @@ def describe(
     pair = max((t for t in together if t.joint == joint), key=lambda t: t.share, default=None)
     if pair and pair.share > MUCH_MORE * max(_rank(own[0]), LITTLE):
         words = " together with ".join(_words(joint, machine, variable.words) for variable in pair.variables)
-        return f"{100 * pair.share:.0f} % of what is left at {the(joint)} goes with {words}{where}."
+        return f"{100 * pair.share:.0f} % of what is left at {the(joint)} depends on {words}{where}."
     if own[0].share < LITTLE:
         return (
-            f"What is left at {the(joint)}{where}{',' * bool(where)} depends on nothing that was measured: neither "
-            f"motion, load and time nor a steady tone above {LOWEST_HZ:g} Hz that is no harmonic of the motion "
-            f"foretells {100 * LITTLE:.0f} % of it."
+            f"What is left at {the(joint)}{where}{',' * bool(where)} depends on nothing that was "
+            f"measured: no variable and no steady tone predicts {100 * LITTLE:.0f} % of it."
         )
     second = next((d for d in own[1:] if d.variable != "phase" and d.share > max(0.5 * own[0].share, LITTLE)), None)
     return own[0].sentence + where + "." + (f" Nearly as much: {second.sentence}." if second else "")

@@ -1,5 +1,6 @@
 """``candidates/1``: every set of causes and laws that was weighed in full, and what became of it."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import pandas as pd
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fit.validation import Validated
 from pipelines.diagnosis.fit.validation_error import gain
+from pipelines.diagnosis.verdict.findings_in_words import LAW, dropped
 from pipelines.effects import EFFECTS, Effect
 from pipelines.mechanics.machine import Machine
 
@@ -91,15 +93,22 @@ def _parameters(fitted: Validated, d: Diagnosis) -> list[dict[str, Any]]:
 def _judged(d: Diagnosis, labels: frozenset[str], probability: float) -> tuple[str, str]:
     named = frozenset(d.causes)
     if named and labels == named:
-        return "named", "selected: its causes are the most probable"
+        return "named", "its causes are the most probable"
     for one in d.named:
         rest = named - {one.element.label}
         rivals = labels - rest
         if rest <= labels and len(rivals) == 1 and next(iter(rivals)) in dict(one.ties):
-            return "indistinguishable", f"it explains these data as well as {one.element.label}"
-    laws = sorted(label for label in labels if label.startswith("law:"))
-    unlisted = f"; {' and '.join(laws)} is no listed cause" if laws else ""
-    return "rejected", f"its probability is {probability:.2g}{unlisted}"
+            return "indistinguishable", f"these data cannot tell it from {one.element.label}"
+    return "rejected", "; ".join(_against(d, labels, probability))
+
+
+def _against(d: Diagnosis, labels: frozenset[str], probability: float) -> Iterator[str]:
+    """Yield why a set is not named."""
+    yield f"its probability is {probability:.2g}"
+    if any(label.startswith(LAW) for label in labels):
+        yield "it holds a law that is no listed cause"
+    if harmful := sorted(labels & dropped(d)):
+        yield f"the validation runs speak against {' and '.join(harmful)}"
 
 
 def _taken_up(effect: type[Effect], machine: Machine) -> dict[str, str]:

@@ -1,16 +1,22 @@
 """What speaks for a named cause: one sentence each."""
 
 from pipelines.contracts.joints import the
-from pipelines.diagnosis.candidates.auxiliary_evidence import PERCEIVED
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.selection.answer import Named
-from pipelines.effects import Effect
+from pipelines.effects import Backlash, Effect, VoluntaryTorque
 from pipelines.label import amount, effect_labelled, in_words, number
 
 CERTAIN = 1000.0
 """Odds from which more is not told: no calibration could vouch for a figure."""
 HEARD = 3.0
 """Log likelihood from which auxiliary evidence is mentioned: odds of 20."""
+AUXILIARY = {
+    Backlash.name: "bursts where the load changes sign speak for it: teeth cross their play there, "
+    "of which hardly anything shows in the mean torque",
+    VoluntaryTorque.name: "cycle-to-cycle differences appear in cuff forces and drive torque "
+    "alike, so they come from the wearer",
+}
+"""What auxiliary evidence is, by effect (``candidates/auxiliary_evidence.py``)."""
 
 
 def cause_evidence(d: Diagnosis, named: Named) -> list[str]:
@@ -31,7 +37,10 @@ def cause_evidence(d: Diagnosis, named: Named) -> list[str]:
         sentences.append(_differs(d, label, effect))
     assert d.selected.evidence is not None
     if d.selected.evidence.heard.get(label, 0.0) > HEARD:
-        sentences.append(PERCEIVED[effect.name])
+        sentences.append(AUXILIARY[effect.name])
+    if lines := len(named.element.shown):
+        plural = "s stand" if lines > 1 else " stands"
+        sentences.append(f"{lines} line{plural} out over the angle at the full sampling rate")
     if rival := _next(d, named):
         sentences.append(rival)
     return [*sentences, f"it looks like {effect.looks_like}", f"to make sure: {effect.confirm}"]

@@ -76,15 +76,12 @@ def _reversal(d: Diagnosis, one: BuildUp) -> str:
     """Say what the samples about a joint's reversals show, which no fit uses."""
     machine = d.baseline.machine
     joint = machine.joint(one.joint)
-    at_once, otherwise, over = (
-        amount(machine, one.joint, value) for value in (one.at_once, one.otherwise, one.over_travel)
-    )
+    before, after = (amount(machine, one.joint, error) for error in (one.at_once, one.over_travel))
     return (
-        f"within {NEAR_S:g} s of its reversals {the(one.joint)}'s friction changes sign over about "
-        f"{1e3 * one.travel:.1g} m{joint.unit('angle')} of travel. {PreslidingHysteresis.name} "
-        "could cause it, or play or give between encoder and friction. The model ignores it: there "
-        f"the {joint.effort} error is {at_once}, at best {otherwise} without a travel and {over} "
-        f"with it (validation runs, below {CUTOFF_HZ:g} Hz)"
+        f"near reversals {the(one.joint)}'s friction changes sign over about "
+        f"{1e3 * one.travel:.1g} m{joint.unit('angle')} of travel: {PreslidingHysteresis.name}, or "
+        f"play between encoder and friction. The model ignores it: the {joint.effort} error within "
+        f"{NEAR_S:g} s of reversals is {before}, {after} with such a travel"
     )
 
 
@@ -110,9 +107,9 @@ def _one_kind(d: Diagnosis) -> list[str]:
         ]
     if kinds == {"with_human"}:
         felt = any(run.motion.forces is not None for run in d.train)
-        told = "by the cuff forces alone" if felt else "not at all"
+        apart = "are separated by the cuff forces alone" if felt else "cannot be separated"
         return [
-            "every run is with a person: causes in the machine and in the person are separated "
-            f"{told}, and the machine's friction alone is unknown. Record exo_alone runs as well"
+            f"every run is with a person: causes in the machine and in the person {apart}, and the "
+            "machine's friction alone is unknown. Record exo_alone runs as well"
         ]
     return []

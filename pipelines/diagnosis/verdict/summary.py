@@ -5,27 +5,18 @@ from typing import Any
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.data_faults import Fault
 from pipelines.diagnosis.diagnosis import AT_FLOOR, EXPLAINED, Diagnosis
-from pipelines.diagnosis.selection.findings import Finding
 from pipelines.diagnosis.verdict.cause_evidence import doubt_of_gain
 from pipelines.diagnosis.verdict.caveats import floor_that_hides
+from pipelines.diagnosis.verdict.findings_in_words import dropped, findings, label_in_words
 from pipelines.diagnosis.verdict.unexplained import Unexplained
-from pipelines.label import amount, cause_label, effect_labelled, effect_told, in_words
+from pipelines.label import amount, cause_label, effect_told, in_words
 
 MENTIONED = 3
 """Tied causes in the summary; ``indistinguishable_from`` has all."""
 CLOSEST = 0.05
 """Probability from which a listed cause is said to come closest."""
-FAMILY = {
-    "angle": "a law of {joint}'s angle",
-    "speed": "a law of {joint}'s speed",
-    "reversal": "friction of {joint} that remembers its reversals",
-    "load": "a law of {joint}'s load",
-    "time": "a torque at {joint} that changes with time",
-    "transmission": "something in {joint}'s transmission",
-    "sensor": "something in {joint}'s sensors",
-    "person": "something of the person at {joint}",
-}
-"""What an unlisted law is called by its family."""
+LIKELY = 0.5
+"""Probability from which an unlisted law is said to be it."""
 
 
 def summary(d: Diagnosis, causes: list[dict[str, Any]], left: Unexplained | None) -> str:
@@ -101,32 +92,41 @@ def _nothing(d: Diagnosis) -> str:
 
 def _unlisted(d: Diagnosis) -> str:
     """Say at which depth something is known that no listed cause explains."""
-    found = d.selected.findings
+    found = findings(d)
     if not found:
         return "Something is missing, and no listed cause is likely."
     first, *more = found
-    also = "".join(f"; and {_thing(one)} ({one.probability:.2f})" for one in more)
+    also = "".join(f"; and {one['words']} ({one['probability']:.2f})" for one in more)
     said = (
-        f"Something is missing that no listed cause explains: {_thing(first)} "
-        f"(probability {first.probability:.2f}){also}."
+        f"Something is missing that no listed cause explains: {first['words']} "
+        f"(probability {first['probability']:.2f}){also}."
     )
-    close = [(label, p) for label, p in first.causes if p >= CLOSEST]
+    laws = [law for law in first["laws"] if law["probability"] >= LIKELY]
+    if laws and laws[0]["words"] != first["words"]:
+        said += f" Most likely it is {laws[0]['words']} ({laws[0]['probability']:.2f})."
+    return f"{said}{_dropped(d) or _closest(first)}"
+
+
+def _closest(finding: dict[str, Any]) -> str:
+    """Say which listed cause comes closest, if any does."""
+    close = [one for one in finding["causes"] if one["probability"] >= CLOSEST]
     if not close:
-        return said
-    label, p = close[0]
-    return f"{said} Of the listed causes {in_words(effect_labelled(label))} ({p:.2f}) comes closest."
+        return ""
+    words, p = close[0]["words"], close[0]["probability"]
+    return f" Of the listed causes {words} ({p:.2f}) comes closest."
 
 
-def _thing(finding: Finding) -> str:
-    """Return what is missing, as deep as it is known."""
-    joint = the(finding.joint) if finding.joint else "the machine"
-    if finding.level == "family":
-        return FAMILY[str(finding.family)].format(joint=joint)
-    if finding.level == "joint":
-        return f"something at {joint}"
-    if finding.repeats is None:
-        return "something that may repeat with the motion or not"
-    return "something that " + ("repeats" if finding.repeats else "does not repeat")
+def _dropped(d: Diagnosis) -> str:
+    """Say which causes are not named since they do harm on the validation runs."""
+    labels = sorted(dropped(d))
+    if not labels:
+        return ""
+    words = " and ".join(label_in_words(label, d.baseline.machine) for label in labels)
+    plural = len(labels) > 1
+    return (
+        f" {words[:1].upper()}{words[1:]} would explain the training runs, but "
+        f"{'raise' if plural else 'raises'} the error on the validation runs."
+    )
 
 
 def _named(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
@@ -144,9 +144,9 @@ def _named(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
         f"{before[most] / d.floor_rms[most]:.2f} times the noise floor, to "
         f"{amount(machine, joint, after[most])}, {_remains(d, most)}."
     )
-    rest = [one for one in d.selected.findings if one.level != "cause"]
-    also = "".join(f" Also missing: {_thing(one)} ({one.probability:.2f})." for one in rest)
-    return f"Missing from the simulation: {named}. {gain}{also}"
+    rest = [one for one in findings(d) if one["level"] != "cause"]
+    also = "".join(f" Also missing: {one['words']} ({one['probability']:.2f})." for one in rest)
+    return f"Missing from the simulation: {named}. {gain}{also}{_dropped(d)}"
 
 
 def _remains(d: Diagnosis, most: int) -> str:

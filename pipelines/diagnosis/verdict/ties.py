@@ -2,9 +2,6 @@
 
 from dataclasses import dataclass
 
-ALIKE = 0.1
-"""Odds against the named cause from which another counts as not told apart."""
-
 
 @dataclass(frozen=True)
 class Tie:

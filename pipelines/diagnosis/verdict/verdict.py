@@ -13,6 +13,7 @@ from pipelines.diagnosis.verdict.cause_evidence import cause_evidence
 from pipelines.diagnosis.verdict.caveats import caveats
 from pipelines.diagnosis.verdict.control_benefit import control
 from pipelines.diagnosis.verdict.error_budget import error_budget
+from pipelines.diagnosis.verdict.findings_in_words import findings
 from pipelines.diagnosis.verdict.summary import finding_in_words, floor_from, summary
 from pipelines.diagnosis.verdict.ties import tie_between
 from pipelines.diagnosis.verdict.unexplained import unexplained
@@ -34,7 +35,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "status": d.status,
         "summary": summary(d, causes, left),
         "finding": None if d.data.spoilt else finding_in_words(d, causes, left),
-        "findings": [one.as_json() for one in d.selected.findings],
+        "findings": findings(d),
         "router": {joint.name: shares.as_json() for joint, shares in zip(joints, d.selected.router, strict=True)},
         "posterior": _posterior(d),
         "acquisition_at_fault": bool(d.data.spoilt),

@@ -1,96 +1,234 @@
-"""The first figure: how each joint's residual repeats, and how probable each explanation is."""
+"""The first figure: how each joint's residual repeats, what it depends on, and what explains it."""
 
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from textwrap import fill
 from typing import Any
 
+import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from pipelines.contracts.joints import the
-from pipelines.diagnosis.candidates.smooth_laws import IN_WORDS
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.label import effect_labelled, in_words
-from pipelines.plots import BLUE, CAUSES, GREY, NOISE, WANDERS
+from pipelines.diagnosis.verdict.findings_in_words import LAW, dropped, family_of, label_in_words
+from pipelines.findings import PARTS, VARIABLES
+from pipelines.plots import BLUE, GREY, NOISE, WANDERS
 
-PARTS = {
-    "noise": ("noise", NOISE),
-    "wanders": ("wanders from period to period", WANDERS),
-    "between_runs": ("differs between runs", CAUSES[1]),
-    "repeats": ("repeats with the motion", BLUE),
-    "unsplit": ("more than noise; no period tells whether it repeats", GREY),
-}
-"""Shares of the residual, in words, and their colours."""
-SHOWN = 8
-"""Sets of causes and laws in the figure."""
+COLOURS = {
+    "noise": NOISE, "wanders": WANDERS, "between_runs": "#5b87e5", "repeats": BLUE, "unsplit": GREY,
+}  # fmt: skip
+"""Of the residual's parts: the more of it a model could explain, the darker."""
+DARK = ("repeats", "unsplit", "between_runs")
+"""Parts on which numbers are white."""
+ORDER = ("noise", "wanders", "between_runs", "unsplit", "repeats")
+FAMILIES = {
+    "person": "#3b0764", "transmission": "#7c2d12", "angle": "#7e22ce", "speed": "#0f766e",
+    "load": "#ea580c", "reversal": "#65a30d", "sensor": "#f59e0b", "time": "#fde68a",
+}  # fmt: skip
+"""Of each family of laws, by rising lightness, so that they differ in grey too."""
+UNLISTED = "////"
+"""Hatching of a law that nobody listed."""
+SHOWN, LEAST = 6, 0.01
+"""Sets in the figure at most, and the least probable one: the others share one bar."""
 TEXT = 0.08
 """Share of a bar in which its number fits."""
+TELLING = 0.05
+"""Share that a variable must predict to be shown, except the usual ones."""
+OTHERS = 3
+"""Variables besides the usual ones."""
+SHORT = {"acceleration": "accel-\neration"}
+"""Names that need two lines."""
+NEGLIGIBLE = 0.01
+"""Share that has no entry in the legend."""
+PERSON = "of it with a person only"
+LABEL = 34
+"""Characters in a line of a label."""
+LINE_IN, SMALLEST_IN, FEWEST = 0.17, 4.4, 17
+"""Height of a line of a label, least height of the figure, and lines that it has room for."""
+SHADES = LinearSegmentedColormap.from_list("shares", ["#ffffff", BLUE])
+NOTHING = "nothing is missing"
+PROBABILITY = "probability of each set of causes and laws; bold: named, or tied with it"
+BAR: dict[str, Any] = {"height": 0.6, "edgecolor": "white", "lw": 0.8}
+AGAINST = " (validation runs against it)"
 
 
 def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
     """Draw the residual's shares on the left, and the posterior over sets on the right."""
-    drawn, (left, right) = plt.subplots(1, 2, figsize=(11, 3.6), width_ratios=[1, 1.1])
-    _shares(left, said)
-    _sets(right, d)
-    drawn.tight_layout()
+    bars = _bars(d)
+    lines = sum(_height(bar) for bar in bars)
+    drawn = plt.figure(figsize=(11, max(SMALLEST_IN, LINE_IN * lines + 1.3)), layout="constrained")
+    grid = drawn.add_gridspec(2, 2, width_ratios=[1, 1.1], height_ratios=[1.25, 1])
+    _shares(drawn.add_subplot(grid[0, 0]), said)
+    _dependence(drawn.add_subplot(grid[1, 0]), said)
+    _sets(drawn.add_subplot(grid[:, 1]), bars)
+    drawn.draw_without_rendering()  # lays out, which whoever measures the figure relies on
     return drawn
 
 
-def _shares(axis: Axes, said: dict[str, Any]) -> None:
-    joints = list(said["router"])
+def _shares(axis: Axes, said: Mapping[str, Any]) -> None:
+    """Draw a bar for each joint, cut into what its residual is made of."""
     seen: dict[str, Patch] = {}
-    for row, joint in enumerate(joints):
+    router = said["router"]
+    for row, told in enumerate(router.values()):
         start = 0.0
-        for part, (words, colour) in PARTS.items():
-            share = said["router"][joint][part] or 0.0
-            if share <= 0.0:
-                continue
-            axis.barh(row, share, left=start, color=colour, height=0.6, edgecolor="white", lw=0.5)
+        for part in ORDER:
+            share = told[part] or 0.0
+            axis.barh(row, share, left=start, color=COLOURS[part], **BAR)
             if share > TEXT:
-                dark = part in ("repeats", "unsplit")
-                axis.text(
-                    start + 0.5 * share, row, f"{share:.0%}", ha="center", va="center", fontsize=8,
-                    color="white" if dark else "black",
-                )  # fmt: skip
-            seen.setdefault(words, Patch(color=colour))
+                _number(axis, row, start, share, part)
+            if share > NEGLIGIBLE:
+                seen[PARTS[part]] = Patch(color=COLOURS[part])
             start += share
+            person = min(told["with_person_only"] or 0.0, share) if part == "repeats" else 0.0
+            if person > NEGLIGIBLE:
+                axis.barh(
+                    row, person, left=start - person, height=0.6, fill=False, hatch="..",
+                    edgecolor="white", lw=0,
+                )  # fmt: skip
+                seen[PERSON] = Patch(facecolor=BLUE, hatch="...", edgecolor="white")
     units = {joint: of["torque"] for joint, of in said["units"].items()}
-    names = [f"{j}\n{said['router'][j]['rms_nm']:.3g} {units[j]} rms" for j in joints]
-    axis.set_yticks(range(len(joints)), names)
-    axis.set_ylim(len(joints) - 0.5, -0.5)
+    names = [f"{j}\n{router[j]['rms_nm']:.3g} {units[j]} rms" for j in router]
+    axis.set_yticks(range(len(names)), names)
+    axis.set_ylim(len(names) - 0.5, -0.5)
     axis.set_xlim(0.0, 1.0)
-    axis.set_xlabel("share of the baseline residual's mean square (0.1 s averages)")
+    axis.grid(visible=False)
+    axis.xaxis.set_major_formatter(lambda x, _: f"{x:.0%}")
+    axis.set_xlabel("share of the mean square, 0.1 s averages, training runs", fontsize=8)
+    words = [one for one in (*map(PARTS.get, ORDER), PERSON) if one in seen]
     axis.legend(
-        seen.values(), seen.keys(), loc="upper left", bbox_to_anchor=(-0.02, -0.18), fontsize=8,
-        ncols=2,
+        [seen[one] for one in words], words, loc="upper left", bbox_to_anchor=(-0.02, -0.32),
+        fontsize=8, ncols=2,
     )  # fmt: skip
-    axis.set_title("Does the residual repeat?", loc="left", fontweight="bold")
+    _title(axis, "Does the error of rigid body and friction repeat?")
 
 
-def _sets(axis: Axes, d: Diagnosis) -> None:
-    axis.set_title("What explains it?", loc="left", fontweight="bold")
-    if d.selected.posterior is None:
-        axis.text(0.0, 0.5, "not asked: acquisition is at fault", transform=axis.transAxes)
+def _number(axis: Axes, row: int, start: float, share: float, part: str) -> None:
+    axis.text(
+        start + 0.5 * share, row, f"{share:.0%}", ha="center", va="center", fontsize=8,
+        color="white" if part in DARK else "black", zorder=3,
+        bbox={"facecolor": COLOURS[part], "edgecolor": "none", "pad": 1},
+    )  # fmt: skip
+
+
+def _dependence(axis: Axes, said: Mapping[str, Any]) -> None:
+    """Draw a field for each joint and variable: how much of the error a curve of it predicts."""
+    ranked = {
+        joint: {one["variable"]: one["share_before"] for one in ranking}
+        for joint, ranking in said["depends_on"].items()
+    }
+    variables = _variables(ranked)
+    shares = np.array([[of.get(name, np.nan) for name in variables] for of in ranked.values()])
+    axis.imshow(shares, cmap=SHADES, vmin=0.0, vmax=1.0, aspect="auto")
+    for (row, column), share in np.ndenumerate(shares):
+        text = "–" if np.isnan(share) else f"{share:.0%}"
+        colour = "white" if share > 0.5 else "black"
+        axis.text(column, row, text, ha="center", va="center", fontsize=8, color=colour)
+    words = [SHORT.get(name, name.replace("_", "\n")) for name in variables]
+    axis.set_xticks(range(len(variables)), words, fontsize=8)
+    axis.set_yticks(range(len(ranked)), list(ranked))
+    axis.grid(visible=False)
+    axis.tick_params(length=0)
+    for spine in axis.spines.values():
+        spine.set_visible(False)
+    axis.set_xlabel("share that a curve of it alone predicts, validation runs", fontsize=8)
+    _title(axis, "What does it depend on?")
+
+
+def _variables(ranked: Mapping[str, Mapping[str, float]]) -> list[str]:
+    """Return the usual variables, and others that are telling; the phase is what repeats."""
+    every = dict.fromkeys(name for of in ranked.values() for name in of if name != "phase")
+    most = {name: max(of.get(name, 0.0) for of in ranked.values()) for name in every}
+    usual = [name for name in VARIABLES if name in every]
+    others = [name for name in every if name not in usual and most[name] >= TELLING]
+    return usual + sorted(others, key=lambda name: -most[name])[:OTHERS]
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A set of causes and laws, or several that share a bar."""
+
+    probability: float
+    elements: tuple[tuple[str, str | None, bool, bool], ...]
+    """Words, family, whether unlisted, and whether an answer, of each."""
+
+
+def _bars(d: Diagnosis) -> list[Bar]:
+    """Return the most probable sets, the others together last."""
+    weighed = d.selected.posterior
+    if weighed is None:
+        return []
+    ranked = sorted(weighed.by_labels.items(), key=lambda item: -item[1])
+    shown = [(labels, p) for labels, p in ranked[:SHOWN] if p >= LEAST]
+    bars = [Bar(p, tuple(_elements(d, labels))) for labels, p in shown]
+    rest = 1.0 - sum(p for _, p in shown)
+    if rest >= 0.5 * LEAST:
+        others = len(ranked) - len(shown)
+        words = f"{others} other set{'s' * (others > 1)}"
+        bars.append(Bar(rest, ((words, None, False, False),)))
+    return bars
+
+
+def _elements(d: Diagnosis, labels: frozenset[str]) -> Iterator[tuple[str, str | None, bool, bool]]:
+    weighed = d.selected.posterior
+    if not labels or weighed is None:
+        yield NOTHING, None, False, d.status == "nothing_missing"
+    answers = {label for one in d.named for label in (one.element.label, *dict(one.ties))}
+    against = dropped(d)
+    for label in sorted(labels, key=lambda one: (one.startswith(LAW), one)):
+        assert weighed is not None
+        words = label_in_words(label, d.baseline.machine) + AGAINST * (label in against)
+        family, unlisted = family_of(label, weighed), label.startswith(LAW)
+        yield fill(words, LABEL), family, unlisted, label in answers
+
+
+def _height(bar: Bar) -> float:
+    """Return how many lines a bar takes, with the gap below it."""
+    return sum(1.3 + words.count("\n") for words, *_ in bar.elements) + 0.6
+
+
+def _sets(axis: Axes, bars: list[Bar]) -> None:
+    """Draw a bar for each set, with a stripe for each of its elements."""
+    _title(axis, "What explains it?")
+    if not bars:
+        axis.text(0.0, 0.9, "not asked: acquisition is at fault", transform=axis.transAxes)
         axis.set_axis_off()
         return
-    ranked = sorted(d.selected.posterior.by_labels.items(), key=lambda item: -item[1])[:SHOWN]
-    named = frozenset(d.causes)
-    for row, (labels, p) in enumerate(ranked):
-        colour = CAUSES[0] if labels == named else GREY
-        axis.barh(row, p, color=colour, height=0.65)
-        axis.text(p + 0.01, row, f"{p:.2f}" if p >= 0.005 else f"{p:.0e}", va="center", fontsize=8)
-    axis.set_yticks(range(len(ranked)), [_in_words(labels) for labels, _ in ranked], fontsize=8)
-    axis.set_ylim(len(ranked) - 0.5, -0.5)
-    axis.set_xlim(0.0, 1.12)
-    axis.set_xlabel("probability of each set of causes and unlisted laws")
+    ticks, families, top = [], dict[str, Patch](), 0.0
+    for bar in bars:
+        begin = top
+        for words, family, unlisted, named in bar.elements:
+            height = 1.3 + words.count("\n")
+            colour = FAMILIES.get(str(family), GREY)
+            axis.barh(
+                top + 0.5 * height, bar.probability, height=height, color=colour,
+                hatch=UNLISTED if unlisted else None, edgecolor="white", lw=0.8,
+            )  # fmt: skip
+            ticks.append((top + 0.5 * height, words, named))
+            if family:
+                families[family] = Patch(color=colour)
+            top += height
+        middle = 0.5 * (begin + top)
+        axis.text(bar.probability + 0.015, middle, f"{bar.probability:.2f}", va="center")
+        top += 0.6
+    axis.set_yticks([y for y, *_ in ticks], [words for _, words, _ in ticks], fontsize=8)
+    for label, (*_, named) in zip(axis.get_yticklabels(), ticks, strict=True):
+        label.set_fontweight("bold" if named else "normal")
+    axis.set_ylim(max(top, FEWEST), -0.4)
+    axis.set_xlim(0.0, 1.1)
+    axis.grid(axis="y", visible=False)
+    axis.set_axisbelow(True)
+    axis.tick_params(axis="y", length=0)
+    axis.set_xlabel(PROBABILITY, fontsize=8)
+    if any(unlisted for bar in bars for _, _, unlisted, _ in bar.elements):
+        families["unlisted law"] = Patch(facecolor=GREY, hatch=UNLISTED, edgecolor="white")
+    axis.legend(
+        families.values(), families.keys(), loc="upper left", bbox_to_anchor=(-0.02, -0.14),
+        fontsize=8, ncols=4,
+    )  # fmt: skip
 
 
-def _in_words(labels: frozenset[str]) -> str:
-    return " +\n".join(_label_in_words(label) for label in sorted(labels)) or "nothing is missing"
-
-
-def _label_in_words(label: str) -> str:
-    if not label.startswith("law:"):
-        return in_words(effect_labelled(label))
-    kind, _, joint = label.removeprefix("law:").partition("@")
-    return IN_WORDS[kind].format(joint=the(joint))
+def _title(axis: Axes, words: str) -> None:
+    axis.set_title(words, loc="left", fontsize=10, fontweight="bold")

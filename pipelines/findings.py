@@ -1,0 +1,158 @@
+"""What a verdict finds, as rows to be shown: how sure it is that something is missing, and what.
+
+For terminal and report alike, from the keys ``findings``, ``router`` and ``posterior`` of a
+verdict; files of older versions lack these, and then nothing is shown.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+LEAST = 0.01
+"""Probability below which an alternative is not shown."""
+TIED = "one of these, which these data cannot tell apart"
+UNLISTED = "unlisted: "
+AGAINST = ", not named: the validation runs speak against it"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One of three cases of which exactly one is so."""
+
+    key: str
+    words: str
+    """What is missing."""
+    probability: float
+    """Rounded to hundredths, so that the three add up to one as they are shown."""
+
+
+@dataclass
+class Node:
+    """What is missing at some depth: that something is, where, of which family, which cause."""
+
+    words: str
+    probability: float
+    is_answer: bool = False
+    """Whether it is the deepest that the data support."""
+    below: dict[Any, "Node"] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of the tree of findings."""
+
+    depth: int
+    words: str
+    probability: float
+    is_answer: bool
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Of one joint: what its residual is made of, and what one variable alone predicts of it."""
+
+    joint: str
+    rms: float
+    parts: dict[str, float]
+    """Shares of the mean square by the router's names; they add up to one."""
+    with_person_only: float | None
+    """Part of what repeats."""
+    predicted: dict[str, float]
+    """Share of the variance that a curve of one variable predicts; these overlap."""
+
+
+PARTS = {
+    "noise": "noise",
+    "repeats": "repeats with the motion",
+    "wanders": "wanders from period to period",
+    "between_runs": "differs from run to run",
+    "unsplit": "more than noise, without periods to tell whether it repeats",
+}
+"""The router's parts in words, as they are shown."""
+VARIABLES = ("angle", "speed", "load", "time", "tone")
+"""Variables whose share is shown."""
+
+
+def outcomes(verdict: Mapping[str, Any]) -> tuple[Outcome, ...]:
+    """Return the three cases and their probabilities; nothing where physics was not looked at."""
+    told = verdict.get("posterior")
+    if not told:
+        return ()
+    nothing, unlisted = round(told["nothing_missing"], 2), round(told["unlisted"], 2)
+    listed = round(max(1.0 - nothing - unlisted, 0.0), 2)
+    return (
+        Outcome("nothing", "nothing", nothing),
+        Outcome("listed", "listed causes only", listed),
+        Outcome("unlisted", "something unlisted", round(1.0 - nothing - listed, 2)),
+    )
+
+
+def rows(verdict: Mapping[str, Any]) -> list[Row]:
+    """Return the tree of findings, each node above what it holds; empty where nothing is found."""
+    root = Node("", 1.0)
+    for finding in verdict.get("findings") or ():
+        _grow(root, finding)
+    return [row for node in root.below.values() for row in _rows_of(node, 0)]
+
+
+def shares(verdict: Mapping[str, Any]) -> list[Shares]:
+    """Return how each joint's residual splits."""
+    found = []
+    slides = all(of["angle"] == "m" for of in verdict["units"].values())
+    for joint, told in (verdict.get("router") or {}).items():
+        depends = {one["variable"]: one["share_before"] for one in verdict["depends_on"][joint]}
+        found.append(
+            Shares(
+                joint, told["rms_nm"], {part: told[part] or 0.0 for part in PARTS},
+                told["with_person_only"],
+                {
+                    "position" if slides and name == "angle" else name: depends[name]
+                    for name in VARIABLES
+                    if name in depends
+                },
+            )
+        )  # fmt: skip
+    return found
+
+
+def _grow(root: Node, finding: Mapping[str, Any]) -> None:
+    """Add a finding's path to the tree, and what could be the answer at its end."""
+    node, is_cause = root, finding["level"] == "cause"
+    path = finding["path"]
+    # That something is missing is one of the outcomes; it is a line only where no more is known.
+    for one in path[1 : len(path) - is_cause] or path[: 1 - is_cause]:
+        node = _under(node, (one["level"], one["value"]), one["words"], one["probability"])
+    if is_cause:
+        _answer(node, path[-1], finding)
+    else:
+        node.is_answer = True
+        for cause in finding["causes"]:
+            _alternative(node, cause["words"] + AGAINST * cause["dropped"], cause)
+    for law in finding["laws"]:
+        _alternative(node, UNLISTED + law["words"], law)
+
+
+def _answer(node: Node, last: Mapping[str, Any], finding: Mapping[str, Any]) -> None:
+    """Add a named cause, with those that are tied with it below one line for all of them."""
+    first, *ties = finding["causes"]
+    words = TIED if ties else first["words"]
+    here = _under(node, (last["level"], last["value"]), words, finding["probability"])
+    here.is_answer = True
+    if ties:
+        for cause in finding["causes"]:
+            _under(here, cause["words"], cause["words"], cause["probability"])
+
+
+def _alternative(node: Node, words: str, told: Mapping[str, Any]) -> None:
+    if told["probability"] >= LEAST:
+        _under(node, words, words, told["probability"])
+
+
+def _under(node: Node, key: Any, words: str, probability: float) -> Node:
+    return node.below.setdefault(key, Node(words, probability))
+
+
+def _rows_of(node: Node, depth: int) -> Iterator[Row]:
+    yield Row(depth, node.words, node.probability, node.is_answer)
+    for below in node.below.values():
+        yield from _rows_of(below, depth + 1)

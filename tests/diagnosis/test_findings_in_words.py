@@ -1,0 +1,117 @@
+"""What the verdict says of each finding: its words, its path, and the unlisted laws beside it."""
+
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pipelines.contracts import HIP_AND_KNEE, Joint
+from pipelines.diagnosis.selection.answer import answer_of
+from pipelines.diagnosis.selection.evidence import Element
+from pipelines.diagnosis.selection.findings import findings as read_off
+from pipelines.diagnosis.selection.posterior import Posterior
+from pipelines.diagnosis.verdict.findings_in_words import dropped, findings
+from pipelines.label import effect_labelled
+
+
+def cause(name: str, joint: str | None, family: str, repeats: bool = True) -> Element:
+    label = f"{name}@{joint}" if joint else name
+    return Element(label, name, joint, family, False, [0], [1.0], repeats=repeats)
+
+
+def law(kind: str, joint: str, family: str, repeats: bool = True) -> Element:
+    label = f"law:{kind}@{joint}"
+    return Element(label, kind, joint, family, True, [0], [1.0], repeats=repeats)
+
+
+ELEMENTS = (
+    cause("coulomb_asymmetry", "hip", "speed"),
+    cause("torque_offset", "hip", "sensor"),
+    cause("base_tilt", None, "angle"),
+    law("angle", "knee", "angle"),
+    law("hum", "knee", "time", repeats=False),
+    cause("cogging", "knee", "angle"),
+    cause("payload_change", "hip", "time", repeats=False),
+)
+SPEED, OFFSET, TILT, ANGLE, HUM, COGGING, PAYLOAD = range(len(ELEMENTS))
+
+
+def diagnosed(sets, ratios=(), joints=HIP_AND_KNEE):
+    """Return what is read of a diagnosis, of sets with their probabilities."""
+    order = sorted(sets, key=lambda chosen: -sets[chosen])
+    p = np.array([sets[chosen] for chosen in order])
+    weighed = Posterior(ELEMENTS, tuple(order), p / p.sum())
+    answer = answer_of(weighed).judged(dict(ratios))
+    labels = tuple(one.element.label for one in answer.named)
+    return SimpleNamespace(
+        selected=SimpleNamespace(posterior=weighed, answer=answer, findings=tuple(read_off(weighed, answer))),
+        baseline=SimpleNamespace(machine=SimpleNamespace(joint={joint.name: joint for joint in joints}.get)),
+        effects={label: effect_labelled(label) for label in labels},
+        effect_of=effect_labelled,
+        causes=labels,
+        named=answer.named,
+        status="explained" if labels else "unknown_cause",
+    )
+
+
+def levels(finding):
+    return [(node["level"], node["value"]) for node in finding["path"]]
+
+
+def test_a_tie_over_two_families_is_told_at_the_joint_and_of_no_family():
+    (found,) = findings(diagnosed({(SPEED,): 0.55, (OFFSET,): 0.42, (): 0.03}))
+    assert levels(found) == [
+        ("missing", True), ("repeats", True), ("joint", "hip"), ("cause", "coulomb_asymmetry@hip"),
+    ]  # fmt: skip
+    assert [one["family"] for one in found["causes"]] == ["speed", "sensor"]
+    assert found["words"] == "Coulomb asymmetry at the hip"
+
+
+def test_a_tie_over_two_joints_is_told_of_no_joint():
+    (found,) = findings(diagnosed({(SPEED,): 0.5, (TILT,): 0.47, (): 0.03}))
+    assert [level for level, _ in levels(found)] == ["missing", "repeats", "cause"]
+
+
+@pytest.mark.parametrize(
+    "sets",
+    [
+        {(SPEED,): 0.55, (OFFSET,): 0.42, (): 0.03},
+        {(SPEED, PAYLOAD): 0.6, (OFFSET,): 0.3, (PAYLOAD,): 0.1},
+        {(ANGLE,): 0.7, (COGGING,): 0.2, (HUM,): 0.1},
+        {(ANGLE, HUM): 0.6, (COGGING, HUM): 0.3, (HUM,): 0.05, (): 0.05},
+    ],
+)
+def test_no_node_of_a_path_is_more_probable_than_the_one_above(sets):
+    for found in findings(diagnosed(sets)):
+        likely = [node["probability"] for node in found["path"]]
+        assert all(below <= above + 1e-12 for above, below in pairwise(likely))
+
+
+def test_an_unlisted_law_is_said_in_words_with_the_closest_listed_cause():
+    (found,) = findings(diagnosed({(ANGLE,): 0.7, (COGGING,): 0.2, (): 0.1}))
+    assert (found["level"], found["words"]) == ("family", "a law of the knee's angle")
+    (unlisted,) = found["laws"]
+    assert unlisted["words"] == "a law of the knee's angle"
+    assert unlisted["probability"] == pytest.approx(0.7)
+    assert [(one["words"], one["dropped"]) for one in found["causes"]] == [("cogging at the knee", False)]
+
+
+def test_a_joint_that_slides_has_a_law_of_its_position_and_a_force():
+    slides = Joint("hip"), Joint("knee", "prismatic")
+    (found,) = findings(diagnosed({(ANGLE,): 0.7, (HUM,): 0.2, (): 0.1}, joints=slides))
+    assert found["words"] == "a law of the knee's position"
+    assert found["laws"][0]["words"] == "a law of the knee's position"
+
+
+def test_a_cause_that_does_harm_on_the_validation_runs_is_said_to_be_dropped():
+    d = diagnosed({(COGGING,): 0.97, (): 0.03}, {"cogging@knee": -8.0})
+    assert d.causes == ()
+    assert dropped(d) == {"cogging@knee"}
+    (found,) = findings(d)
+    assert found["level"] == "family"
+    assert found["causes"][0]["dropped"]
+
+
+def test_where_nothing_is_missing_nothing_is_found():
+    assert findings(diagnosed({(): 0.9, (SPEED,): 0.1})) == []
