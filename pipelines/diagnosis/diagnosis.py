@@ -23,7 +23,7 @@ from pipelines.diagnosis.fit.validation import Validated, gains_of
 from pipelines.diagnosis.fit.validation_error import Gain, errors_of
 from pipelines.diagnosis.selection.answer import Answer, Named
 from pipelines.diagnosis.selection.evidence import Evidence
-from pipelines.diagnosis.selection.findings import Finding, findings
+from pipelines.diagnosis.selection.findings import LIKELY, Finding, findings
 from pipelines.diagnosis.selection.posterior import Posterior
 from pipelines.effects import Effect
 from pipelines.effects.force_sensor_zero import ForceSensorZero
@@ -119,10 +119,13 @@ class Diagnosis:
         if self.data.spoilt:
             return "unknown_cause"
         if not self.named:
-            missing = self.selected.answer.nothing < 0.5
+            missing = 1.0 - self.selected.answer.nothing >= LIKELY
             return "unknown_cause" if missing else "nothing_missing"
         left = [share for share in self.unexplained if share is not None]
-        return "explained" if all(s <= EXPLAINED for s in left) else "partly_explained"
+        is_gone = all(share <= EXPLAINED for share in left)
+        more = any(one.level != "cause" for one in self.selected.findings)
+        more |= self.selected.answer.unlisted >= LIKELY
+        return "explained" if is_gone and not more else "partly_explained"
 
     @property
     def floor_rms(self) -> NDArray:

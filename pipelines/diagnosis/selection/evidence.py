@@ -211,7 +211,8 @@ def _shown(kind: Kind, joint: int, prepared: Prepared) -> list[Shown]:
 
 def _of_cause(number: int, cause: Cause, at: _Places, laws: Laws, prepared: Prepared, two: bool) -> Element:
     effect, names = cause.candidate.effect, prepared.baseline.joints
-    tracked = isinstance(effect, Cogging) and cause.candidate.shapes[0] == orders_of(effect.joint, prepared)
+    is_ripple = isinstance(effect, Cogging) and effect.joint is not None
+    tracked = is_ripple and cause.candidate.shapes[0] == orders_of(str(effect.joint), prepared)
     places = at.causes[number].tolist()
     resembles = list(_resembled(effect, laws, names, two))
     total = sum(v for _, v in resembles)

@@ -4,18 +4,21 @@ Findings form a tree: whether it repeats with the motion, at which joint, which 
 belongs to, which cause it is. Each is told at the deepest node whose probability reaches one half.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pipelines.diagnosis.selection.answer import Answer
-from pipelines.diagnosis.selection.evidence import Element
+from pipelines.diagnosis.selection.answer import Answer, Named
 from pipelines.diagnosis.selection.posterior import Posterior
 
 LIKELY = 0.5
 """Probability from which a node is told."""
 CLOSEST = 3
 """Listed causes that are told where none is named."""
+LEVELS = ("repeats", "joint", "family")
+"""From the root to the causes: attributes of elements."""
+Inside = frozenset[int]
+"""Numbers of the elements that a node holds."""
 
 
 @dataclass(frozen=True)
@@ -28,10 +31,16 @@ class Finding:
     joint: str | None
     family: str | None
     probability: float
+    """Of a cause with its ties, or of something in the deepest node besides what others tell."""
     causes: tuple[tuple[str, float], ...]
     """Listed causes that come closest, with their probabilities."""
+    laws: tuple[tuple[str, float], ...]
+    """Unlisted laws in the deepest node above a cause, with their probabilities."""
     path: tuple[tuple[str, Any, float], ...]
-    """Level, value and probability of each node on the way."""
+    """Level, value and probability of each node on the way, each within the one before it.
+
+    Where tied causes belong to several families or joints, none holds all, and none is on the path.
+    """
 
     def as_json(self) -> dict[str, Any]:
         """Return what the verdict says of it."""
@@ -52,90 +61,102 @@ def _cause(label: str, probability: float) -> dict[str, Any]:
 
 def findings(posterior: Posterior, answer: Answer) -> list[Finding]:
     """Return what is missing, the most probable first; empty where nothing is."""
-    missing = 1.0 - posterior.nothing
-    if missing < LIKELY:
+    if 1.0 - posterior.nothing < LIKELY:
         return []
-    root = ("missing", True, missing)
-    told = [_of_cause(posterior, answer, n, root) for n in range(len(answer.named))]
-    covered = {(finding.joint, finding.family) for finding in told}
-    told += list(_families(posterior, root, covered))
-    if not told:
-        told += list(_joints(posterior, root)) or [_repeatability(posterior, root)]
-    return sorted(told, key=lambda finding: -finding.probability)
+    found = [_of_cause(posterior, named) for named in answer.named]
+    told = {label for one in found for label, _ in one.causes}
+    rest = frozenset(i for i, element in enumerate(posterior.elements) if element.label not in told)
+    found += _remainder(posterior, rest)
+    return sorted(found, key=lambda finding: -finding.probability)
 
 
-def _of_cause(posterior: Posterior, answer: Answer, number: int, root: tuple[str, Any, float]) -> Finding:
-    named = answer.named[number]
+def _of_cause(posterior: Posterior, named: Named) -> Finding:
     element = named.element
-    path = (root, *_path(posterior, element), ("cause", element.label, named.probability))
+    alternatives = ((element.label, named.alone), *named.ties)
+    labels = dict(alternatives)
+    members = [one for one in posterior.elements if one.label in labels]
+    shared = {
+        level: getattr(element, level)
+        for level in LEVELS
+        if all(getattr(one, level) == getattr(element, level) for one in members)
+    }
+    family = _within(posterior, {"joint": element.joint, "family": element.family})
     return Finding(
-        "cause", element.repeats, element.joint, element.family, named.probability,
-        ((element.label, named.alone), *named.ties), path,
+        "cause", element.repeats, element.joint, element.family, named.probability, alternatives,
+        tuple(_ranked(posterior, family, are_laws=True)),
+        (*_path(posterior, shared), ("cause", element.label, named.probability)),
     )  # fmt: skip
 
 
-def _path(posterior: Posterior, element: Element) -> Iterator[tuple[str, Any, float]]:
-    """Yield the nodes above an element."""
-    yield "repeats", element.repeats, _chance(posterior, lambda e: e.repeats == element.repeats)
-    yield "joint", element.joint, _chance(posterior, lambda e: e.joint == element.joint)
-    yield "family", element.family, _chance(posterior, _same(element))
+def _remainder(posterior: Posterior, rest: Inside) -> Iterator[Finding]:
+    """Yield what is likely among the elements that no named cause stands for, the deepest first."""
+    elements = posterior.elements
+    families = [{"joint": e.joint, "family": e.family} for e in elements]
+    joints = [{"joint": e.joint} for e in elements]
+    anything: dict[str, Any] = {}
+    for nodes in (families, joints, [anything]):
+        told: Inside = frozenset()
+        for node in _distinct(nodes):
+            for finding, inside in _likely(posterior, rest, node):
+                yield finding
+                told |= inside
+        rest -= told
 
 
-def _same(element: Element) -> Callable[[Element], bool]:
-    return lambda e: (e.joint, e.family) == (element.joint, element.family)
+def _distinct(nodes: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
+    return list({tuple(node.items()): node for node in nodes}.values())
 
 
-def _families(
-    posterior: Posterior, root: tuple[str, Any, float], covered: set[tuple[str | None, str | None]]
-) -> Iterator[Finding]:
-    """Yield families at joints that are likely and hold no named cause."""
-    for joint, family in dict.fromkeys((e.joint, e.family) for e in posterior.elements):
-        if (joint, family) in covered:
-            continue
+def _likely(posterior: Posterior, rest: Inside, node: Mapping[str, Any]) -> Iterator[tuple[Finding, Inside]]:
+    """Yield the findings of a node that are likely, and the elements of each.
 
-        def belongs(e: Element, joint: str | None = joint, family: str = family) -> bool:
-            return (e.joint, e.family) == (joint, family)
-
-        chance = _chance(posterior, belongs)
-        if chance < LIKELY:
-            continue
-        first = max(
-            (e for e in posterior.elements if belongs(e)),
-            key=lambda e: posterior.marginals.get(e.label, 0.0),
-        )
-        path = (root, *_path(posterior, first))
-        yield Finding("family", first.repeats, joint, family, chance, _closest(posterior, belongs), path)
+    Whether it repeats is left out where neither is likely.
+    """
+    repeating = [_finding(posterior, rest, {"repeats": r, **node}) for r in (True, False)]
+    likely = [one for one in repeating if one[0].probability >= LIKELY]
+    if not likely:
+        either = _finding(posterior, rest, node)
+        likely = [either] if either[0].probability >= LIKELY else []
+    yield from likely
 
 
-def _closest(posterior: Posterior, belongs: Callable[[Element], bool]) -> tuple[tuple[str, float], ...]:
-    """Return the listed causes that come closest, the most probable first."""
-    labels = {e.label for e in posterior.elements if belongs(e) and not e.is_law}
-    ranked = [(label, p) for label, p in posterior.marginals.items() if label in labels]
-    return tuple(ranked[:CLOSEST])
+def _finding(posterior: Posterior, rest: Inside, node: Mapping[str, Any]) -> tuple[Finding, Inside]:
+    """Return the finding that something of the rest lies within a node, and which elements do."""
+    inside = _within(posterior, node) & rest
+    deepest = [level for level in LEVELS if level in node] or ["repeats"]
+    finding = Finding(
+        "repeatability" if deepest[-1] == "repeats" else deepest[-1],
+        node.get("repeats"), node.get("joint"), node.get("family"), _chance(posterior, inside),
+        tuple(_ranked(posterior, inside, are_laws=False))[:CLOSEST],
+        tuple(_ranked(posterior, inside, are_laws=True)), _path(posterior, node),
+    )  # fmt: skip
+    return finding, inside
 
 
-def _joints(posterior: Posterior, root: tuple[str, Any, float]) -> Iterator[Finding]:
-    for joint in dict.fromkeys(e.joint for e in posterior.elements):
-        chance = _chance(posterior, lambda e, joint=joint: e.joint == joint)
-        if chance >= LIKELY:
-            path = (root, ("joint", joint, chance))
-            close = _closest(posterior, lambda e, joint=joint: e.joint == joint)
-            yield Finding("joint", None, joint, None, chance, close, path)
+def _path(posterior: Posterior, node: Mapping[str, Any]) -> tuple[tuple[str, Any, float], ...]:
+    """Return the way to a node, given by its value at some levels."""
+    path: list[tuple[str, Any, float]] = [("missing", True, 1.0 - posterior.nothing)]
+    above: dict[str, Any] = {}
+    for level in LEVELS:
+        if level in node:
+            above[level] = node[level]
+            path.append((level, node[level], _chance(posterior, _within(posterior, above))))
+    return tuple(path)
 
 
-def _repeatability(posterior: Posterior, root: tuple[str, Any, float]) -> Finding:
-    """Return that something is missing, and whether it repeats where that is likely."""
-    chances = {r: _chance(posterior, lambda e, r=r: e.repeats == r) for r in (True, False)}
-    repeats = max(chances, key=lambda r: chances[r])
-    chance, close = chances[repeats], _closest(posterior, lambda e: True)
-    if chance < LIKELY:
-        return Finding("repeatability", None, None, None, root[2], close, (root,))
-    path = (root, ("repeats", repeats, chance))
-    return Finding("repeatability", repeats, None, None, chance, close, path)
+def _within(posterior: Posterior, node: Mapping[str, Any]) -> Inside:
+    """Return the elements that have a node's values."""
+    pairs = enumerate(posterior.elements)
+    return frozenset(i for i, e in pairs if all(getattr(e, level) == value for level, value in node.items()))
 
 
-def _chance(posterior: Posterior, belongs: Callable[[Element], bool]) -> float:
-    """Return the probability that some element of the true set belongs to a node."""
-    inside = {i for i, element in enumerate(posterior.elements) if belongs(element)}
+def _ranked(posterior: Posterior, inside: Inside, *, are_laws: bool) -> Iterator[tuple[str, float]]:
+    """Yield the labels of causes or of laws, the most probable first, with their probabilities."""
+    labels = {posterior.elements[i].label for i in inside if posterior.elements[i].is_law == are_laws}
+    return ((label, p) for label, p in posterior.marginals.items() if label in labels)
+
+
+def _chance(posterior: Posterior, inside: Inside) -> float:
+    """Return the probability that the true set holds some of these elements."""
     pairs = zip(posterior.sets, posterior.probabilities, strict=True)
     return float(sum(p for chosen, p in pairs if not inside.isdisjoint(chosen)))

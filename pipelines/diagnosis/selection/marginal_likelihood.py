@@ -132,12 +132,12 @@ class MarginalLikelihood:
 
     def pairs(self, chosen: Sequence[int]) -> tuple[NDArray, NDArray]:
         """Return all pairs of different labels among elements, (p, 2), and rough log odds, (p,)."""
-        chosen = np.asarray(chosen, dtype=int)
-        labels = np.array([self.evidence.elements[i].label for i in chosen])
-        one, other = np.triu_indices(len(chosen), 1)
+        places = np.asarray(chosen, dtype=int)
+        labels = np.array([self.evidence.elements[i].label for i in places])
+        one, other = np.triu_indices(len(places), 1)
         apart = labels[one] != labels[other]
         one, other = one[apart], other[apart]
-        columns, sd, width = self._padded(chosen)
+        columns, sd, width = self._padded(places)
         odds = np.empty(len(one))
         for a in WIDTHS:
             for b in WIDTHS:
@@ -148,8 +148,8 @@ class MarginalLikelihood:
                     s = np.hstack([sd[one[some], :a], sd[other[some], :b]])
                     odds[some] = self._rough(c, s)
         own = self.lines + self.features @ self._weights
-        odds += own[chosen[one]] + own[chosen[other]] + self.criteria.further
-        return np.column_stack([chosen[one], chosen[other]]), odds
+        odds += own[places[one]] + own[places[other]] + self.criteria.further
+        return np.column_stack([places[one], places[other]]), odds
 
     def _padded(self, chosen: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Return elements' columns and prior sds padded to one width, and the width that counts."""
