@@ -121,6 +121,8 @@ class Diagnosis:
         if not self.named:
             missing = self.selected.answer.nothing < 0.5
             return "unknown_cause" if missing else "nothing_missing"
+        if any(finding.level != "cause" for finding in self.selected.findings):
+            return "partly_explained"
         left = [share for share in self.unexplained if share is not None]
         return "explained" if all(s <= EXPLAINED for s in left) else "partly_explained"
 

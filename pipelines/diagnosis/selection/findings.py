@@ -4,7 +4,7 @@ Findings form a tree: whether it repeats with the motion, at which joint, which 
 belongs to, which cause it is. Each is told at the deepest node whose probability reaches one half.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,9 @@ LIKELY = 0.5
 """Probability from which a node is told."""
 CLOSEST = 3
 """Listed causes that are told where none is named."""
+Node = tuple[str, Any, float]
+"""Level, value and probability of a node of the tree."""
+Belongs = Callable[[Element], bool]
 
 
 @dataclass(frozen=True)
@@ -30,8 +33,8 @@ class Finding:
     probability: float
     causes: tuple[tuple[str, float], ...]
     """Listed causes that come closest, with their probabilities."""
-    path: tuple[tuple[str, Any, float], ...]
-    """Level, value and probability of each node on the way."""
+    path: tuple[Node, ...]
+    """The nodes on the way, each within the one above."""
 
     def as_json(self) -> dict[str, Any]:
         """Return what the verdict says of it."""
@@ -64,29 +67,36 @@ def findings(posterior: Posterior, answer: Answer) -> list[Finding]:
     return sorted(told, key=lambda finding: -finding.probability)
 
 
-def _of_cause(posterior: Posterior, answer: Answer, number: int, root: tuple[str, Any, float]) -> Finding:
+def _of_cause(posterior: Posterior, answer: Answer, number: int, root: Node) -> Finding:
     named = answer.named[number]
-    element = named.element
-    path = (root, *_path(posterior, element), ("cause", element.label, named.probability))
+    element, causes = named.element, ((named.element.label, named.alone), *named.ties)
+    labels = {label for label, _ in causes}
+    members = [e for e in posterior.elements if e.label in labels]
+    path = (root, *_path(posterior, element, members), ("cause", element.label, named.probability))
     return Finding(
-        "cause", element.repeats, element.joint, element.family, named.probability,
-        ((element.label, named.alone), *named.ties), path,
-    )  # fmt: skip
+        "cause", element.repeats, element.joint, element.family, named.probability, causes, path
+    )
 
 
-def _path(posterior: Posterior, element: Element) -> Iterator[tuple[str, Any, float]]:
-    """Yield the nodes above an element."""
-    yield "repeats", element.repeats, _chance(posterior, lambda e: e.repeats == element.repeats)
-    yield "joint", element.joint, _chance(posterior, lambda e: e.joint == element.joint)
-    yield "family", element.family, _chance(posterior, _same(element))
+def _path(posterior: Posterior, element: Element, members: Sequence[Element]) -> Iterator[Node]:
+    """Yield the nodes that hold all members, each within those above it.
 
-
-def _same(element: Element) -> Callable[[Element], bool]:
-    return lambda e: (e.joint, e.family) == (element.joint, element.family)
+    Tied causes may be of several families or joints: no family or joint then holds them all.
+    """
+    nodes: list[tuple[str, Any, Belongs]] = [
+        ("repeats", element.repeats, lambda e: e.repeats == element.repeats),
+        ("joint", element.joint, lambda e: e.joint == element.joint),
+        ("family", element.family, lambda e: (e.joint, e.family) == (element.joint, element.family)),
+    ]
+    above: list[Belongs] = []
+    for level, value, belongs in nodes:
+        if all(map(belongs, members)):
+            above.append(belongs)
+            yield level, value, _chance(posterior, *above)
 
 
 def _families(
-    posterior: Posterior, root: tuple[str, Any, float], covered: set[tuple[str | None, str | None]]
+    posterior: Posterior, root: Node, covered: set[tuple[str | None, str | None]]
 ) -> Iterator[Finding]:
     """Yield families at joints that are likely and hold no named cause."""
     for joint, family in dict.fromkeys((e.joint, e.family) for e in posterior.elements):
@@ -96,15 +106,16 @@ def _families(
         def belongs(e: Element, joint: str | None = joint, family: str = family) -> bool:
             return (e.joint, e.family) == (joint, family)
 
-        chance = _chance(posterior, belongs)
-        if chance < LIKELY:
+        if _chance(posterior, belongs) < LIKELY:
             continue
         first = max(
             (e for e in posterior.elements if belongs(e)),
             key=lambda e: posterior.marginals.get(e.label, 0.0),
         )
-        path = (root, *_path(posterior, first))
-        yield Finding("family", first.repeats, joint, family, chance, _closest(posterior, belongs), path)
+        path = (root, *_path(posterior, first, [first]))
+        yield Finding(
+            "family", first.repeats, joint, family, path[-1][2], _closest(posterior, belongs), path
+        )
 
 
 def _closest(posterior: Posterior, belongs: Callable[[Element], bool]) -> tuple[tuple[str, float], ...]:
@@ -114,7 +125,7 @@ def _closest(posterior: Posterior, belongs: Callable[[Element], bool]) -> tuple[
     return tuple(ranked[:CLOSEST])
 
 
-def _joints(posterior: Posterior, root: tuple[str, Any, float]) -> Iterator[Finding]:
+def _joints(posterior: Posterior, root: Node) -> Iterator[Finding]:
     for joint in dict.fromkeys(e.joint for e in posterior.elements):
         chance = _chance(posterior, lambda e, joint=joint: e.joint == joint)
         if chance >= LIKELY:
@@ -123,7 +134,7 @@ def _joints(posterior: Posterior, root: tuple[str, Any, float]) -> Iterator[Find
             yield Finding("joint", None, joint, None, chance, close, path)
 
 
-def _repeatability(posterior: Posterior, root: tuple[str, Any, float]) -> Finding:
+def _repeatability(posterior: Posterior, root: Node) -> Finding:
     """Return that something is missing, and whether it repeats where that is likely."""
     chances = {r: _chance(posterior, lambda e, r=r: e.repeats == r) for r in (True, False)}
     repeats = max(chances, key=lambda r: chances[r])
@@ -134,8 +145,8 @@ def _repeatability(posterior: Posterior, root: tuple[str, Any, float]) -> Findin
     return Finding("repeatability", repeats, None, None, chance, close, path)
 
 
-def _chance(posterior: Posterior, belongs: Callable[[Element], bool]) -> float:
-    """Return the probability that some element of the true set belongs to a node."""
-    inside = {i for i, element in enumerate(posterior.elements) if belongs(element)}
+def _chance(posterior: Posterior, *nodes: Belongs) -> float:
+    """Return the probability that some element of the true set lies within all nodes."""
+    inside = {i for i, e in enumerate(posterior.elements) if all(node(e) for node in nodes)}
     pairs = zip(posterior.sets, posterior.probabilities, strict=True)
     return float(sum(p for chosen, p in pairs if not inside.isdisjoint(chosen)))

@@ -1,11 +1,10 @@
 """``findings`` of the verdict: what is missing at the depth that the data support, in words.
 
-A path leads from level to level, and each of its nodes lies within the one above. Where tied causes
-belong to several families or joints, no family or joint holds them all, so the path has no such
-node.
+A path leads from level to level. Where tied causes belong to several families or joints, no family
+or joint holds them all, so the path has no such node.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 from pipelines.contracts.joints import the
@@ -33,7 +32,6 @@ LAW = "law:"
 """What the label of an unlisted law begins with."""
 WORTH_A_LINE = 0.01
 """Probability below which a law is not listed with a finding."""
-Belongs = Callable[[Element], bool]
 
 
 def findings(d: Diagnosis) -> list[dict[str, Any]]:
@@ -78,46 +76,12 @@ def _as_json(d: Diagnosis, finding: Finding, weighed: Posterior) -> dict[str, An
             "family": family_of(label, weighed), "words": in_words(effect),
             "dropped": label in against,
         }  # fmt: skip
-    path = _path(finding, weighed)
-    told["path"] = [node | {"words": _node_in_words(node, told, machine)} for node in path]
+    told["path"] = [node | {"words": _node_in_words(node, told, machine)} for node in told["path"]]
     told["laws"] = list(_laws(finding, weighed, machine))
-    if finding.level != "cause":
-        told["probability"] = told["path"][-1]["probability"]
     last = told["path"][-1]["words"]
     # Where it is unknown whether it repeats, the path ends at its beginning.
     told["words"] = last if len(told["path"]) > 1 else "something that may repeat or not"
     return told
-
-
-def _path(finding: Finding, weighed: Posterior) -> Iterator[dict[str, Any]]:
-    """Yield the nodes that hold all that could be the answer, each within those above it."""
-    labels = dict(finding.causes) if finding.level == "cause" else {}
-    members = [element for element in weighed.elements if element.label in labels]
-    above: list[Belongs] = []
-    for node in finding.as_json()["path"]:
-        if node["level"] in ("missing", "cause"):
-            yield node
-            continue
-        belongs = _belongs(node["level"], finding)
-        if all(map(belongs, members)):
-            above.append(belongs)
-            yield node | {"probability": _chance(weighed, above)}
-
-
-def _chance(weighed: Posterior, nodes: Sequence[Belongs]) -> float:
-    """Return the probability that some element of the true set lies within all nodes."""
-    inside = {i for i, e in enumerate(weighed.elements) if all(node(e) for node in nodes)}
-    pairs = zip(weighed.sets, weighed.probabilities, strict=True)
-    return float(sum(p for chosen, p in pairs if not inside.isdisjoint(chosen)))
-
-
-def _belongs(level: str, finding: Finding) -> Belongs:
-    """Return whether an element lies within the node of a level on a finding's path."""
-    if level == "repeats":
-        return lambda e: e.repeats == finding.repeats
-    if level == "joint":
-        return lambda e: e.joint == finding.joint
-    return lambda e: (e.joint, e.family) == (finding.joint, finding.family)
 
 
 def _node_in_words(node: dict[str, Any], finding: dict[str, Any], machine: Machine) -> str:
@@ -143,11 +107,16 @@ def _law_of(label: str) -> tuple[str, str]:
 
 def _laws(finding: Finding, weighed: Posterior, machine: Machine) -> Iterator[dict[str, Any]]:
     """Yield the unlisted laws of the finding's deepest node above a cause."""
-    level = "family" if finding.level == "cause" else finding.level
-    belongs = _belongs(level, finding) if finding.family or finding.joint else lambda e: True
-    labels = {e.label for e in weighed.elements if e.is_law and belongs(e)}
+    labels = {e.label for e in weighed.elements if e.is_law and _within(finding, e)}
     for label, p in weighed.marginals.items():
         if label in labels and p >= WORTH_A_LINE:
             kind, joint = _law_of(label)
             words = label_in_words(label, machine)
             yield {"law": kind, "joint": joint, "probability": p, "words": words}
+
+
+def _within(finding: Finding, element: Element) -> bool:
+    """Return whether an element lies within the finding's deepest node above a cause."""
+    if finding.family is not None:
+        return (element.joint, element.family) == (finding.joint, finding.family)
+    return finding.joint in (None, element.joint)
