@@ -14,6 +14,8 @@ class Criteria:
     """How much of a drive row's likelihood counts: rows are not quite independent."""
     cuff_weight: float = 0.4
     """The same of a cuff row."""
+    model_error: float = 0.003
+    """What counts as noise besides, per unit of what all causes and laws explain together: no form is exact."""
     form_misfit: float = 0.1
     """Share of a residual's rms that counts as noise: no form of any cause follows it exactly."""
     background_law: float = 0.0005
@@ -32,11 +34,11 @@ class Criteria:
     """Shares of a cause's own size by which its true form may differ from ours, equally likely."""
     shape_sd: float = 0.3
     """Prior standard deviation of a shape about its best value, in its unit of change."""
-    cause: float = -5.0
+    cause: float = -3.0
     """Prior log odds of a cause against none."""
-    law: float = -5.0
+    law: float = -3.0
     """Prior log odds of an unlisted law against none."""
-    further: float = -1.0
+    further: float = -2.0
     """Prior log odds of each element beyond the first."""
     other_shape: float = -0.5
     """Log odds of a shape that is not the one which explains most."""

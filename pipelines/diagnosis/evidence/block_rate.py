@@ -11,6 +11,9 @@ import numpy as np
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.signals.blocks import BlockAverage
 
+HIGHEST_CUTOFF = 0.4
+"""Highest cutoff, as a share of the rate: a motion filtered above it moves no faster at this rate."""
+
 
 def at_block_rate(run: Run) -> Run:
     """Return the run with one sample a block, so that its columns are computed once a block."""
@@ -21,6 +24,7 @@ def at_block_rate(run: Run) -> Run:
     slow = replace(
         motion, time=run.time, q=q, dq=dq, ddq=ddq, torque=run.measured[:, :joints],
         segment=motion.segment[run.starts], valid=run.valid, sample_rate_hz=rate_hz,
+        cutoff_hz=min(motion.cutoff_hz, HIGHEST_CUTOFF * rate_hz),
         load=None if motion.load is None else run.average(motion.load),
         limb_load=None if motion.limb_load is None else run.average(motion.limb_load),
         temperature=None if motion.temperature is None else run.average(motion.temperature),

@@ -87,6 +87,8 @@ class Evidence:
     to others of the kind, and that of noise besides."""
     heard: Mapping[str, float]
     """Log likelihood of causes besides what they do to the mean torque, by label."""
+    explained: tuple[float, float]
+    """What all columns together explain of the drives' and of the cuffs' rows, squared and in units of the noise."""
     contexts: tuple[tuple[int, ...], ...] = ()
     """Sets of elements whose causes were refined beside one another."""
     about: Mapping[str, Any] = field(default_factory=dict)
@@ -99,12 +101,12 @@ class Evidence:
         of_drives = library.regression.of_drives
         y = library.regression.measured
         parts = [(X[rows], y[rows]) for rows in (of_drives, ~of_drives)]
-        drives, cuffs = parts
+        (drives, drives_right), (cuffs, cuffs_right) = ((X.T @ X, X.T @ y) for X, y in parts)
         return cls(
-            drives[0].T @ drives[0], cuffs[0].T @ cuffs[0],
-            drives[0].T @ drives[1], cuffs[0].T @ cuffs[1],
+            drives, cuffs, drives_right, cuffs_right,
             (elements := tuple(_elements(library, at))), tuple(_background(library, at)),
-            dict(heard), tuple(_contexts(library, elements)), _about(library),
+            dict(heard), (explained(drives, drives_right), explained(cuffs, cuffs_right)),
+            tuple(_contexts(library, elements)), _about(library),
         )  # fmt: skip
 
     def packed(self) -> dict[str, Any]:
@@ -118,6 +120,7 @@ class Evidence:
                 {
                     "elements": [asdict(element) for element in self.elements],
                     "background": self.background, "heard": self.heard,
+                    "explained": self.explained,
                     "contexts": self.contexts, "about": self.about,
                 }
             ),
@@ -128,12 +131,26 @@ class Evidence:
         """Return the evidence of a row that ``packed`` made."""
         right = np.frombuffer(row["right"])
         n, text = len(right) // 2, json.loads(row["text"])
+        drives, cuffs = _symmetric(row["drives"], n), _symmetric(row["cuffs"], n)
         return cls(
-            _symmetric(row["drives"], n), _symmetric(row["cuffs"], n), right[:n], right[n:],
+            drives, cuffs, right[:n], right[n:],
             tuple(Element(**one) for one in text["elements"]),
             tuple((kind, place, v, noise) for kind, place, v, noise in text["background"]),
-            text["heard"], tuple(map(tuple, text["contexts"])), text["about"],
+            text["heard"],
+            tuple(text.get("explained") or (explained(drives, right[:n]), explained(cuffs, right[n:]))),
+            tuple(map(tuple, text["contexts"])), text["about"],
         )  # fmt: skip
+
+
+LARGEST_SHARE = 0.3
+"""Prior standard deviation of each column's share where all explain together."""
+
+
+def explained(gram: NDArray, right: NDArray) -> float:
+    """Return what columns, of products (n, n), explain together beyond what they explain of noise."""
+    system = gram + np.eye(len(gram)) / LARGEST_SHARE**2
+    both = np.linalg.solve(system, np.column_stack([right, gram]))
+    return max(float(right @ both[:, 0] - np.trace(both[:, 1:])), 0.0)
 
 
 def _symmetric(packed: bytes, n: int) -> NDArray:

@@ -37,7 +37,10 @@ class MarginalLikelihood:
     def __init__(self, evidence: Evidence, criteria: Criteria) -> None:
         """Weight rows, and marginalise the background."""
         self.evidence, self.criteria = evidence, criteria
-        drive, cuff = criteria.drive_weight, criteria.cuff_weight
+        drive, cuff = (
+            weight / (1.0 + criteria.model_error * weight * explained)
+            for weight, explained in zip((criteria.drive_weight, criteria.cuff_weight), evidence.explained, strict=True)
+        )
         gram = drive * evidence.drives + cuff * evidence.cuffs
         right = drive * evidence.drives_right + cuff * evidence.cuffs_right
         self.gram, self.right = _without(gram, right, *self._background())
