@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from pipelines.diagnosis.criteria import Criteria
-from pipelines.diagnosis.selection.evidence import Element, Evidence
+from pipelines.diagnosis.selection.evidence import Element, Evidence, explained
 from pipelines.diagnosis.selection.marginal_likelihood import MarginalLikelihood
 from pipelines.diagnosis.selection.posterior import posterior
 
@@ -27,7 +27,7 @@ def problem(seed: int = 0, strength: float = 0.0) -> tuple[np.ndarray, np.ndarra
     )
     background = (("law", 5, 1.0, 0.0), ("cuff", 6, 1.0, 0.0), ("wander", 7, 1.0, 0.0))
     none = np.zeros((8, 8))
-    return X, y, Evidence(X.T @ X, none, X.T @ y, np.zeros(8), elements, background, {})
+    return X, y, Evidence(X.T @ X, none, X.T @ y, np.zeros(8), elements, background, {}, (0.0, 0.0))
 
 
 def background_covariance(X: np.ndarray) -> np.ndarray:
@@ -92,6 +92,23 @@ def test_screening_ranks_pairs_as_the_exact_weighing_does_without_misfit():
     assert len(pairs) == 3
     for pair, value in zip(pairs, odds, strict=True):
         assert value == pytest.approx(weigh.rough(pair.tolist()), abs=1e-9)
+
+
+def test_what_all_columns_explain_counts_as_noise_by_the_model_error():
+    _, _, evidence = problem(strength=0.1)
+    criteria = replace(CRITERIA, model_error=0.01)
+    inexact = MarginalLikelihood(replace(evidence, explained=(50.0, 0.0)), criteria)
+    noisier = MarginalLikelihood(evidence, replace(criteria, drive_weight=1.0 / 1.5))
+    for chosen in ((0,), (1,), (0, 2)):
+        assert inexact(chosen) == pytest.approx(noisier(chosen), abs=1e-9)
+
+
+def test_noise_alone_explains_nothing_beyond_what_noise_does():
+    rng = np.random.default_rng(3)
+    X = rng.normal(size=(4000, 8))
+    noise = [explained(X.T @ X, X.T @ rng.normal(size=4000)) for _ in range(50)]
+    assert np.mean(noise) < 5.0
+    assert explained(X.T @ X, X.T @ (X[:, 0] + rng.normal(size=4000))) == pytest.approx(4000, rel=0.1)
 
 
 def test_probabilities_add_up_to_one_and_nothing_wins_where_nothing_is_hidden():
