@@ -39,7 +39,19 @@ class Cause:
         cls, fitted: Fitted, slopes: NDArray, regression: DecisionRegression, *, first: bool,
         context: int = -1,
     ) -> "Cause | None":  # fmt: skip
-        """Return a fitted candidate as a cause; None where the baseline leaves nothing of it."""
+        """Return a fitted candidate as a cause; None where the baseline leaves nothing of it.
+
+        Parameters
+        ----------
+        fitted : Fitted
+            The candidate at its best shapes, with its columns.
+        slopes : NDArray
+            (N, d) rows of what its shapes do, each per unit of change.
+        first : bool
+            Whether these are the best shapes of the effect.
+        context : int, optional
+            Number of the set beside whose others it was refined; -1 where it was refined alone.
+        """
         # The effect's own first amplitude keeps its sign as the last column of the triangle.
         shares = regression.shares(fitted.columns)
         _, triangle = np.linalg.qr(shares[:, ::-1])

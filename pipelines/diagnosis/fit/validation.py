@@ -35,7 +35,13 @@ class Validated:
 def without_each(
     made: Fit, train: Sequence[Run], validate: Sequence[Run], baseline: Baseline, weights: NDArray
 ) -> dict[str, Validated]:
-    """Return the model without each of its causes, the others kept and fitted anew, by label."""
+    """Return the model without each of its causes, the others kept and fitted anew, by label.
+
+    Parameters
+    ----------
+    weights : NDArray
+        (O,) inverse variances of the outputs, 1/(N·m)².
+    """
     found = {}
     for label in {cause.label for cause in made.causes}:
         rest = [cause for cause in made.causes if cause.label != label]
