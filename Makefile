@@ -13,9 +13,12 @@ LEGS = $(wildcard build/blind/report.json build/blind-full/report.json)
 MACHINES = $(wildcard build/blind-machines/report.json)
 # Seeds of the blind examination: tests/blind/README.md says why there are two ranges.
 SEEDS ?= tuning
+# Sessions of each world from which the decision's criteria are learned.
+SESSIONS ?= 2000
 
 .DEFAULT_GOAL := help
-.PHONY: help all test test-slow invariants check format bench estimators real fuzz blind blind-full blind-machines blind-fixed blind-page docs lock clean install
+.PHONY: help all test test-slow invariants check format bench estimators real fuzz blind blind-full blind-machines blind-fixed blind-page
+.PHONY: evidence learn sensitivity docs lock clean install
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | sort | expand -t 12
@@ -76,6 +79,15 @@ blind-fixed: $(INSTALLED) ## record anew how the fixed set of CI comes out, in t
 blind-page: $(INSTALLED) ## write docs/blind.md and docs/blind-machines.md from the examinations that were made
 	$(if $(LEGS),$(BIN)/python -m tests.blind.page $(LEGS) docs/blind.md)
 	$(if $(MACHINES),$(BIN)/python -m tests.blind.page $(MACHINES) docs/blind-machines.md)
+
+evidence: $(INSTALLED) ## what the decision needs of SESSIONS simulated sessions of each world, in build/learn; goes on where it was stopped; hours
+	$(BIN)/python -m tests.learn evidence --seeds $(SEEDS) --cases $(SESSIONS)
+
+learn: $(INSTALLED) ## learn the decision's criteria from that evidence, into build/learn/learned.json
+	$(BIN)/python -m tests.learn fit
+
+sensitivity: $(INSTALLED) ## measure on that evidence how much each criterion matters; `make docs` then writes docs/criteria.md
+	$(BIN)/python -m tests.learn sensitivity
 
 docs: $(INSTALLED) ## bring the generated pages up to date, and make the site of all pages in build/site
 	$(BIN)/python -m pipelines.settings.reference > docs/settings.md

@@ -11,6 +11,7 @@ import numpy as np
 import typer
 
 from pipelines.diagnosis.criteria import CRITERIA
+from pipelines.diagnosis.reference import MEASURED
 from tests.blind.seeds import RANGES
 from tests.learn.evidence import ONE_THREAD, write_evidence
 
@@ -19,6 +20,13 @@ OUT = Annotated[Path, typer.Option(help="Folder of evidence and results.")]
 HERE = Path("build/learn")
 MIX = {"single": 0.55, "pair": 0.15, "outside": 0.12, "none": 0.09, "imperfect": 0.09}
 """Shares of what is hidden: faults of acquisition teach the decision nothing."""
+
+
+class Seeds(StrEnum):
+    """Whose seeds: criteria are learned on some and judged on others."""
+
+    tuning = "tuning"
+    reporting = "reporting"
 
 
 class World(StrEnum):
@@ -34,7 +42,8 @@ class World(StrEnum):
 def evidence(
     world: Annotated[World, typer.Option(help="Which world.")] = World.all,
     cases: Annotated[int, typer.Option(min=1, help="Sessions of each world.")] = 400,
-    seed_base: Annotated[int, typer.Option(help="First seed.")] = RANGES["tuning"].start,
+    seeds: Annotated[Seeds, typer.Option(help="Which range of seeds.")] = Seeds.tuning,
+    seed_base: Annotated[int | None, typer.Option(help="First seed, instead of the range's.")] = None,
     out: OUT = HERE,
     workers: Annotated[int, typer.Option(min=1)] = os.cpu_count() or 1,
 ) -> None:
@@ -42,9 +51,10 @@ def evidence(
     from tests.blind.cases import mixed
 
     worlds = [w for w in World if w is not World.all] if world is World.all else [world]
-    turns = mixed(cases * len(worlds), seed_base, MIX, [w.value for w in worlds])
+    base = RANGES[seeds].start if seed_base is None else seed_base
+    turns = mixed(cases * len(worlds), base, MIX, [w.value for w in worlds])
     # In an order of its own, so that a campaign that is stopped has some of everything.
-    np.random.default_rng(seed_base).shuffle(turns)
+    np.random.default_rng(base).shuffle(turns)
     began = time.monotonic()
     for done, name in enumerate(write_evidence(turns, out.resolve(), workers), 1):
         pace = (time.monotonic() - began) / done
@@ -70,6 +80,24 @@ def fit(
     result = learn(out.resolve(), chosen, left_out, most, workers, CRITERIA)
     (out / f"{name}.json").write_text(json.dumps(result, indent=1))
     typer.echo(json.dumps(result["criteria"], indent=1))
+
+
+@app.command()
+def sensitivity(
+    out: OUT = HERE,
+    worlds: Annotated[str, typer.Option(help="Worlds to measure on, commas between.")] = "",
+    most: Annotated[int, typer.Option(help="Sessions at most, of each world.")] = 1000,
+    workers: Annotated[int, typer.Option(min=1)] = os.cpu_count() or 1,
+) -> None:
+    """Measure what a change of each criterion does, for docs/criteria.md."""
+    from tests.learn.sensitivity import sensitivity as measured
+
+    for variable in ONE_THREAD:
+        os.environ[variable] = "1"
+    chosen = [w for w in worlds.split(",") if w]
+    result = measured(out.resolve(), chosen, most, workers, CRITERIA)
+    MEASURED.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    typer.echo(f"written to {MEASURED}")
 
 
 @app.command()

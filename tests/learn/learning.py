@@ -32,7 +32,7 @@ def learn(
     criteria, history = start, []
     for _ in range(ROUNDS):
         with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
-            sessions = list(_sessions(root, worlds, left_out, most, pool, criteria))
+            sessions = list(sessions_of(root, worlds, left_out, most, pool, criteria))
         weigh = LogEvidence(sessions, workers)
         criteria, before, after = _ascended(weigh, sets_of(sessions), criteria)
         weigh.close()
@@ -44,7 +44,7 @@ def learn(
     }  # fmt: skip
 
 
-def _sessions(
+def sessions_of(
     root: Path, worlds: Sequence[str], left_out: set[int], most: int, pool: Executor,
     criteria: Criteria,
 ) -> Iterator[Session]:  # fmt: skip

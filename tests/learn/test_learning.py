@@ -1,0 +1,88 @@
+"""Learning raises the probability of the truth, and what it starts from comes back unchanged."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.diagnosis.criteria import CRITERIA
+from pipelines.diagnosis.selection.prior import FEATURES, weights
+from tests.learn.prior_fit import Sets
+from tests.learn.search import ascend
+from tests.learn.sensitivity import CHANGE, changes, told_of
+from tests.learn.truth import right_sets
+from tests.learn.vector import from_vector, names, to_vector
+
+
+def sessions(count: int = 200) -> tuple[Sets, np.ndarray]:
+    """Return sessions of a law and a cause each beside nothing; the truth is a cause in one of four."""
+    rng = np.random.default_rng(5)
+    features = np.zeros((count, 3, len(FEATURES)))
+    features[:, 1, FEATURES.index("cause")] = 1.0
+    features[:, 2, FEATURES.index("law")] = 1.0
+    truth = np.where(rng.random(count) < 0.25, 1, 0)
+    evidence = np.zeros((count, 3))
+    evidence[:, 1] = np.where(truth == 1, 4.0, -1.0) + rng.normal(size=count)
+    return Sets(features, np.eye(3)[truth], np.full(count, 1.0 / count)), evidence
+
+
+def test_the_vector_of_a_criterion_gives_the_same_criteria_back():
+    again = from_vector(to_vector(CRITERIA), CRITERIA)
+    assert len(names()) == len(to_vector(CRITERIA))
+    assert weights(again).tolist() == weights(CRITERIA).tolist()
+    np.testing.assert_allclose(to_vector(again), to_vector(CRITERIA))
+
+
+def test_the_fitted_prior_gives_the_truth_more_probability_than_its_start():
+    sets, evidence = sessions()
+    start = weights(CRITERIA)
+    fitted, score = sets.fit(evidence, start)
+    assert score > sets.weights @ sets.scores(evidence, start)
+    assert fitted[FEATURES.index("law")] < start[FEATURES.index("law")], "no law is ever the truth"
+
+
+def test_coordinate_steps_come_close_to_a_maximum():
+    best, value, _ = ascend(lambda x: (-float(np.sum((x - 1.0) ** 2)), x), np.zeros(3))
+    assert value > -0.1
+    np.testing.assert_allclose(best, 1.0, atol=0.2)
+
+
+def test_each_number_is_changed_alone_and_by_the_same_factor():
+    seen = {name: (larger, smaller) for name, larger, smaller in changes(CRITERIA)}
+    assert set(seen) == {*names(), *FEATURES}
+    larger, smaller = seen["shape_sd"]
+    assert larger.shape_sd == pytest.approx(CHANGE * CRITERIA.shape_sd)
+    assert smaller.shape_sd == pytest.approx(CRITERIA.shape_sd / CHANGE)
+    np.testing.assert_allclose(weights(replace(larger, shape_sd=CRITERIA.shape_sd)), weights(CRITERIA))
+
+
+def test_a_prior_that_forbids_causes_is_seldom_right_where_causes_are_the_truth():
+    sets, evidence = sessions()
+    score, share = told_of(sets, evidence, replace(CRITERIA, cause=-3.0))
+    worse, seldom = told_of(sets, evidence, replace(CRITERIA, cause=-30.0))
+    assert score > worse
+    assert share > seldom
+    assert seldom == pytest.approx(sets.weights @ sets.right[:, 0])
+
+
+def hidden(effect, joint):
+    return {"effect": effect, "joint": joint, "form": "plain"}
+
+
+def truth(category, *causes):
+    return {"case": {"category": category}, "hidden": list(causes)}
+
+
+def test_a_set_is_right_where_it_holds_each_hidden_cause_and_nothing_else():
+    both = right_sets(truth("pair", hidden("backlash", "knee"), hidden("payload_change", "hip")))
+    assert both(frozenset({"backlash@knee", "payload_change@hip"}))
+    assert not both(frozenset({"backlash@knee"}))
+    assert not both(frozenset({"backlash@knee", "payload_change@hip", "law:angle@hip"}))
+    assert right_sets(truth("none"))(frozenset())
+    assert not right_sets(truth("imperfect"))(frozenset({"backlash@knee"}))
+
+
+def test_a_cause_that_no_data_can_tell_from_the_hidden_one_is_as_right():
+    offset = right_sets(truth("single", hidden("torque_offset", "knee")))
+    assert offset(frozenset({"coulomb_asymmetry@knee"}))
+    assert not offset(frozenset({"coulomb_asymmetry@hip"}))
