@@ -12,6 +12,9 @@ HIDING = 0.2
 """Share of a joint's torque from which an estimated noise floor is doubted: no sensor is as noisy,
 and friction is seldom more."""
 
+LARGER = 2.0
+"""Error of the validation runs over that of the training runs from which a caveat tells of it."""
+
 
 def caveats(d: Diagnosis) -> list[str]:
     """Return what must be known beside the verdict, a sentence or two each."""
@@ -27,7 +30,7 @@ def caveats(d: Diagnosis) -> list[str]:
     doubtful = [] if d.data.spoilt else [*_high_floor(d), *d.upside_down]
     return [
         *known, *_default_length(d), *[noisy] * d.data.noisy_angles, *_unrealizable(d), *doubtful,
-        *(_reversal(d, one) for one in d.reversals), *_one_run(d), *_one_kind(d),
+        *(_reversal(d, one) for one in d.reversals), *_differs(d), *_one_run(d), *_one_kind(d),
     ]  # fmt: skip
 
 
@@ -85,9 +88,29 @@ def _reversal(d: Diagnosis, one: BuildUp) -> str:
     )
 
 
+def _differing(d: Diagnosis) -> dict[str, tuple[float, float]]:
+    """Return joints whose validation runs have a larger error, with it and with the training's."""
+    errors = zip(d.after.errors.rms.tolist(), d.after.fit.rms.tolist(), strict=False)
+    pairs = zip(d.baseline.joints, errors, strict=True)
+    return {} if d.data.spoilt else {joint: both for joint, both in pairs if both[0] > LARGER * both[1]}
+
+
+def _differs(d: Diagnosis) -> list[str]:
+    """Say where the validation runs lack what no training run shows."""
+    machine = d.baseline.machine
+    return [
+        f"{the(joint)}'s {machine.joint(joint).effort} error is {amount(machine, joint, validated)} on the "
+        f"validation runs and {amount(machine, joint, trained)} on the training runs. They differ in something "
+        "that no training run shows: train and validate on runs of both sorts"
+        for joint, (validated, trained) in _differing(d).items()
+    ]
+
+
 def _one_run(d: Diagnosis) -> list[str]:
     """Say what one training run cannot show, where nothing is named that it could be."""
-    if d.status != "unknown_cause" or d.data.spoilt or len(d.train) > 1:
+    if d.causes or d.data.spoilt or len(d.train) > 1:
+        return []
+    if d.status == "nothing_missing" and not _differing(d):
         return []
     return [
         "there is one training run only: a zero that is set at each start looks like one for all "
