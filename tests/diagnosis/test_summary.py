@@ -8,14 +8,17 @@ import pytest
 
 from pipelines.contracts.joints import Joint
 from pipelines.contracts.table import Table
+from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.candidates.shape_refinement import reach
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.evidence.noise_floor import Floor
 from pipelines.diagnosis.fit.validation_error import Errors, scored
 from pipelines.diagnosis.selection.posterior import Posterior
 from pipelines.diagnosis.verdict.cause_evidence import cause_evidence
-from pipelines.diagnosis.verdict.caveats import _default_length
+from pipelines.diagnosis.verdict.caveats import _at_ends, _default_length
 from pipelines.diagnosis.verdict.summary import _in_words, finding_in_words
 from pipelines.diagnosis.verdict.verdict import verdict
+from pipelines.effects.passive_joint_torque import PassiveJointTorque
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.machine import machine_of
@@ -216,3 +219,17 @@ def test_an_arm_whose_length_nobody_told_is_said_to_have_an_exoskeletons(names, 
     told = _default_length(found)
     assert bool(told) == said
     assert not said or "0.38952 m is assumed, an exoskeleton's: set geometry.thigh_length_m" in told[0]
+
+
+def test_a_shape_that_ended_where_its_search_ends_is_told_with_its_value():
+    effect = PassiveJointTorque(joint="knee")
+    least, greatest = reach(effect.shape[0])
+    assert least < effect.shape[0].typical[0] and greatest > effect.shape[0].typical[1]
+
+    def told(onset):
+        fit = SimpleNamespace(causes=(Candidate(effect, ((onset, 0.1),)),))
+        return _at_ends(SimpleNamespace(after=SimpleNamespace(fit=fit)))
+
+    assert told(0.2) == []
+    (caveat,) = told(least)
+    assert f"passive_joint_torque@knee ended at the limit of its search, onset_angle = {least:.3g} rad" in caveat

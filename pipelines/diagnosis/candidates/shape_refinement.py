@@ -274,11 +274,15 @@ def unit_at(candidate: Candidate, i: int, unit: float, run: int = 0) -> float:
 def changed(candidate: Candidate, i: int, unit: float, step: float, runs: Sequence[int] | None = None) -> Candidate:
     """Return the candidate after a step in units of change, within reach of its typical range."""
     parameter, now = candidate.effect.shape[i], candidate.shapes[runs[0] if runs else 0][i]
-    low, high = parameter.typical
     step = float(np.clip(step, -LARGEST_STEP, LARGEST_STEP))
-    if not unit:
-        value = float(np.clip(now * np.exp(step), low / BEYOND, high * BEYOND))
-    else:
-        beyond = MARGIN * (high - low)
-        value = float(np.clip(now + step * unit, low - beyond, high + beyond))
-    return candidate.reshaped(i, value, runs)
+    value = now + step * unit if unit else now * np.exp(step)
+    return candidate.reshaped(i, float(np.clip(value, *reach(parameter))), runs)
+
+
+def reach(parameter: Parameter) -> tuple[float, float]:
+    """Return the least and the greatest value to which a shape is refined, in its unit."""
+    low, high = parameter.typical
+    if not _unit_of(parameter):
+        return low / BEYOND, high * BEYOND
+    beyond = MARGIN * (high - low)
+    return low - beyond, high + beyond

@@ -1,6 +1,9 @@
 """What the recordings at hand could not show, whatever is missing."""
 
+import numpy as np
+
 from pipelines.contracts.joints import the
+from pipelines.diagnosis.candidates.shape_refinement import reach
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fit.presliding_test import NEAR_S, BuildUp
 from pipelines.effects import PreslidingHysteresis
@@ -29,7 +32,7 @@ def caveats(d: Diagnosis) -> list[str]:
     ]
     doubtful = [] if d.data.spoilt else [*_high_floor(d), *d.upside_down]
     return [
-        *known, *_default_length(d), *[noisy] * d.data.noisy_angles, *_unrealizable(d), *doubtful,
+        *known, *_at_ends(d), *_default_length(d), *[noisy] * d.data.noisy_angles, *_unrealizable(d), *doubtful,
         *(_reversal(d, one) for one in d.reversals), *_differs(d), *_one_run(d), *_one_kind(d),
     ]  # fmt: skip
 
@@ -50,6 +53,20 @@ def _high_floor(d: Diagnosis) -> list[str]:
         "model lacks. Repeat one motion and record its period, and check unit, sign and time "
         "stamps of that channel"
         for joint, share in floor_that_hides(d).items()
+    ]
+
+
+def _at_ends(d: Diagnosis) -> list[str]:
+    """Say which shape of a named cause ended where its search ends: its other values hold only with it."""
+    return [
+        f"the fit of {cause.label} ended at the limit of its search, {parameter.name} = {value:.3g}"
+        f"{'' if parameter.unit == '1' else f' {parameter.unit}'}: "
+        "its values hold only together, and its true form may be another"
+        for cause in d.after.fit.causes
+        for i, parameter in enumerate(cause.effect.shape)
+        if cause.is_free(i) and i != cause.onset
+        for value in {shape[i] for shape in cause.shapes}
+        if any(np.isclose(value, end, rtol=1e-6) for end in reach(parameter))
     ]
 
 
