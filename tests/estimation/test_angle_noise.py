@@ -61,7 +61,7 @@ def test_the_motion_of_a_leg_takes_torque_however_it_rings(effect, values):
 def test_no_cause_is_named_for_what_shaking_encoders_do_and_the_reader_is_warned(shaken):
     found = diagnose(shaken)
     assert found.causes == ()
-    assert found.noisy_angles
+    assert found.data.noisy_angles
     assert any("no torque goes with" in caveat for caveat in verdict(found)["caveats"])
 
 
