@@ -45,9 +45,8 @@ def evidence(
     turns = mixed(cases * len(worlds), seed_base, MIX, [w.value for w in worlds])
     # In an order of its own, so that a campaign that is stopped has some of everything.
     np.random.default_rng(seed_base).shuffle(turns)
-    began, done = time.monotonic(), 0
-    for name in write_evidence(turns, out.resolve(), workers):
-        done += 1
+    began = time.monotonic()
+    for done, name in enumerate(write_evidence(turns, out.resolve(), workers), 1):
         pace = (time.monotonic() - began) / done
         typer.echo(f"{done} {name} ({pace:.1f} s each)")
 

@@ -85,9 +85,7 @@ def _weights(sessions: Sequence[Session]) -> NDArray:
     return np.array([1.0 / (len(counts) * counts[world]) for world in worlds])
 
 
-def _ascended(
-    weigh: LogEvidence, sets: Sets, criteria: Criteria
-) -> tuple[Criteria, float, float]:
+def _ascended(weigh: LogEvidence, sets: Sets, criteria: Criteria) -> tuple[Criteria, float, float]:
     """Return the best criteria found, and the scores at first and at last."""
     prior = weights(criteria)
     first = float(sets.weights @ sets.scores(weigh(criteria), prior))

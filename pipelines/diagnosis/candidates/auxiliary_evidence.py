@@ -11,14 +11,6 @@ from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
 from pipelines.effects import Backlash, Effect, VoluntaryTorque
 
-PERCEIVED = {
-    Backlash.name: "bursts are heard where the load changes sign, as of teeth that cross their play; hardly any of it "
-    "shows in the mean of the torque",
-    VoluntaryTorque.name: "what differs from period to period is felt in cuffs and drive alike: it comes through the "
-    "cuffs, and no model foretells it",
-}
-"""How causes are known besides what they do to the mean of the torque."""
-
 
 def auxiliary_evidence(prepared: Prepared) -> dict[str, float]:
     """Return the log likelihood ratio of each label besides what it does to the mean torque."""

@@ -25,7 +25,8 @@ def law_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list[L
     """Return every smooth law and its rows (N, l)."""
     joints = regression.joints
     spans = Spans.of(prepared.runs, prepared.torque[:joints])
-    drives, laws = [], []
+    drives: list[NDArray] = []
+    laws: Sequence[LawColumn] = ()
     for run, columns in zip(prepared.runs, prepared.columns, strict=True):
         laws, values = smooth_laws(run, spans, (columns @ prepared.values)[:, :joints])
         drives.append(values * spans.torque[:, np.newaxis])

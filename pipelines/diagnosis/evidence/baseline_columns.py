@@ -1,31 +1,21 @@
 """The columns of the baseline, and of terms beside it, behind the regression filter."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.gram import Gram, gram_of
 from pipelines.diagnosis.evidence.observed_run import FOLDS, Run
-from pipelines.mechanics.motion import Motion
-from pipelines.model import Model, Motions, Term
+from pipelines.model import Model, Term
 
 
-def columns_under(
-    terms: Sequence[Term], run: Run, baseline: Baseline, slow: Run | None = None
-) -> tuple[NDArray, NDArray]:
+def columns_under(terms: Sequence[Term], run: Run, baseline: Baseline) -> tuple[NDArray, NDArray]:
     """Return the columns of the baseline and of some terms in one run, and what was measured.
 
     Terms transform the motion that everything is computed at, add their own torque, and stand
     between torque and reading. The force sensors sit on the links: their forces make another
     torque where those stand at another angle.
-
-    Parameters
-    ----------
-    slow : Run, optional
-        The same run at block rate: the motion is transformed at the full rate, and the columns are
-        computed once a block.
 
     Returns
     -------
@@ -33,18 +23,8 @@ def columns_under(
     """
     model = Model((*baseline.terms, *terms))
     motions = model.motions(run.motion)
-    if slow is not None:
-        motions, run = Motions(*(_slowed(m, run, slow) for m in motions)), slow
     columns = model.regressor(run.motion, cuffs=True, motions=motions)
     return run.average(columns), run.measured_at(motions.link)
-
-
-def _slowed(motion: Motion, run: Run, slow: Run) -> Motion:
-    """Return a transformed motion of a run once a block."""
-    if motion.q is run.motion.q:
-        return slow.motion
-    q, dq, ddq = (run.average(x) for x in (motion.q, motion.dq, motion.ddq))
-    return replace(slow.motion, q=q, dq=dq, ddq=ddq)
 
 
 def gram_of_runs(runs: Sequence[Run], columns: Sequence[NDArray], measured: Sequence[NDArray] | None = None) -> Gram:

@@ -73,9 +73,7 @@ def _of_cause(posterior: Posterior, answer: Answer, number: int, root: Node) -> 
     labels = {label for label, _ in causes}
     members = [e for e in posterior.elements if e.label in labels]
     path = (root, *_path(posterior, element, members), ("cause", element.label, named.probability))
-    return Finding(
-        "cause", element.repeats, element.joint, element.family, named.probability, causes, path
-    )
+    return Finding("cause", element.repeats, element.joint, element.family, named.probability, causes, path)
 
 
 def _path(posterior: Posterior, element: Element, members: Sequence[Element]) -> Iterator[Node]:
@@ -95,9 +93,7 @@ def _path(posterior: Posterior, element: Element, members: Sequence[Element]) ->
             yield level, value, _chance(posterior, *above)
 
 
-def _families(
-    posterior: Posterior, root: Node, covered: set[tuple[str | None, str | None]]
-) -> Iterator[Finding]:
+def _families(posterior: Posterior, root: Node, covered: set[tuple[str | None, str | None]]) -> Iterator[Finding]:
     """Yield families at joints that are likely and hold no named cause."""
     for joint, family in dict.fromkeys((e.joint, e.family) for e in posterior.elements):
         if (joint, family) in covered:
@@ -113,12 +109,10 @@ def _families(
             key=lambda e: posterior.marginals.get(e.label, 0.0),
         )
         path = (root, *_path(posterior, first, [first]))
-        yield Finding(
-            "family", first.repeats, joint, family, path[-1][2], _closest(posterior, belongs), path
-        )
+        yield Finding("family", first.repeats, joint, family, path[-1][2], _closest(posterior, belongs), path)
 
 
-def _closest(posterior: Posterior, belongs: Callable[[Element], bool]) -> tuple[tuple[str, float], ...]:
+def _closest(posterior: Posterior, belongs: Belongs) -> tuple[tuple[str, float], ...]:
     """Return the listed causes that come closest, the most probable first."""
     labels = {e.label for e in posterior.elements if belongs(e) and not e.is_law}
     ranked = [(label, p) for label, p in posterior.marginals.items() if label in labels]
@@ -127,18 +121,23 @@ def _closest(posterior: Posterior, belongs: Callable[[Element], bool]) -> tuple[
 
 def _joints(posterior: Posterior, root: Node) -> Iterator[Finding]:
     for joint in dict.fromkeys(e.joint for e in posterior.elements):
-        chance = _chance(posterior, lambda e, joint=joint: e.joint == joint)
+
+        def belongs(e: Element, joint: str | None = joint) -> bool:
+            return e.joint == joint
+
+        chance = _chance(posterior, belongs)
         if chance >= LIKELY:
             path = (root, ("joint", joint, chance))
-            close = _closest(posterior, lambda e, joint=joint: e.joint == joint)
+            close = _closest(posterior, belongs)
             yield Finding("joint", None, joint, None, chance, close, path)
 
 
 def _repeatability(posterior: Posterior, root: Node) -> Finding:
     """Return that something is missing, and whether it repeats where that is likely."""
-    chances = {r: _chance(posterior, lambda e, r=r: e.repeats == r) for r in (True, False)}
-    repeats = max(chances, key=lambda r: chances[r])
-    chance, close = chances[repeats], _closest(posterior, lambda e: True)
+    chance, repeats = max(
+        (_chance(posterior, lambda e: e.repeats), True), (_chance(posterior, lambda e: not e.repeats), False)
+    )
+    close = _closest(posterior, lambda e: True)
     if chance < LIKELY:
         return Finding("repeatability", None, None, None, root[2], close, (root,))
     path = (root, ("repeats", repeats, chance))

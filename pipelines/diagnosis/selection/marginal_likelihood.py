@@ -39,9 +39,7 @@ class MarginalLikelihood:
         self.evidence, self.criteria = evidence, criteria
         drive, cuff = (
             weight / (1.0 + criteria.model_error * weight * explained)
-            for weight, explained in zip(
-                (criteria.drive_weight, criteria.cuff_weight), evidence.explained, strict=True
-            )
+            for weight, explained in zip((criteria.drive_weight, criteria.cuff_weight), evidence.explained, strict=True)
         )
         gram = drive * evidence.drives + cuff * evidence.cuffs
         right = drive * evidence.drives_right + cuff * evidence.cuffs_right
@@ -137,12 +135,12 @@ class MarginalLikelihood:
 
     def pairs(self, chosen: Sequence[int]) -> tuple[NDArray, NDArray]:
         """Return all pairs of different labels among elements, (p, 2), and rough log odds, (p,)."""
-        chosen = np.asarray(chosen, dtype=int)
-        labels = np.array([self.evidence.elements[i].label for i in chosen])
-        one, other = np.triu_indices(len(chosen), 1)
+        numbers = np.asarray(chosen, dtype=int)
+        labels = np.array([self.evidence.elements[i].label for i in numbers])
+        one, other = np.triu_indices(len(numbers), 1)
         apart = labels[one] != labels[other]
         one, other = one[apart], other[apart]
-        columns, sd, width = self._padded(chosen)
+        columns, sd, width = self._padded(numbers)
         odds = np.empty(len(one))
         for a in WIDTHS:
             for b in WIDTHS:
@@ -153,8 +151,8 @@ class MarginalLikelihood:
                     s = np.hstack([sd[one[some], :a], sd[other[some], :b]])
                     odds[some] = self._rough(c, s)
         own = self.lines + self.features @ self._weights
-        odds += own[chosen[one]] + own[chosen[other]] + self.criteria.further
-        return np.column_stack([chosen[one], chosen[other]]), odds
+        odds += own[numbers[one]] + own[numbers[other]] + self.criteria.further
+        return np.column_stack([numbers[one], numbers[other]]), odds
 
     def _padded(self, chosen: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Return elements' columns and prior sds padded to one width, and the width that counts."""
