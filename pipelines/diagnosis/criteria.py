@@ -10,47 +10,47 @@ from dataclasses import dataclass
 class Criteria:
     """The hyper-parameters of the posterior over sets of causes and laws."""
 
-    drive_weight: float = 0.6
+    drive_weight: float = 2.03
     """How much of a drive row's likelihood counts: rows are not quite independent."""
-    cuff_weight: float = 0.4
+    cuff_weight: float = 0.019
     """The same of a cuff row."""
-    model_error: float = 0.003
+    model_error: float = 0.00715
     """What counts as noise besides, per unit of what all causes and laws explain together: no form is exact."""
     form_misfit: float = 0.1
     """Share of a residual's rms that counts as noise: no form of any cause follows it exactly."""
-    background_law: float = 0.0005
+    background_law: float = 0.00014
     """Share by which each smooth law is off on a good rig."""
-    background_cause: float = 0.003
+    background_cause: float = 0.00197
     """Share of each cause of the catalogue on a good rig."""
-    background_cuff: float = 0.01
+    background_cuff: float = 0.00214
     """Share by which each smooth law of the cuffs' own is off on a good rig."""
-    background_wander: float = 0.002
+    background_wander: float = 0.00219
     """Share by which a good rig's torque wanders in each run."""
-    background_line: float = 0.003
+    background_line: float = 0.00258
     """Share of a line over the angle or over time on a good rig."""
-    amplitudes: tuple[float, float, float] = (0.03, 0.08, 0.2)
+    amplitudes: tuple[float, float, float] = (0.0919, 0.131, 0.245)
     """Shares that a cause or a law may have, equally likely: prior standard deviations."""
-    misfits: tuple[float, float, float] = (0.0, 0.1, 0.3)
+    misfits: tuple[float, float, float] = (0.0, 0.00475, 0.258)
     """Shares of a cause's own size by which its true form may differ from ours, equally likely."""
     shape_sd: float = 0.3
     """Prior standard deviation of a shape about its best value, in its unit of change."""
-    cause: float = -3.0
+    cause: float = -2.32
     """Prior log odds of a cause against none."""
-    law: float = -3.0
+    law: float = -2.74
     """Prior log odds of an unlisted law against none."""
-    further: float = -2.0
+    further: float = -1.34
     """Prior log odds of each element beyond the first."""
-    other_shape: float = -0.5
+    other_shape: float = -5.02
     """Log odds of a shape that is not the one which explains most."""
-    each_run: float = -1.0
+    each_run: float = -2.19
     """Log odds of a cause whose value is another in every run."""
-    worn: float = -0.7
+    worn: float = -2.93
     """Log odds of a mass that the person carries, against the machine."""
-    impacts: float = 0.3
+    impacts: float = 0.0952
     """Share of the bursts' log likelihood that counts for backlash."""
-    lines: float = 0.3
+    lines: float = 0.0294
     """Share of a line's log likelihood ratio that counts for a ripple or a tone."""
-    coherence: float = 0.3
+    coherence: float = 0.264
     """Share of the cuffs' and drive's common scatter that counts for a voluntary torque."""
 
 

@@ -170,6 +170,8 @@ class Effect(ABC):
     """How to make sure of it on the rig."""
     family: ClassVar[Family]
     """The kind of law it follows; one that states none has the family of its side (``FAMILY_OF_SIDE``)."""
+    any_form: ClassVar[str] = ""
+    """The smooth law that is this effect whatever its form; empty where only forms near its own are."""
     resembles: ClassVar[tuple[str, ...]]
     """Smooth laws of its joint (``LAWS``) that contain it approximately: what the real effect does beyond our equation
     looks like one of them. One that states none has those of its family (``LAWS_OF_FAMILY``)."""

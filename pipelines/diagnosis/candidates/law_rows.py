@@ -26,7 +26,7 @@ def law_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list[L
     joints = regression.joints
     spans = Spans.of(prepared.runs, prepared.torque[:joints])
     drives: list[NDArray] = []
-    laws: list[LawColumn] = []
+    laws: Sequence[LawColumn] = ()
     for run, columns in zip(prepared.runs, prepared.columns, strict=True):
         laws, values = smooth_laws(run, spans, (columns @ prepared.values)[:, :joints])
         drives.append(values * spans.torque[:, np.newaxis])

@@ -99,8 +99,8 @@ def noise_model(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NoiseModel
     rate_hz = runs[0].motion.sample_rate_hz / runs[0].block.decimation
     outputs = range(residuals[0].shape[1])
     fits = [_spectrum_of([one[:, o] for one in series if len(one)], rate_hz, band, pink) for o in outputs]
-    density, correlation_s, pink_share = np.array(fits).T
-    return NoiseModel(density, correlation_s, pink_share, from_periods)
+    density, correlation_s, ratio = np.array(fits).T
+    return NoiseModel(density, correlation_s, ratio, from_periods)
 
 
 def _spectrum_of(

@@ -5,7 +5,7 @@ Small enough to be kept for thousands of sessions, from which the criteria are l
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from itertools import pairwise
 from typing import Any
 
@@ -200,7 +200,22 @@ def _elements(library: Library, at: _Places) -> list[Element]:
         )
         for (kind, j, wearer), own in laws.items() if wearer != "cuffs"
     ]  # fmt: skip
-    return elements
+    effects = [cause.candidate.effect for cause in library.causes]
+    return _in_any_form(elements, {effect.label: effect.any_form for effect in effects if effect.any_form})
+
+
+def _in_any_form(elements: Sequence[Element], any_form: Mapping[str, str]) -> list[Element]:
+    """Give laws that are a listed cause in any form that cause's label; ``any_form`` has laws by label."""
+    best = {e.label: e for e in elements if e.label in any_form and e.first and e.context < 0}
+    of_laws = {(any_form[label], e.joint): e for label, e in best.items()}
+    return [
+        replace(
+            of_laws[e.name, e.joint], columns=e.columns, variance=e.variance,
+            derivative=[], resembles=[], resembles_variance=[], amplitudes=[], first=False,
+        )
+        if e.is_law and e.wearer == "all" and (e.name, e.joint) in of_laws else e
+        for e in elements
+    ]  # fmt: skip
 
 
 Laws = dict[tuple[str, int, str], list[tuple[int, float]]]
@@ -228,8 +243,8 @@ def _shown(kind: Kind, joint: int, prepared: Prepared) -> list[Shown]:
 
 def _of_cause(number: int, cause: Cause, at: _Places, laws: Laws, prepared: Prepared, two: bool) -> Element:
     effect, names = cause.candidate.effect, prepared.baseline.joints
-    is_ripple = isinstance(effect, Cogging) and effect.joint is not None
-    tracked = is_ripple and cause.candidate.shapes[0] == orders_of(str(effect.joint), prepared)
+    joint = effect.joint
+    tracked = isinstance(effect, Cogging) and joint and cause.candidate.shapes[0] == orders_of(joint, prepared)
     places = at.causes[number].tolist()
     resembles = list(_resembled(effect, laws, names, two))
     total = sum(v for _, v in resembles)
@@ -240,7 +255,7 @@ def _of_cause(number: int, cause: Cause, at: _Places, laws: Laws, prepared: Prep
         cause.amplitudes[_positive(cause)].tolist(),
         not effect.goes_with_time and effect.family != TIME, cause.first, effect.each_run,
         effect.run is not None, place=number, context=cause.context,
-        shown=_shown(Kind.ANGLE, names.index(effect.joint), prepared) if tracked else [],
+        shown=_shown(Kind.ANGLE, names.index(joint), prepared) if tracked and joint else [],
     )  # fmt: skip
 
 

@@ -136,12 +136,12 @@ class MarginalLikelihood:
 
     def pairs(self, chosen: Sequence[int]) -> tuple[NDArray, NDArray]:
         """Return all pairs of different labels among elements, (p, 2), and rough log odds, (p,)."""
-        places = np.asarray(chosen, dtype=int)
-        labels = np.array([self.evidence.elements[i].label for i in places])
-        one, other = np.triu_indices(len(places), 1)
+        numbers = np.asarray(chosen, dtype=int)
+        labels = np.array([self.evidence.elements[i].label for i in numbers])
+        one, other = np.triu_indices(len(numbers), 1)
         apart = labels[one] != labels[other]
         one, other = one[apart], other[apart]
-        columns, sd, width = self._padded(places)
+        columns, sd, width = self._padded(numbers)
         odds = np.empty(len(one))
         for a in WIDTHS:
             for b in WIDTHS:
@@ -152,8 +152,8 @@ class MarginalLikelihood:
                     s = np.hstack([sd[one[some], :a], sd[other[some], :b]])
                     odds[some] = self._rough(c, s)
         own = self.lines + self.features @ self._weights
-        odds += own[places[one]] + own[places[other]] + self.criteria.further
-        return np.column_stack([places[one], places[other]]), odds
+        odds += own[numbers[one]] + own[numbers[other]] + self.criteria.further
+        return np.column_stack([numbers[one], numbers[other]]), odds
 
     def _padded(self, chosen: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Return elements' columns and prior sds padded to one width, and the width that counts."""
