@@ -56,7 +56,10 @@ class Refinement:
 
     def _round(self, best: Fit, runs: Sequence[Run]) -> Fit:
         """Return the fit after a few steps with the loads held."""
-        best = self._forms(best, runs)
+        return self._stepped(self._forms(best, runs), runs)
+
+    def _stepped(self, best: Fit, runs: Sequence[Run]) -> Fit:
+        """Return the fit after a few steps of its shapes at the forms that it has."""
         for _ in range(STEPS):
             best = self._onsets(best, runs)
             ahead = self._step(best, runs)
@@ -66,14 +69,20 @@ class Refinement:
         return best
 
     def _forms(self, best: Fit, runs: Sequence[Run]) -> Fit:
-        """Return the best of a transmission's forms: the library has only its straight one."""
+        """Return the best of each cause's forms, its other shapes refined beside each.
+
+        The library has a transmission's straight form only, and the forms of others side by side:
+        beside the other causes, and at the full rate, another may be the best.
+        """
         tried = [best]
         for number, cause in enumerate(best.causes):
             for i, parameter in enumerate(cause.effect.shape):
-                for form in parameter.forms if cause.bends else ():
+                for form in parameter.forms:
                     if form != cause.shapes[0][i]:
                         causes = best.instead(number, cause.reshaped(i, form))
                         tried.append(self._fit(causes, runs, best.loads))
+        if len(tried) > 1:
+            tried = [self._stepped(made, runs) for made in tried]
         return min(tried, key=lambda made: made.cost)
 
     def _onsets(self, best: Fit, runs: Sequence[Run]) -> Fit:
