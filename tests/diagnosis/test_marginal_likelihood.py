@@ -27,7 +27,7 @@ def problem(seed: int = 0, strength: float = 0.0) -> tuple[np.ndarray, np.ndarra
     )
     background = (("law", 5, 1.0, 0.0), ("cuff", 6, 1.0, 0.0), ("wander", 7, 1.0, 0.0))
     none = np.zeros((8, 8))
-    return X, y, Evidence(X.T @ X, none, X.T @ y, np.zeros(8), elements, background, {})
+    return X, y, Evidence(X.T @ X, none, X.T @ y, np.zeros(8), elements, background, {}, (0.0, 0.0))
 
 
 def background_covariance(X: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ def evidence_from(X: np.ndarray, y: np.ndarray, elements: tuple[Element, ...], *
     """Return the evidence of rows that are all of drives; the last column is a good rig's."""
     none = np.zeros((X.shape[1], X.shape[1]))
     background = (("law", X.shape[1] - 1, 1.0, 0.0),)
-    return Evidence(X.T @ X, none, X.T @ y, np.zeros(len(none)), elements, background, {}, **more)
+    return Evidence(X.T @ X, none, X.T @ y, np.zeros(len(none)), elements, background, {}, (0.0, 0.0), **more)
 
 
 def problem(seed: int = 0, strength: float = 0.0, noise_columns: int = 0) -> Evidence:

@@ -39,7 +39,10 @@ class Cause:
         cls, fitted: Fitted, slopes: NDArray, regression: DecisionRegression, *, first: bool,
         context: int = -1,
     ) -> "Cause | None":  # fmt: skip
-        """Return a fitted candidate as a cause; None where the baseline leaves nothing of it."""
+        """Return a fitted candidate as a cause; None where the baseline leaves nothing of it.
+
+        ``slopes`` (N, d) are what a change of its shape does.
+        """
         # The effect's own first amplitude keeps its sign as the last column of the triangle.
         shares = regression.shares(fitted.columns)
         _, triangle = np.linalg.qr(shares[:, ::-1])

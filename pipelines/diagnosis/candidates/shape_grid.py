@@ -96,7 +96,7 @@ def _tried(effect: Effect, parameter: Parameter, few: int, runs: Sequence[Run]) 
 
 
 def values_in(effect: Effect, parameter: Parameter, count: int, runs: Sequence[Run]) -> NDArray:
-    """Return the values of an effect's shape parameter that are tried on some runs."""
+    """Return the values of an effect's shape parameter that are tried on some runs, (k,)."""
     if not parameter.swept or effect.joint is None:
         return values_of(parameter, count)
     j = runs[0].motion.joint_index(effect.joint)

@@ -123,7 +123,7 @@ class DecisionRegression:
         return columns - self.basis @ (self.basis.T @ columns)
 
     def series(self, output: int) -> Iterator[tuple[NDArray, NDArray]]:
-        """Yield for each run the times of an output's rows and what the baseline leaves there."""
+        """Yield for each run the times of an output's rows and what the baseline leaves there, (m,) each."""
         ends = np.cumsum([0, *(root.size for root in self.roots)])
         values = np.zeros(len(self.weighty))
         values[self.weighty] = self.measured

@@ -35,7 +35,10 @@ class Validated:
 def without_each(
     made: Fit, train: Sequence[Run], validate: Sequence[Run], baseline: Baseline, weights: NDArray
 ) -> dict[str, Validated]:
-    """Return the model without each of its causes, the others kept and fitted anew, by label."""
+    """Return the model without each of its causes, the others kept and fitted anew, by label.
+
+    ``weights`` (O,) are those of the outputs.
+    """
     found = {}
     for label in {cause.label for cause in made.causes}:
         rest = [cause for cause in made.causes if cause.label != label]

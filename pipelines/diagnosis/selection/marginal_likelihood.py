@@ -18,7 +18,7 @@ from scipy.special import log_ndtr, logsumexp
 
 from pipelines.diagnosis.criteria import Criteria
 from pipelines.diagnosis.selection.evidence import Element, Evidence
-from pipelines.diagnosis.selection.prior import features, of_set, weights
+from pipelines.diagnosis.selection.prior import FEATURES, features, of_set, weights
 
 ROUGH_SHARE = 0.08
 """Prior share with which sets are screened before each is weighed in full."""
@@ -45,7 +45,7 @@ class MarginalLikelihood:
         right = drive * evidence.drives_right + cuff * evidence.cuffs_right
         self.gram, self.right = _without(gram, right, *self._background())
         self.parts = [np.array([*e.columns, *e.derivative], dtype=int) for e in evidence.elements]
-        self.features = np.array([features(e, evidence.heard) for e in evidence.elements])
+        self.features = np.reshape([features(e, evidence.heard) for e in evidence.elements], (-1, len(FEATURES)))
         self._weights = weights(criteria)
         self.lines = np.array([_shown(e, criteria) for e in evidence.elements])
 

@@ -15,7 +15,7 @@ HEARD_BY = {"backlash": "impacts", "voluntary_torque": "coherence"}
 
 
 def features(element: Element, heard: Mapping[str, float]) -> NDArray:
-    """Return the features of one element, in the order of ``FEATURES``.
+    """Return the features of one element, (features,), in the order of ``FEATURES``.
 
     Parameters
     ----------
@@ -32,12 +32,12 @@ def features(element: Element, heard: Mapping[str, float]) -> NDArray:
 
 
 def of_set(chosen: Sequence[NDArray]) -> NDArray:
-    """Return the features of a set from those of its elements."""
+    """Return the features of a set, (features,), from those of its elements, (features,) each."""
     total = np.sum(chosen, axis=0) if len(chosen) else np.zeros(len(FEATURES))
     total[FEATURES.index("further")] = max(len(chosen) - 1, 0)
     return total
 
 
 def weights(criteria: Criteria) -> NDArray:
-    """Return the log odds of one unit of each feature."""
+    """Return the log odds of one unit of each feature, (features,)."""
     return np.array([getattr(criteria, name) for name in FEATURES])
