@@ -216,7 +216,6 @@ def test_a_run_shorter_than_its_period_is_still_dealt_out_to_every_fold(run):
     assert set(short.fold) == set(range(FOLDS))
 
 
-@pytest.mark.xfail(strict=True, reason="the joint refinement keeps no least number of waves")
 def test_a_wave_that_does_not_come_again_within_the_motion_is_no_cogging(run):
     baseline, ripple = baseline_of([run]), Cogging(joint="knee")
     angle = run.state[0][:, 1]

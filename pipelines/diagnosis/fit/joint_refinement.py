@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.candidates.candidate import Candidate, lowest
 from pipelines.diagnosis.candidates.shape_refinement import changed, free_shapes, unit_at
 from pipelines.diagnosis.evidence.baseline import Baseline, with_load
 from pipelines.diagnosis.evidence.baseline_columns import gram_of_runs
@@ -103,7 +103,7 @@ class Refinement:
         steps = solve(gram, self._weights)[len(best.values) :]
         length = 1.0
         for _ in range(HALVINGS):
-            causes = _moved(best.causes, places, length * steps)
+            causes = _moved(best.causes, places, length * steps, runs)
             ahead = self._fit(causes, runs, best.loads)
             if ahead.cost < best.cost:
                 return ahead
@@ -121,10 +121,17 @@ class Refinement:
         return places
 
 
-def _moved(causes: Sequence[Candidate], places: Sequence[Place], steps: NDArray) -> list[Candidate]:
-    """Return the causes after steps of their shapes, each in its own unit, not in units of change."""
+def _moved(
+    causes: Sequence[Candidate], places: Sequence[Place], steps: NDArray, runs: Sequence[Run]
+) -> list[Candidate]:
+    """Return the causes after steps of their shapes, each in its own unit, not in units of change.
+
+    No wave becomes longer than the runs can tell.
+    """
     moved = list(causes)
     for (number, i, run, unit), step in zip(places, steps, strict=True):
-        of_unit = step / unit_at(moved[number], i, unit, max(run, 0))
-        moved[number] = changed(moved[number], i, unit, of_unit, None if run < 0 else [run])
+        of_unit, own = step / unit_at(moved[number], i, unit, max(run, 0)), None if run < 0 else [run]
+        ahead = changed(moved[number], i, unit, of_unit, own)
+        least = lowest(ahead.effect, ahead.effect.shape[i], runs)
+        moved[number] = ahead if ahead.shapes[max(run, 0)][i] >= least else ahead.reshaped(i, least, own)
     return moved
