@@ -15,7 +15,7 @@ MACHINES = $(wildcard build/blind-machines/report.json)
 SEEDS ?= tuning
 
 .DEFAULT_GOAL := help
-.PHONY: help all test test-slow invariants check format bench estimators real fuzz blind blind-full blind-machines blind-fixed blind-page docs lock clean install
+.PHONY: help all test test-slow invariants check format bench estimators real fuzz blind blind-full blind-machines blind-fixed blind-page evidence learn docs lock clean install
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | sort | expand -t 12
@@ -76,6 +76,12 @@ blind-fixed: $(INSTALLED) ## record anew how the fixed set of CI comes out, in t
 blind-page: $(INSTALLED) ## write docs/blind.md and docs/blind-machines.md from the examinations that were made
 	$(if $(LEGS),$(BIN)/python -m tests.blind.page $(LEGS) docs/blind.md)
 	$(if $(MACHINES),$(BIN)/python -m tests.blind.page $(MACHINES) docs/blind-machines.md)
+
+evidence: $(INSTALLED) ## what the decision needs of 3000 simulated sessions, into build/learn; hours, goes on where it stopped
+	$(BIN)/python -m tests.learn evidence --cases 1000 --workers $$(nproc) --out build/learn
+
+learn: $(INSTALLED) ## learn the criteria from that evidence, into build/learn/learned.json; an hour
+	$(BIN)/python -m tests.learn fit --workers $$(nproc) --out build/learn
 
 docs: $(INSTALLED) ## bring the generated pages up to date, and make the site of all pages in build/site
 	$(BIN)/python -m pipelines.settings.reference > docs/settings.md
