@@ -11,7 +11,7 @@ class Criteria:
     """The hyper-parameters of the posterior over sets of causes and laws."""
 
     drive_weight: float = 2.03
-    """How much of a drive row's likelihood counts: rows are not quite independent."""
+    """How much of a drive row's likelihood counts where nothing is missing; above one, the noise was told too large."""
     cuff_weight: float = 0.019
     """The same of a cuff row."""
     model_error: float = 0.00715

@@ -34,9 +34,9 @@ def held_back(t, q, dq, ddq, own):
     return lag
 
 
-def off_by_a_little(t, q, dq, ddq, own):
-    """A current that is read too small where it is large, by up to three percent."""
-    return -0.03 * own * (own / np.abs(own).max()) ** 2
+def off_by_a_little(share, own):
+    """A current that is read too small where it is large, by up to a share."""
+    return -share * own * (own / np.abs(own).max()) ** 2
 
 
 def gripped_beyond_a_speed(t, q, dq, ddq, own):
@@ -58,6 +58,7 @@ def test_what_a_cause_of_another_form_leaves_is_told_with_what_it_goes_with(kind
     assert f"of what is left at the {joint} depends on the {joint}'s speed" in said["summary"]
 
 
+@pytest.mark.xfail(strict=True, reason="a wide Stribeck peak is named where friction falls away from nought")
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])
 def test_no_friction_is_an_excess_over_one_that_gives_energy(kind):
     said = told(kind, gripped_beyond_a_speed)
@@ -69,7 +70,8 @@ def test_no_friction_is_an_excess_over_one_that_gives_energy(kind):
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])
 def test_a_bearing_that_is_rough_on_one_side_is_no_play(kind):
     said = told(kind, rough_on_one_side)
-    assert said["status"] == "unknown_cause" and not said["causes"]
+    assert [cause["effect"] for cause in said["causes"]] == ["position_dependent_friction"]
+    assert said["status"] == "partly_explained", "its equation has no step"
 
 
 def test_a_lifts_weight_hides_nothing_for_what_is_off_varies_with_the_force():
@@ -81,13 +83,15 @@ def test_a_lifts_weight_hides_nothing_for_what_is_off_varies_with_the_force():
     assert "depends on the force that the carriage passes on" in said["summary"]
 
 
-def test_an_error_that_is_no_noise_but_as_small_as_on_a_good_rig_is_nothing_missing():
-    said = told("revolute", off_by_a_little)
-    (error,), (floor,), (torque,) = (
-        said[key].values() for key in ("baseline_rmse_nm", "noise_floor_nm", "torque_rms_nm")
-    )
-    assert np.sqrt(error**2 - floor**2) < 0.01 * torque
-    assert said["status"] == "nothing_missing"
+@pytest.mark.parametrize(
+    ("share", "status", "words"), [(0.015, "nothing_missing", []), (0.03, "unknown_cause", ["a law of the arm's load"])]
+)
+def test_a_reading_off_by_some_percent_is_a_law_of_the_load_and_half_of_it_is_as_on_a_good_rig(share, status, words):
+    said = told("revolute", lambda t, q, dq, ddq, own: off_by_a_little(share, own))
+    assert (said["status"], said["causes"]) == (status, [])
+    assert [finding["words"] for finding in said["findings"]] == words
+    (error,), (torque,) = (said[key].values() for key in ("baseline_rmse_nm", "torque_rms_nm"))
+    assert error < 0.02 * torque
 
 
 def test_a_lift_of_which_nothing_is_hidden_misses_nothing():
