@@ -19,7 +19,8 @@ def naming(d: Diagnosis, *labels: str, ties: tuple[tuple[str, float], ...] = ())
         for number, label in enumerate(labels)
     )
     answer = Answer(named, 0.0, 0.0)
-    found = tuple(findings(selected.posterior, answer))
+    # What the posterior itself holds beside them is another answer's.
+    found = tuple(one for one in findings(selected.posterior, answer) if one.level == "cause")
     return _validated(d.data, selected.library.prepared, replace(selected, answer=answer, findings=found))
 
 

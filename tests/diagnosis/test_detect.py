@@ -73,7 +73,7 @@ def test_an_effect_of_the_smallest_size_is_found_as_often_as_promised(label):
     candidate = Candidate(one.effect, ((),))
     own = [torque_columns(candidate, r, run)[:, :2] for r, run in enumerate(runs)]
     plain = [columns_under((), run, baseline)[0][:, :2] for run in runs]
-    root = np.sqrt(CRITERIA.drive_weight * share) / rms
+    root = np.sqrt(min(CRITERIA.drive_weight, 1.0) * share) / rms
     independent = share * max(sum(run.usable[:, o].sum() for run in runs) for o in (0, 1))
     price = 0.5 * np.log(independent) - CRITERIA.cause
     effect = one.smallest * rows_of(own, runs, root)[:, 0]

@@ -147,7 +147,9 @@ class Sight:
         there = np.isfinite(floor.rms) & (floor.rms > 0)
         noise, share = np.where(there, floor.rms, 1.0), floor.independent_share
         drives = len(noise) // 2
-        counts = np.repeat([CRITERIA.drive_weight, CRITERIA.cuff_weight], drives)
+        # A weight above one makes up for noise that recordings tell too large; here it is given.
+        weights = np.minimum([CRITERIA.drive_weight, CRITERIA.cuff_weight], 1.0)
+        counts = np.repeat(weights, drives)
         root = np.where(there, np.sqrt(counts * share) / noise, 0.0)
         independent = float(np.max(share * plain.count.sum(axis=0)))
         values = solve(plain, root**2)
