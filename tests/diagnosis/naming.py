@@ -19,9 +19,11 @@ def naming(d: Diagnosis, *labels: str, ties: tuple[tuple[str, float], ...] = ())
         for number, label in enumerate(labels)
     )
     answer = Answer(named, 0.0, 0.0)
+    found = tuple(findings(selected.posterior, answer))
+    fitted = _validated(d.data, selected.library.prepared, replace(selected, answer=answer, findings=found))
     # What the posterior itself holds beside them is another answer's.
-    found = tuple(one for one in findings(selected.posterior, answer) if one.level == "cause")
-    return _validated(d.data, selected.library.prepared, replace(selected, answer=answer, findings=found))
+    causes = tuple(one for one in fitted.selected.findings if one.level == "cause")
+    return replace(fitted, selected=replace(fitted.selected, findings=causes))
 
 
 def _best(d: Diagnosis, label: str):
