@@ -80,7 +80,7 @@ def test_friction_that_differs_with_direction_is_named_at_a_ball_screw_in_newton
 def test_a_cause_that_harms_the_validation_run_is_dropped_and_the_other_stays_named():
     """A spring is added to the training run alone, beside friction that differs with direction in both."""
     train, validate = motions(slide, asymmetry=-80.0)
-    found = diagnose([replace(train, torque=train.torque + 200.0 * train.q), validate])
+    found = diagnose([replace(train, torque=train.torque + 90.0 * train.q), validate])
     before = {one.element.label for one in answer_of(found.selected.posterior).named}
     assert "viscous_asymmetry@axis" in before and len(before) == 2, "training names both"
     assert found.causes == ("viscous_asymmetry@axis",)
