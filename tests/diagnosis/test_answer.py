@@ -84,6 +84,28 @@ def test_a_cause_and_an_unlisted_remainder_are_told_together():
     assert next(one for one in told if one.family == "time").repeats is False
 
 
+def test_a_law_of_the_same_family_as_the_named_cause_is_told_beside_it():
+    posterior = weighed(_04=0.8, _0=0.2)
+    cause, rest = sorted(findings(posterior, answer_of(posterior)), key=lambda one: one.level)
+    assert (cause.level, cause.causes[0][0]) == ("cause", "parallel_spring@knee")
+    assert (rest.level, rest.family, rest.probability) == ("family", "angle", pytest.approx(0.8))
+    assert rest.laws == (("law:angle@knee", pytest.approx(0.8)),)
+    assert rest.causes == ()
+
+
+def test_what_may_stand_in_the_place_of_a_named_cause_is_no_second_finding():
+    posterior = weighed(_0=0.55, _4=0.45)
+    (finding,) = findings(posterior, answer_of(posterior))
+    assert finding.level == "cause"
+
+
+def test_a_rest_of_which_only_the_joint_is_known_is_told_beside_the_named_cause():
+    posterior = weighed(_02=0.35, _05=0.35, _0=0.3)
+    told = findings(posterior, answer_of(posterior))
+    assert [(one.level, one.joint) for one in told] == [("cause", "knee"), ("joint", "hip")]
+    assert told[1].probability == pytest.approx(0.7)
+
+
 def test_where_families_are_in_doubt_the_joint_is_told_and_else_whether_it_repeats():
     joint = weighed(_2=0.3, _3=0.05, _5=0.4, _=0.25)
     (finding,) = findings(joint, answer_of(joint))

@@ -233,3 +233,11 @@ def test_a_shape_that_ended_where_its_search_ends_is_told_with_its_value():
     assert told(0.2) == []
     (caveat,) = told(least)
     assert f"passive_joint_torque@knee ended at the limit of its search, onset_angle = {least:.3g} rad" in caveat
+
+
+@pytest.mark.parametrize(("unlisted", "status"), [(0.4, "explained"), (0.6, "partly_explained")])
+def test_beside_a_likely_unlisted_law_named_causes_explain_a_part(stuck, unlisted, status):
+    """Even where they leave little: what is left need not show in the validation runs' error."""
+    answer = replace(stuck.selected.answer, unlisted=unlisted)
+    d = with_errors(replace(stuck, selected=replace(stuck.selected, answer=answer)), [0.5, 0.3], [0.6, 2.4], [0.5, 0.3])
+    assert d.status == status
