@@ -10,7 +10,7 @@ from pipelines.dynamics.assembly import assemble
 from pipelines.dynamics.forward import DTHETA, THETA, Q, accelerations, resting_state, stages, step, workspace
 from pipelines.effects.cuff_compliance import CuffCompliance
 from pipelines.effects.joint_elasticity import JointElasticity
-from pipelines.effects.kernel import swing_along
+from pipelines.effects.kernel import address, swing_along
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.effects.swing import behind_spring
 from pipelines.mechanics.geometry import Geometry
@@ -25,7 +25,7 @@ def swung(stiffness, torque, inertia, ratio=0.0, h=0.005):
     """Return the twist of a constant inertia on an elastic joint's spring."""
     twist, zero = np.empty(len(torque)), np.zeros(len(torque))
     spring = JointElasticity("hip").spring
-    swing_along(spring, np.array([stiffness]), ratio, 0.02, h, torque, zero + inertia, zero, zero, twist)
+    swing_along(address(spring), np.array([stiffness]), ratio, 0.02, h, torque, zero + inertia, zero, zero, twist)
     return twist
 
 
@@ -50,7 +50,7 @@ def test_a_load_that_a_fit_has_made_of_nothing_does_not_run_away():
     """Gravity that pushes up harder than the spring holds: undisturbed it would be beyond any number in seconds."""
     twist, ones = np.empty(20_000), np.ones(20_000)
     spring = JointElasticity("hip").spring
-    swing_along(spring, np.array([100.0]), 0.0, 0.02, 0.005, ones, -ones, -ones, -1e4 * ones, twist)
+    swing_along(address(spring), np.array([100.0]), 0.0, 0.02, 0.005, ones, -ones, -ones, -1e4 * ones, twist)
     assert np.isfinite(twist).all()
     assert np.abs(twist).max() <= np.pi
 
