@@ -59,7 +59,7 @@ def diagnosed(folder, seed, travel, counts=COUNTS, late=0.0):
             plan.torque(smooth.DAHL, j, level, travel)
         plan.channel.delay_s[:] = late
         runs.append(record(rig, random_excitation(rng), plan, run, rng))
-    write(Session(case(seed, "none", 0, plain=True), rig, [], runs), folder / "recordings", folder / "truth.json")
+    write(Session(case(seed, "none", 0), rig, [], runs), folder / "recordings", folder / "truth.json")
     return diagnose(read_motions(sorted((folder / "recordings").glob("*.parquet")), FilterSettings(), Geometry()))
 
 
