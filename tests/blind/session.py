@@ -71,7 +71,7 @@ class Session:
     runs: list[Recorded]
     conditions: Conditions = PLAIN
     trajectories: Mapping[str, Trajectory] = field(default_factory=dict)
-    """Motions by purpose; empty where they are plain."""
+    """Motions by purpose; empty where they are plain, and so are clocks and headers then."""
     background: list[tuple[Cause, float, float]] = field(default_factory=list)
     """Small effects that are there besides: cause, size, magnitude."""
 
@@ -298,7 +298,7 @@ def write(session: Session, recordings: Path, truth: Path) -> None:
     label = hashlib.sha256(f"session {session.case.seed}".encode()).hexdigest()[:8]
     tables = [session.mechanism.columns(session.rig, r) for r in session.runs]
     gaps: dict[int, recorder.Gaps] = {}
-    if not session.case.plain:
+    if session.trajectories:
         clock = np.random.default_rng([session.case.seed, 7])
         tables = [
             recorder.stamped(t, r, session.conditions, clock)
@@ -324,7 +324,7 @@ def write(session: Session, recordings: Path, truth: Path) -> None:
 
 def _header(session: Session, r: Recorded, label: str) -> dict[str, Any]:
     told = session.mechanism.header(session.rig, r)
-    if not session.case.plain:
+    if session.trajectories:
         about = {
             "contract": "recording/1",
             "run": r.run.kind,
