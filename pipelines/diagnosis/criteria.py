@@ -15,7 +15,7 @@ class Criteria:
     cuff_weight: float = 0.019
     """The same of a cuff row."""
     model_error: float = 0.00715
-    """What counts as noise besides, per unit of what all causes and laws explain together: no form is exact."""
+    """What counts as noise besides, per unit of what all causes and laws explain at an output: no form is exact."""
     form_misfit: float = 0.1
     """Share of a residual's rms that counts as noise: no form of any cause follows it exactly."""
     background_law: float = 0.00014

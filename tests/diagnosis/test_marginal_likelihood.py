@@ -26,8 +26,9 @@ def problem(seed: int = 0, strength: float = 0.0) -> tuple[np.ndarray, np.ndarra
         Element("law:angle@hip", "angle", "hip", "angle", True, [3, 4], [0.7, 0.3]),
     )
     background = (("law", 5, 1.0, 0.0), ("cuff", 6, 1.0, 0.0), ("wander", 7, 1.0, 0.0))
-    none = np.zeros((8, 8))
-    return X, y, Evidence(X.T @ X, none, X.T @ y, np.zeros(8), elements, background, {}, (0.0, 0.0))
+    gram, right = np.zeros((2, 8, 8)), np.zeros((2, 8))
+    gram[0], right[0] = X.T @ X, X.T @ y
+    return X, y, Evidence(gram, right, elements, background, {}, np.zeros(2))
 
 
 def background_covariance(X: np.ndarray) -> np.ndarray:
@@ -97,7 +98,7 @@ def test_screening_ranks_pairs_as_the_exact_weighing_does_without_misfit():
 def test_what_all_columns_explain_counts_as_noise_by_the_model_error():
     _, _, evidence = problem(strength=0.1)
     criteria = replace(CRITERIA, model_error=0.01)
-    inexact = MarginalLikelihood(replace(evidence, explained=(50.0, 0.0)), criteria)
+    inexact = MarginalLikelihood(replace(evidence, explained=np.array([50.0, 0.0])), criteria)
     noisier = MarginalLikelihood(evidence, replace(criteria, drive_weight=1.0 / 1.5))
     for chosen in ((0,), (1,), (0, 2)):
         assert inexact(chosen) == pytest.approx(noisier(chosen), abs=1e-9)
@@ -120,9 +121,9 @@ def test_probabilities_add_up_to_one_and_nothing_wins_where_nothing_is_hidden():
 
 def test_a_strong_cause_is_found_and_a_set_that_cannot_be_weighed_is_left_out():
     _, _, evidence = problem(strength=0.5)
-    broken = evidence.drives.copy()
-    broken[1, 1] = -1e9  # no product of columns: its matrix is not positive definite
-    weighed = posterior(replace(evidence, drives=broken), CRITERIA)
+    broken = evidence.gram.copy()
+    broken[0, 1, 1] = -1e9  # no product of columns: its matrix is not positive definite
+    weighed = posterior(replace(evidence, gram=broken), CRITERIA)
     assert weighed.probabilities.sum() == pytest.approx(1.0)
     assert weighed.marginals["spring@hip"] > 0.99
     assert weighed.marginals.get("drag@knee", 0.0) == 0.0
@@ -131,7 +132,7 @@ def test_a_strong_cause_is_found_and_a_set_that_cannot_be_weighed_is_left_out():
 def test_evidence_survives_being_packed():
     _, _, evidence = problem(strength=0.2)
     again = Evidence.unpacked(evidence.packed())
-    np.testing.assert_allclose(again.drives, evidence.drives, rtol=1e-6)
+    np.testing.assert_allclose(again.gram, evidence.gram, rtol=1e-6)
     assert again.elements == evidence.elements
     assert again.background == evidence.background
     ours, theirs = posterior(evidence, CRITERIA), posterior(again, CRITERIA)

@@ -38,6 +38,21 @@ def test_the_density_where_columns_move_is_that_of_the_noise(tau):
     assert np.std(found) < 0.35 * np.mean(found)
 
 
+@pytest.mark.parametrize("share", [0.6, 0.33, 0.2])
+def test_above_the_motion_noise_is_known_through_gaps(share):
+    """A joint that often stands still is known in short stretches only; it counts all the same."""
+    rng, true, found = np.random.default_rng(1), 0.3**2 / RATE_HZ, []
+    for _ in range(20):
+        x, at = np.full(2400, np.nan), 0
+        while at < len(x):
+            length = int(rng.integers(10, 50))
+            x[at : at + length] = 0.3 * rng.normal(size=len(x[at : at + length]))
+            at += length + int(rng.exponential(30.0 * (1.0 / share - 1.0)))
+        found.append(_spectrum_of([x], RATE_HZ, (4.0, 8.0), np.array([0.2]))[0])
+    assert 0.7 * true < np.median(found) < 1.8 * true
+    assert np.all((np.array(found) > 0.1 * true) & (np.array(found) < 10.0 * true))
+
+
 def test_pink_noise_is_known_to_grow_towards_low_frequencies():
     rng = np.random.default_rng(6)
     frequency = np.fft.rfftfreq(4800, 1.0 / RATE_HZ)

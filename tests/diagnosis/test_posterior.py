@@ -20,9 +20,9 @@ def cause(name: str, columns: list[int]) -> Element:
 
 def evidence_from(X: np.ndarray, y: np.ndarray, elements: tuple[Element, ...], **more) -> Evidence:
     """Return the evidence of rows that are all of drives; the last column is a good rig's."""
-    none = np.zeros((X.shape[1], X.shape[1]))
     background = (("law", X.shape[1] - 1, 1.0, 0.0),)
-    return Evidence(X.T @ X, none, X.T @ y, np.zeros(len(none)), elements, background, {}, (0.0, 0.0), **more)
+    gram, right = (np.array([part, np.zeros_like(part)]) for part in (X.T @ X, X.T @ y))
+    return Evidence(gram, right, elements, background, {}, np.zeros(2), **more)
 
 
 def problem(seed: int = 0, strength: float = 0.0, noise_columns: int = 0) -> Evidence:
@@ -61,12 +61,12 @@ def test_the_order_of_elements_changes_nothing(strength):
 
 def test_the_order_of_columns_changes_nothing():
     evidence = problem(strength=0.1)
-    order = np.random.default_rng(3).permutation(len(evidence.drives))
+    order = np.random.default_rng(3).permutation(evidence.gram.shape[1])
     place = np.argsort(order).tolist()
     moved = replace(
         evidence,
-        drives=evidence.drives[np.ix_(order, order)],
-        drives_right=evidence.drives_right[order],
+        gram=evidence.gram[:, order[:, np.newaxis], order],
+        right=evidence.right[:, order],
         elements=tuple(replace(e, columns=[place[c] for c in e.columns]) for e in evidence.elements),
         background=tuple((kind, place[c], *sizes) for kind, c, *sizes in evidence.background),
     )

@@ -63,7 +63,7 @@ def evidence_row(recordings: Path) -> dict[str, Any]:
     from pipelines.settings.filter import FilterSettings
 
     began = time.process_time()
-    empty = {"drives": b"", "cuffs": b"", "right": b"", "text": "", "refused": ""}
+    empty = {"gram": b"", "right": b"", "text": "", "refused": ""}
     try:
         motions = read_motions(sorted(recordings.glob("*.parquet")), FilterSettings(), None)
         row = empty | evidence_of(motions).packed()

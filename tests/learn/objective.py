@@ -96,9 +96,7 @@ def _compact(
     )  # fmt: skip
     square = np.ix_(kept, kept)
     small = replace(
-        evidence, drives=evidence.drives[square].astype(np.float32),
-        cuffs=evidence.cuffs[square].astype(np.float32),
-        drives_right=evidence.drives_right[kept], cuffs_right=evidence.cuffs_right[kept],
+        evidence, gram=evidence.gram[:, *square].astype(np.float32), right=evidence.right[:, kept],
         elements=own, background=tuple((k, new[p], v, n) for k, p, v, n in evidence.background),
     )  # fmt: skip
     number = {i: n for n, i in enumerate(elements)}

@@ -40,6 +40,8 @@ PIECE_S = 20.0
 """Length of the pieces of a series whose spectra are taken, s."""
 SHORTEST = 64
 """Blocks that a series must have for its spectrum to count."""
+LARGEST_SLOW = 0.8
+"""Share of a series' known blocks that the slow cosines may be at most in number."""
 UNLIKE = 3.0
 """Times the median of all pieces, from which a piece holds what came or went, not noise."""
 
@@ -111,39 +113,48 @@ def _spectrum_of(
     Maximum likelihood of the periodogram (Whittle, 1953, Arkiv för Matematik 2(23)).
     """
     pieces = [piece for x in series for piece in _pieces(x, rate_hz, band)]
-    sizes = np.array([power.mean() for _, power in pieces])
+    sizes = np.array([power.sum() / share.sum() for _, power, share in pieces])
     if not sizes.any():
         return np.nan, np.nan, np.nan
     alike = sizes <= UNLIKE * np.median(sizes)
-    frequency, power = (np.concatenate([p[k] for p, a in zip(pieces, alike, strict=True) if a]) for k in (0, 1))
-    first = 1.0 / (1.0 + (2.0 * np.pi * np.outer(CORRELATION_S, frequency)) ** 2)
+    chosen = [piece for piece, is_alike in zip(pieces, alike, strict=True) if is_alike]
+    frequency, power, share = (np.concatenate(parts) for parts in zip(*chosen, strict=True))
+    # A band tells no correlation time that is longer than its slowest wave.
+    tried = CORRELATION_S[2.0 * np.pi * band[0] * CORRELATION_S <= 1.0]
+    first = 1.0 / (1.0 + (2.0 * np.pi * np.outer(tried, frequency)) ** 2)
     shapes = first[:, np.newaxis] + pink[:, np.newaxis] * PINK_HZ / frequency
-    densities = np.mean(power / shapes, axis=2)
-    misfit = len(power) * np.log(densities) + np.sum(np.log(shapes), axis=2)
+    densities = np.sum(power / shapes, axis=2) / share.sum()
+    misfit = share.sum() * np.log(densities) + np.log(shapes) @ share
     t, p = np.unravel_index(np.argmin(misfit), misfit.shape)
-    return float(densities[t, p]), float(CORRELATION_S[t]), float(pink[p])
+    return float(densities[t, p]), float(tried[t]), float(pink[p])
 
 
-def _pieces(x: NDArray, rate_hz: float, band: tuple[float, float]) -> list[tuple[NDArray, NDArray]]:
-    """Return frequencies (Hz) and two-sided densities of each piece of a series within a band."""
+Piece = tuple[NDArray, NDArray, NDArray]
+
+
+def _pieces(x: NDArray, rate_hz: float, band: tuple[float, float]) -> list[Piece]:
+    """Return frequencies (Hz), densities of what is left, and shares that are left, within a band."""
     pieces = np.array_split(x, max(1, round(len(x) / (PIECE_S * rate_hz))))
-    found = [_of_piece(piece, rate_hz, band) for piece in pieces]
-    return [piece for piece in found if len(piece[0])]
+    return [_of_piece(piece, rate_hz, band) for piece in pieces if np.isfinite(piece).sum() >= SHORTEST]
 
 
-def _of_piece(x: NDArray, rate_hz: float, band: tuple[float, float]) -> tuple[NDArray, NDArray]:
+def _of_piece(x: NDArray, rate_hz: float, band: tuple[float, float]) -> Piece:
+    """Return one piece's spectrum without what is slow, which would leak into the band through gaps.
+
+    Through gaps the slow cosines take some of what is faster, too: of white noise the share of the
+    density that they leave is known.
+    """
     known, n = np.isfinite(x), len(x)
-    slow = _cosines(n, int(2.0 * band[0] * n / rate_hz) + 1)
-    if known.sum() < max(SHORTEST, 2 * slow.shape[1]):
-        return np.zeros(0), np.zeros(0)
-    # What is slow would leak into the band through the gaps.
-    wanders, *_ = np.linalg.lstsq(slow[known], x[known], rcond=None)
+    count = min(int(2.0 * band[0] * n / rate_hz) + 1, int(LARGEST_SLOW * known.sum()))
+    slow = np.zeros((n, count))
+    slow[known], _ = np.linalg.qr(_cosines(n, count)[known])
+    value = np.where(known, x, 0.0)
     window = np.hanning(n) * known
-    left = np.where(known, x - slow @ wanders, 0.0)
-    power = np.abs(np.fft.rfft(left * window)) ** 2
-    frequency = np.fft.rfftfreq(n, 1.0 / rate_hz)
+    power = np.abs(np.fft.rfft(window * (value - slow @ (slow.T @ value)))) ** 2
+    taken = np.sum(np.abs(np.fft.rfft(slow.T * window)) ** 2, axis=0)
+    frequency, total = np.fft.rfftfreq(n, 1.0 / rate_hz), np.sum(window**2)
     inside = (frequency > band[0]) & (frequency < min(band[1], 0.45 * rate_hz))
-    return frequency[inside], power[inside] / (np.sum(window**2) * rate_hz)
+    return frequency[inside], power[inside] / (total * rate_hz), 1.0 - taken[inside] / total
 
 
 def _cosines(n: int, count: int) -> NDArray:

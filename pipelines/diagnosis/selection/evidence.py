@@ -72,23 +72,20 @@ class Element:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Products over the training runs' rows; n columns."""
+    """Products over the training runs' rows, of each output (O,) apart: drives first; n columns."""
 
-    drives: NDArray
-    """(n, n) of the rows of drives."""
-    cuffs: NDArray
-    """(n, n) of the rows of cuffs."""
-    drives_right: NDArray
-    """(n,) with the measured torque."""
-    cuffs_right: NDArray
+    gram: NDArray
+    """(O, n, n) of the columns with one another."""
+    right: NDArray
+    """(O, n) of the columns with the measured torque."""
     elements: tuple[Element, ...]
     background: tuple[tuple[str, int, float, float], ...]
     """What a good rig has: kind (``law``, ``cuff``, ``wander``, ``cause``), column, its variance relative
     to others of the kind, and that of noise besides."""
     heard: Mapping[str, float]
     """Log likelihood of causes besides what they do to the mean torque, by label."""
-    explained: tuple[float, float]
-    """What all columns together explain of the drives' and of the cuffs' rows, squared and in units of the noise."""
+    explained: NDArray
+    """(O,) what all columns together explain of each output's rows, squared and in units of the noise."""
     contexts: tuple[tuple[int, ...], ...] = ()
     """Sets of elements whose causes were refined beside one another."""
     about: Mapping[str, Any] = field(default_factory=dict)
@@ -98,29 +95,27 @@ class Evidence:
     def of(cls, library: Library, heard: Mapping[str, float]) -> "Evidence":
         """Multiply a library's columns out."""
         X, at = _stack(library)
-        of_drives = library.regression.of_drives
-        y = library.regression.measured
-        parts = [(X[rows], y[rows]) for rows in (of_drives, ~of_drives)]
-        (drives, drives_right), (cuffs, cuffs_right) = ((X.T @ X, X.T @ y) for X, y in parts)
+        regression = library.regression
+        own = [regression.output == o for o in range(len(regression.torque))]
+        gram = np.array([X[rows].T @ X[rows] for rows in own])
+        right = np.array([X[rows].T @ regression.measured[rows] for rows in own])
         return cls(
-            drives, cuffs, drives_right, cuffs_right,
-            (elements := tuple(_elements(library, at))), tuple(_background(library, at)),
-            dict(heard), (explained(drives, drives_right), explained(cuffs, cuffs_right)),
+            gram, right, (elements := tuple(_elements(library, at))), tuple(_background(library, at)),
+            dict(heard), np.array([explained(g, r) for g, r in zip(gram, right, strict=True)]),
             tuple(_contexts(library, elements)), _about(library),
         )  # fmt: skip
 
     def packed(self) -> dict[str, Any]:
         """Return a row of a table: symmetric matrices as their upper triangles."""
-        upper = np.triu_indices(len(self.drives))
+        upper = np.triu_indices(self.gram.shape[1])
         return {
-            "drives": self.drives[upper].astype(np.float32).tobytes(),
-            "cuffs": self.cuffs[upper].astype(np.float32).tobytes(),
-            "right": np.concatenate([self.drives_right, self.cuffs_right]).tobytes(),
+            "gram": self.gram[:, *upper].astype(np.float32).tobytes(),
+            "right": self.right.tobytes(),
             "text": json.dumps(
                 {
                     "elements": [asdict(element) for element in self.elements],
                     "background": self.background, "heard": self.heard,
-                    "explained": self.explained,
+                    "explained": self.explained.tolist(),
                     "contexts": self.contexts, "about": self.about,
                 }
             ),
@@ -129,16 +124,14 @@ class Evidence:
     @classmethod
     def unpacked(cls, row: Mapping[str, Any]) -> "Evidence":
         """Return the evidence of a row that ``packed`` made."""
-        right = np.frombuffer(row["right"])
-        n, text = len(right) // 2, json.loads(row["text"])
-        drives, cuffs = _symmetric(row["drives"], n), _symmetric(row["cuffs"], n)
+        text = json.loads(row["text"])
+        explained = np.array(text["explained"])
+        right = np.frombuffer(row["right"]).reshape(len(explained), -1)
         return cls(
-            drives, cuffs, right[:n], right[n:],
+            _symmetric(row["gram"], right.shape), right,
             tuple(Element(**one) for one in text["elements"]),
             tuple((kind, place, v, noise) for kind, place, v, noise in text["background"]),
-            text["heard"],
-            tuple(text.get("explained") or (explained(drives, right[:n]), explained(cuffs, right[n:]))),
-            tuple(map(tuple, text["contexts"])), text["about"],
+            text["heard"], explained, tuple(map(tuple, text["contexts"])), text["about"],
         )  # fmt: skip
 
 
@@ -153,11 +146,12 @@ def explained(gram: NDArray, right: NDArray) -> float:
     return max(float(right @ both[:, 0] - np.trace(both[:, 1:])), 0.0)
 
 
-def _symmetric(packed: bytes, n: int) -> NDArray:
-    full = np.zeros((n, n))
+def _symmetric(packed: bytes, shape: tuple[int, int]) -> NDArray:
+    outputs, n = shape
+    full = np.zeros((outputs, n, n))
     upper = np.triu_indices(n)
-    full[upper] = np.frombuffer(packed, np.float32)
-    return full + np.triu(full, 1).T
+    full[:, *upper] = np.frombuffer(packed, np.float32).reshape(outputs, -1)
+    return full + np.triu(full, 1).transpose(0, 2, 1)
 
 
 @dataclass(frozen=True)

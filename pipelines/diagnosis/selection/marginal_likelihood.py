@@ -37,13 +37,9 @@ class MarginalLikelihood:
     def __init__(self, evidence: Evidence, criteria: Criteria) -> None:
         """Weight rows, and marginalise the background."""
         self.evidence, self.criteria = evidence, criteria
-        drive, cuff = (
-            weight / (1.0 + criteria.model_error * weight * explained)
-            for weight, explained in zip((criteria.drive_weight, criteria.cuff_weight), evidence.explained, strict=True)
-        )
-        gram = drive * evidence.drives + cuff * evidence.cuffs
-        right = drive * evidence.drives_right + cuff * evidence.cuffs_right
-        self.gram, self.right = _without(gram, right, *self._background())
+        power = _power(evidence.explained, criteria)
+        gram = np.einsum("o,oij->ij", power, evidence.gram)
+        self.gram, self.right = _without(gram, power @ evidence.right, *self._background())
         self.parts = [np.array([*e.columns, *e.derivative], dtype=int) for e in evidence.elements]
         own = [features(e, evidence.heard) for e in evidence.elements]
         self.features = np.array(own).reshape(-1, len(FEATURES))
@@ -191,6 +187,12 @@ class MarginalLikelihood:
     def alone(self) -> NDArray:
         """Log odds of each element alone, (elements,)."""
         return np.array([self((i,)) for i in range(len(self.evidence.elements))])
+
+
+def _power(explained: NDArray, criteria: Criteria) -> NDArray:
+    """Return how much of each output's likelihood counts, (O,): at each joint, what may be explained is not exact."""
+    weight = np.repeat([criteria.drive_weight, criteria.cuff_weight], len(explained) // 2)
+    return np.asarray(weight / (1.0 + criteria.model_error * weight * explained))
 
 
 def _without(gram: NDArray, right: NDArray, background: NDArray, sd: NDArray) -> tuple[NDArray, NDArray]:
