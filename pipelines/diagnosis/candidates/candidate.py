@@ -8,8 +8,10 @@ Linearised at biased parameters, elasticity would pass for an encoder offset.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from math import prod
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.observed_run import Run
@@ -68,6 +70,24 @@ class Candidate:
         per_run = [self.effect.per_run] * width if self.bends else None
         return TermColumns.of(self.effect, kinds, per_run, start)
 
+    def typical(self, kinds: Sequence[str]) -> NDArray:
+        """Return how large the amplitude of each column is where the effect is as large as on other machines, (k,).
+
+        Where the effect transforms the motion a column has its shape, or is in proportion to its direction.
+        """
+        if self.directions:
+            sizes = [_largest(self.effect, direction) for direction in self.directions]
+        elif self.bends:
+            sizes = [1.0]
+        else:
+            sizes = [max(map(abs, parameter.typical)) for parameter in self.effect.linear]
+        return np.array([sizes[k] for k, _ in self.columns_in(kinds).columns])
+
+    @property
+    def forms(self) -> int:
+        """Number of the forms of the effect, of which the best was chosen."""
+        return prod(max(len(parameter.forms), 1) for parameter in self.effect.shape)
+
     def is_free(self, i: int) -> bool:
         """Tell whether shape parameter ``i`` is fitted, and not held at its usual value or at one of its forms."""
         parameter = self.effect.shape[i]
@@ -91,6 +111,12 @@ def bends_motion(effect: Effect) -> bool:
     """Tell whether an effect changes kinematics or readings rather than adding torque of its own."""
     shaped = any(p.default is None for p in effect.shape)
     return type(effect).corrected is not Effect.corrected or (effect.torque_reading is not None and shaped)
+
+
+def _largest(effect: Effect, direction: Sequence[float]) -> float:
+    """Return how far along a direction of its shapes an effect may typically be."""
+    pairs = zip(effect.shape, direction, strict=True)
+    return max(max(map(abs, parameter.typical)) / abs(value) for parameter, value in pairs if value)
 
 
 def lowest(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> float:

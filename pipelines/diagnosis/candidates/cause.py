@@ -11,7 +11,7 @@ from pipelines.diagnosis.candidates.shape_refinement import Fitted
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 
 RANK = 1e-6
-"""Relative share below which a column of a cause adds nothing to those before it."""
+"""Relative size below which a direction of a cause's columns adds nothing to the larger ones."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,8 @@ class Cause:
     """(N, k)."""
     amplitudes: NDArray
     """(p, k): the effect's own amplitudes per coefficient."""
+    variance: NDArray
+    """(k,) prior variance of each coefficient relative to their sum, where amplitudes are as large as is typical."""
     derivative: NDArray
     """(N, d) what a change of its shape does: along each shape, and towards another form."""
     first: bool
@@ -52,18 +54,16 @@ class Cause:
         context : int, optional
             Number of the set beside whose others it was refined; -1 where it was refined alone.
         """
-        # The effect's own first amplitude keeps its sign as the last column of the triangle.
-        shares = regression.shares(fitted.columns)
-        _, triangle = np.linalg.qr(shares[:, ::-1])
-        size = np.abs(np.diag(triangle))
-        largest = max(size.max(initial=0.0), np.finfo(float).tiny)
-        kept = np.flatnonzero(size > RANK * largest)
-        if not len(kept) or not size.any():
+        typical = fitted.candidate.typical(regression.kinds)
+        _, size, turned = np.linalg.svd(regression.shares(fitted.columns) * typical, full_matrices=False)
+        kept = size > RANK * max(size.max(initial=0.0), np.finfo(float).tiny)
+        if not kept.any():
             return None
-        inverse = np.linalg.pinv(triangle)[::-1][:, kept]
-        columns = regression.project(fitted.columns @ inverse)
+        amplitudes = typical[:, np.newaxis] * turned[kept].T / size[kept]
+        columns = regression.project(fitted.columns @ amplitudes)
+        variance = size[kept] ** 2 / np.sum(size[kept] ** 2)
         derivative = regression.project(slopes)
-        return cls(fitted.candidate, columns, inverse, derivative, first, context)
+        return cls(fitted.candidate, columns, amplitudes, variance, derivative, first, context)
 
 
 def towards(best: Fitted, others: Sequence[Fitted]) -> NDArray:

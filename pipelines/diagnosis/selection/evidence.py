@@ -56,7 +56,8 @@ class Element:
     """Of a law: in all runs' drives, or the human's share."""
     place: int = -1
     """Of a cause: its number in the library."""
-
+    forms: int = 1
+    """Of a cause: the number of its forms, of which this is one."""
     shown: list[Shown] = field(default_factory=list)
     """Of a ripple or a tone: its lines at the full sampling rate."""
     context: int = -1
@@ -244,11 +245,11 @@ def _of_cause(number: int, cause: Cause, at: _Places, laws: Laws, prepared: Prep
     total = sum(v for _, v in resembles)
     return Element(
         effect.label, effect.name, effect.joint, str(effect.family), False, places,
-        [1.0 / len(places)] * len(places), at.derivatives[number].tolist(),
+        cause.variance.tolist(), at.derivatives[number].tolist(),
         [p for p, _ in resembles], [v / total for _, v in resembles],
         cause.amplitudes[_positive(cause)].tolist(),
         not effect.goes_with_time and effect.family != TIME, cause.first, effect.each_run,
-        effect.run is not None, place=number, context=cause.context,
+        effect.run is not None, place=number, forms=cause.candidate.forms, context=cause.context,
         shown=_shown(Kind.ANGLE, names.index(joint), prepared) if tracked and joint else [],
     )  # fmt: skip
 
@@ -288,7 +289,7 @@ def _background(library: Library, at: _Places):
         effect = cause.candidate.effect
         alone = cause.first and cause.context < 0
         if alone and not effect.each_run and effect.run is None:
-            yield from (("cause", int(place), 1.0 / len(places), 0.0) for place in places)
+            yield from (("cause", int(p), float(v), 0.0) for p, v in zip(places, cause.variance, strict=True))
 
 
 def _contexts(library: Library, elements: Sequence[Element]):

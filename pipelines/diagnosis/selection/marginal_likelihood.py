@@ -94,7 +94,9 @@ class MarginalLikelihood:
             )
             for share in misfits
         ]
-        mixture = -np.log(len(amplitudes)) * len(chosen) - np.log(len(misfits))
+        # All amplitudes, misfits and forms are equally likely.
+        forms = np.prod([e.forms for e in elements])
+        mixture = -np.log(len(amplitudes)) * len(chosen) - np.log(len(misfits)) - float(np.log(forms))
         return float(logsumexp(weighed)) + mixture
 
     def _variance(self, element: Element, amplitude: float) -> NDArray:
