@@ -135,18 +135,19 @@ class ShapeRefinement:
         What has begun acts as if it had always been there: the column of an instant is that of all
         the run, zero before it.
         """
-        at, runs = candidate.onset, range(len(candidate.shapes))
+        at, count = candidate.onset, len(candidate.shapes)
         assert at is not None
-        whole = [self._only_in(candidate, r) for r in runs]
-        times = [self._regression.time[self._regression.run == r] for r in runs]
-        steps = [(t.max() - t.min()) / ONSETS for t in times]
-        tried = [t.min() + step * np.arange(ONSETS) for t, step in zip(times, steps, strict=True)]
-        onsets, own = [NEVER for _ in runs], [np.zeros(len(self._measured)) for _ in runs]
+        times = {r: self._regression.time[self._regression.run == r] for r in range(count)}
+        times = {r: t for r, t in times.items() if len(t)}  # a run may have no row that counts
+        whole = {r: self._only_in(candidate, r) for r in times}
+        steps = {r: (t.max() - t.min()) / ONSETS for r, t in times.items()}
+        onsets, own = [NEVER] * count, {r: np.zeros(len(self._measured)) for r in times}
         for sweep in range(SWEEPS):
-            for r in runs:
-                fine = sweep and onsets[r] != NEVER
-                instants = np.linspace(onsets[r] - steps[r], onsets[r] + steps[r], ONSETS + 1) if fine else tried[r]
-                others = np.sum([own[k] for k in runs if k != r], axis=0) if len(runs) > 1 else np.zeros_like(own[r])
+            for r, t in times.items():
+                fine = sweep > 0 and onsets[r] != NEVER
+                ends = (onsets[r] - steps[r], onsets[r] + steps[r]) if fine else (t.min(), t.max() - steps[r])
+                instants = np.linspace(*ends, ONSETS + int(fine))
+                others = np.sum([own[k] for k in times if k != r], axis=0) if len(times) > 1 else np.zeros_like(own[r])
                 begun = whole[r][:, np.newaxis] * (self._regression.time[:, np.newaxis] >= instants)
                 columns = self._project(begun)
                 gains = self._gains(others[:, np.newaxis] + columns)
