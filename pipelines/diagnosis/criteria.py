@@ -42,6 +42,8 @@ class Criteria:
     """Prior log odds of each element beyond the first."""
     other_shape: float = -5.02
     """Log odds of a shape that is not the one which explains most."""
+    searched: float = -0.4
+    """Log odds per log number of the values among which a wave, a tone or an onset was sought."""
     each_run: float = -2.19
     """Log odds of a cause whose value is another in every run."""
     worn: float = -2.93

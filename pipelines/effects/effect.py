@@ -34,6 +34,8 @@ DIFFERENCE = 1e-6
 """Relative step of numerical derivatives."""
 
 
+WIDE = 4.0
+"""Ratio of a typical range's ends above which a parameter changes by factors."""
 LEAST_WARMING_C = 1.0
 """Change of a motor's temperature without which nothing that depends on it can be seen."""
 
@@ -133,6 +135,18 @@ class Parameter:
     def neutral(self) -> float:
         """Value at which its effect is not there; of a stiffness, the end that it never reaches."""
         return 1.0 if self.unit == "1" and self.typical[0] > 0 else 0.0
+
+    @property
+    def by_factors(self) -> bool:
+        """Whether it changes by factors: its typical range is positive and wide."""
+        low, high = self.typical
+        return low > 0.0 and high / low > WIDE
+
+    def off_middle(self, value: float) -> float:
+        """Return how far a value is off the middle of the typical range, in halves of the range."""
+        ends = np.array([*self.typical, value])
+        low, high, at = np.log(np.maximum(ends, np.finfo(float).tiny)) if self.by_factors else ends
+        return float((2.0 * at - low - high) / (high - low))
 
     def at(self, machine: Machine, joint: str) -> "Parameter":
         """Return the parameter as it is at a joint of a machine."""

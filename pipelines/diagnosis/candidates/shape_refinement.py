@@ -27,8 +27,6 @@ DIFFERENCE = 0.02
 """Step of a difference quotient, in the shape's own unit of change."""
 LARGEST_STEP = 0.7
 """Of one step, in the shape's unit of change."""
-WIDE = 4.0
-"""Ratio of the ends of a positive range from which a shape changes by factors."""
 MARGIN, BEYOND = 0.5, 2.0
 """Share of its typical range, and factor, by which a shape may leave that range."""
 ROUNDING = 1e-5
@@ -177,8 +175,7 @@ class ShapeRefinement:
             return start
         parameter, now = effect.shape[0], start.candidate.shapes[0][0]
         low, high = parameter.typical
-        wide = low > 0.0 and high / low > WIDE
-        if wide:
+        if parameter.by_factors:
             value = now / amplitude if effect.swings else now * amplitude
             value = float(np.clip(value, low / BEYOND, high * BEYOND))
         else:
@@ -264,7 +261,18 @@ def _unit_of(parameter: Parameter) -> float:
         return parameter.grain
     if parameter.unit == "Hz":
         return TONE_STEP_HZ
-    return 0.0 if low > 0.0 and high / low > WIDE else high - low
+    return 0.0 if parameter.by_factors else high - low
+
+
+def log_searched(candidate: Candidate) -> float:
+    """Return the log number of independent values among which its waves, tones and onsets were sought."""
+    effect, count = candidate.effect, 0.0
+    for i, parameter in enumerate(effect.shape):
+        if i == candidate.onset:
+            count += np.log(ONSETS) * sum(shape[i] < NEVER for shape in candidate.shapes)
+        elif candidate.is_free(i) and parameter.unit in (*TURNS, "Hz"):
+            count += np.log(np.ptp(parameter.typical) / _unit_of(parameter))
+    return float(count)
 
 
 def unit_at(candidate: Candidate, i: int, unit: float, run: int = 0) -> float:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates.cause import Cause
 from pipelines.diagnosis.candidates.library import Library, orders_of
+from pipelines.diagnosis.candidates.shape_refinement import log_searched
 from pipelines.diagnosis.candidates.smooth_laws import FAMILIES, HUM, TIME, LawColumn, law_label
 from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
@@ -56,8 +57,10 @@ class Element:
     """Of a law: in all runs' drives, or the human's share."""
     place: int = -1
     """Of a cause: its number in the library."""
-    forms: int = 1
-    """Of a cause: the number of its forms, of which this is one."""
+    log_prior: float = 0.0
+    """Of a cause: what its shape and form add to the log odds."""
+    log_searched: float = 0.0
+    """Of a cause: the log number of values among which its waves, tones and onsets were sought."""
     shown: list[Shown] = field(default_factory=list)
     """Of a ripple or a tone: its lines at the full sampling rate."""
     context: int = -1
@@ -248,8 +251,10 @@ def _of_cause(number: int, cause: Cause, at: _Places, laws: Laws, prepared: Prep
         cause.variance.tolist(), at.derivatives[number].tolist(),
         [p for p, _ in resembles], [v / total for _, v in resembles],
         cause.amplitudes[_positive(cause)].tolist(),
-        not effect.goes_with_time and effect.family != TIME, cause.first, effect.each_run,
-        effect.run is not None, place=number, forms=cause.candidate.forms, context=cause.context,
+        not effect.goes_with_time and effect.family != TIME, cause.first,
+        effect.each_run or any(p.per_run for p in effect.linear),
+        effect.run is not None, place=number, log_prior=cause.candidate.log_prior,
+        log_searched=log_searched(cause.candidate), context=cause.context,
         shown=_shown(Kind.ANGLE, names.index(joint), prepared) if tracked and joint else [],
     )  # fmt: skip
 

@@ -44,7 +44,7 @@ class MarginalLikelihood:
         own = [features(e, evidence.heard) for e in evidence.elements]
         self.features = np.array(own).reshape(-1, len(FEATURES))
         self._weights = weights(criteria)
-        self.lines = np.array([_shown(e, criteria) for e in evidence.elements])
+        self.apart = np.array([e.log_prior + _shown(e, criteria) for e in evidence.elements])
 
     def _background(self) -> tuple[NDArray, NDArray]:
         c = self.criteria
@@ -72,7 +72,7 @@ class MarginalLikelihood:
         if not chosen:
             return 0.0
         try:
-            return self._mixed(chosen) + float(self.lines[list(chosen)].sum())
+            return self._mixed(chosen) + float(self.apart[list(chosen)].sum())
         except np.linalg.LinAlgError:
             return -np.inf
 
@@ -94,9 +94,7 @@ class MarginalLikelihood:
             )
             for share in misfits
         ]
-        # All amplitudes, misfits and forms are equally likely.
-        forms = np.prod([e.forms for e in elements])
-        mixture = -np.log(len(amplitudes)) * len(chosen) - np.log(len(misfits)) - float(np.log(forms))
+        mixture = -np.log(len(amplitudes)) * len(chosen) - np.log(len(misfits))
         return float(logsumexp(weighed)) + mixture
 
     def _variance(self, element: Element, amplitude: float) -> NDArray:
@@ -149,7 +147,7 @@ class MarginalLikelihood:
                     c = np.hstack([columns[one[some], :a], columns[other[some], :b]])
                     s = np.hstack([sd[one[some], :a], sd[other[some], :b]])
                     odds[some] = self._rough(c, s)
-        own = self.lines + self.features @ self._weights
+        own = self.apart + self.features @ self._weights
         odds += own[numbers[one]] + own[numbers[other]] + self.criteria.further
         return np.column_stack([numbers[one], numbers[other]]), odds
 
@@ -183,7 +181,7 @@ class MarginalLikelihood:
         elements = [self.evidence.elements[i] for i in chosen]
         variance = np.concatenate([self._variance(e, ROUGH_SHARE**2) for e in elements])
         value = self._rough(columns[np.newaxis], np.sqrt(variance)[np.newaxis])[0]
-        return float(value) + float(self.lines[list(chosen)].sum()) + self.prior(chosen)
+        return float(value) + float(self.apart[list(chosen)].sum()) + self.prior(chosen)
 
     @cached_property
     def alone(self) -> NDArray:
