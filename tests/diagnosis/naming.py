@@ -2,10 +2,13 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from pipelines.diagnosis.diagnose import _validated
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.selection.answer import Answer, Named
 from pipelines.diagnosis.selection.findings import findings
+from pipelines.diagnosis.selection.posterior import Posterior
 
 PROBABILITY = 0.97
 
@@ -14,16 +17,16 @@ def naming(d: Diagnosis, *labels: str, ties: tuple[tuple[str, float], ...] = ())
     """Return the diagnosis with these causes named, the first with ties, fitted and validated."""
     selected = d.selected
     assert selected.library is not None and selected.posterior is not None
+    elements = [_best(d, label) for label in labels]
     named = tuple(
-        Named(_best(d, label), PROBABILITY, PROBABILITY, ties if number == 0 else ())
-        for number, label in enumerate(labels)
+        Named(element, PROBABILITY, PROBABILITY, ties if number == 0 else ()) for number, element in enumerate(elements)
     )
-    answer = Answer(named, 0.0, 0.0)
-    found = tuple(findings(selected.posterior, answer))
-    fitted = _validated(d.data, selected.library.prepared, replace(selected, answer=answer, findings=found))
-    # What the posterior itself holds beside them is another answer's.
-    causes = tuple(one for one in fitted.selected.findings if one.level == "cause")
-    return replace(fitted, selected=replace(fitted.selected, findings=causes))
+    chosen = tuple(sorted(selected.posterior.elements.index(element) for element in elements))
+    weighed = Posterior(selected.posterior.elements, (chosen, ()), np.array([PROBABILITY, 1.0 - PROBABILITY]))
+    answer = Answer(named, 1.0 - PROBABILITY, 0.0)
+    found = tuple(findings(weighed, answer))
+    given = replace(selected, posterior=weighed, answer=answer, findings=found)
+    return _validated(d.data, selected.library.prepared, given)
 
 
 def _best(d: Diagnosis, label: str):

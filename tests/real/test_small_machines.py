@@ -1,4 +1,4 @@
-"""Machines that say little: their verdicts make no more of friction at reversals than of all else."""
+"""Machines that say little: what is named of them foretells runs that no fit has seen, and no travel is told."""
 
 import pytest
 
@@ -8,12 +8,13 @@ from tests.real.machines import LOGS, diagnosed, motions, recordings
 
 
 @pytest.mark.parametrize(
-    ("machine", "status"), [("simple", "nothing_missing"), ("xl330", "partly_explained"), ("modexo", "unknown_cause")]
+    ("machine", "status"),
+    [("simple", "nothing_missing"), ("xl330", "partly_explained"), ("modexo", "partly_explained")],
 )
-def test_small_or_dirty_logs_have_no_sure_cause_and_show_no_travel_at_reversals(real_data, tmp_path, machine, status):
+def test_of_small_or_dirty_logs_only_what_foretells_unseen_runs_is_named(real_data, tmp_path, machine, status):
     said = diagnosed(LOGS[machine], real_data, tmp_path).verdict
     assert (said["status"], said["reversals"]) == (status, [])
-    assert all(cause["probability"] < 0.7 for cause in said["causes"])
+    assert all(cause["gain"]["systematic_error_removed"] > 0.25 for cause in said["causes"])
 
 
 @pytest.mark.parametrize("machine", ["simple", "xl330", "modexo"])
