@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from math import prod
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.observed_run import Run
@@ -70,19 +69,6 @@ class Candidate:
         per_run = [self.effect.per_run] * width if self.bends else None
         return TermColumns.of(self.effect, kinds, per_run, start)
 
-    def typical(self, kinds: Sequence[str]) -> NDArray:
-        """Return how large the amplitude of each column is where the effect is as large as on other machines, (k,).
-
-        Where the effect transforms the motion a column has its shape, or is in proportion to its direction.
-        """
-        if self.directions:
-            sizes = [_largest(self.effect, direction) for direction in self.directions]
-        elif self.bends:
-            sizes = [1.0]
-        else:
-            sizes = [max(map(abs, parameter.typical)) for parameter in self.effect.linear]
-        return np.array([sizes[k] for k, _ in self.columns_in(kinds).columns])
-
     @property
     def log_prior(self) -> float:
         """Log prior density of its shape over that of a uniform one in the typical range; forms are equally likely.
@@ -120,12 +106,6 @@ def bends_motion(effect: Effect) -> bool:
     """Tell whether an effect changes kinematics or readings rather than adding torque of its own."""
     shaped = any(p.default is None for p in effect.shape)
     return type(effect).corrected is not Effect.corrected or (effect.torque_reading is not None and shaped)
-
-
-def _largest(effect: Effect, direction: Sequence[float]) -> float:
-    """Return how far along a direction of its shapes an effect may typically be."""
-    pairs = zip(effect.shape, direction, strict=True)
-    return max(max(map(abs, parameter.typical)) / abs(value) for parameter, value in pairs if value)
 
 
 def lowest(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> float:

@@ -27,8 +27,6 @@ class Cause:
     """(N, k)."""
     amplitudes: NDArray
     """(p, k): the effect's own amplitudes per coefficient."""
-    variance: NDArray
-    """(k,) prior variance of each coefficient relative to their sum, where amplitudes are as large as is typical."""
     derivative: NDArray
     """(N, d) what a change of its shape does: along each shape, and towards another form."""
     first: bool
@@ -54,16 +52,14 @@ class Cause:
         context : int, optional
             Number of the set beside whose others it was refined; -1 where it was refined alone.
         """
-        typical = fitted.candidate.typical(regression.kinds)
-        _, size, turned = np.linalg.svd(regression.shares(fitted.columns) * typical, full_matrices=False)
+        _, size, turned = np.linalg.svd(regression.shares(fitted.columns), full_matrices=False)
         kept = size > RANK * max(size.max(initial=0.0), np.finfo(float).tiny)
         if not kept.any():
             return None
-        amplitudes = typical[:, np.newaxis] * turned[kept].T / size[kept]
+        amplitudes = turned[kept].T / size[kept]
         columns = regression.project(fitted.columns @ amplitudes)
-        variance = size[kept] ** 2 / np.sum(size[kept] ** 2)
         derivative = regression.project(slopes)
-        return cls(fitted.candidate, columns, amplitudes, variance, derivative, first, context)
+        return cls(fitted.candidate, columns, amplitudes, derivative, first, context)
 
 
 def towards(best: Fitted, others: Sequence[Fitted]) -> NDArray:

@@ -248,11 +248,10 @@ def _of_cause(number: int, cause: Cause, at: _Places, laws: Laws, prepared: Prep
     total = sum(v for _, v in resembles)
     return Element(
         effect.label, effect.name, effect.joint, str(effect.family), False, places,
-        cause.variance.tolist(), at.derivatives[number].tolist(),
+        [1.0 / len(places)] * len(places), at.derivatives[number].tolist(),
         [p for p, _ in resembles], [v / total for _, v in resembles],
         cause.amplitudes[_positive(cause)].tolist(),
-        not effect.goes_with_time and effect.family != TIME, cause.first,
-        effect.each_run or any(p.per_run for p in effect.linear),
+        not effect.goes_with_time and effect.family != TIME, cause.first, effect.each_run,
         effect.run is not None, place=number, log_prior=cause.candidate.log_prior,
         log_searched=log_searched(cause.candidate), context=cause.context,
         shown=_shown(Kind.ANGLE, names.index(joint), prepared) if tracked and joint else [],
@@ -294,7 +293,7 @@ def _background(library: Library, at: _Places):
         effect = cause.candidate.effect
         alone = cause.first and cause.context < 0
         if alone and not effect.each_run and effect.run is None:
-            yield from (("cause", int(p), float(v), 0.0) for p, v in zip(places, cause.variance, strict=True))
+            yield from (("cause", int(place), 1.0 / len(places), 0.0) for place in places)
 
 
 def _contexts(library: Library, elements: Sequence[Element]):
