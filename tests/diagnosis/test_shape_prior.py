@@ -1,0 +1,38 @@
+"""A cause pays for its forms, for a shape off the usual, and for what was sought among many values."""
+
+import numpy as np
+import pytest
+
+from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.candidates.shape_refinement import ONSETS, log_searched
+from pipelines.diagnosis.fit.change_point import NEVER
+from pipelines.effects import Cogging
+from pipelines.effects.backlash import Backlash
+from pipelines.effects.end_stop import EndStop
+from pipelines.effects.mass_off_axis import MassOffAxis
+from pipelines.effects.payload_change import PayloadChange
+
+
+def test_of_six_forms_each_has_a_sixth_of_the_prior():
+    assert Candidate(EndStop("knee"), ((0.4, 1.0, 1.5),)).log_prior == pytest.approx(-np.log(6.0))
+    assert Candidate(MassOffAxis("knee"), ((),)).log_prior == 0.0
+
+
+def test_a_shape_is_normal_about_the_middle_of_its_range_which_holds_two_standard_deviations_each_way():
+    low, high = Backlash("knee").shape[0].typical
+    own = [Candidate(Backlash("knee"), ((play,),)).log_prior for play in (np.sqrt(low * high), low, high, 2.0 * high)]
+    middle, *ends, beyond = own
+    assert ends == pytest.approx([middle - 2.0] * 2)
+    assert beyond < middle - 4.0
+    # It is a density: over a range that holds nearly all it integrates to one, in units of the typical range.
+    plays = np.exp(np.linspace(np.log(low) - 3.0, np.log(high) + 3.0, 2001))
+    densities = np.exp([Candidate(Backlash("knee"), ((play,),)).log_prior for play in plays])
+    assert np.trapezoid(densities, np.log(plays)) / np.log(high / low) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_waves_and_onsets_were_sought_among_many_values_and_an_onset_that_never_came_among_none():
+    assert log_searched(Candidate(Cogging("knee"), ((24.0,),))) == pytest.approx(np.log(396.0))
+    both, one = (Candidate(PayloadChange("knee"), ((20.0, 0.3), (late, 0.3))) for late in (30.0, NEVER))
+    assert log_searched(both) == pytest.approx(2.0 * np.log(ONSETS))
+    assert log_searched(one) == pytest.approx(np.log(ONSETS))
+    assert log_searched(Candidate(Backlash("knee"), ((0.01,),))) == 0.0
