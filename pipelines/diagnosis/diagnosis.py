@@ -21,9 +21,9 @@ from pipelines.diagnosis.fit.presliding_test import BuildUp
 from pipelines.diagnosis.fit.uncertainty import Uncertainty
 from pipelines.diagnosis.fit.validation import Validated, gains_of
 from pipelines.diagnosis.fit.validation_error import Gain, errors_of
-from pipelines.diagnosis.selection.answer import Answer, Named
+from pipelines.diagnosis.selection.answer import LIKELY, Answer, Named
 from pipelines.diagnosis.selection.evidence import Evidence
-from pipelines.diagnosis.selection.findings import LIKELY, Finding, findings
+from pipelines.diagnosis.selection.findings import Finding, findings
 from pipelines.diagnosis.selection.posterior import Posterior
 from pipelines.effects import Effect
 from pipelines.effects.force_sensor_zero import ForceSensorZero

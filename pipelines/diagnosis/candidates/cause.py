@@ -50,7 +50,7 @@ class Cause:
         first : bool
             Whether these are the best shapes of the effect.
         context : int, optional
-            Number of the set beside whose others it was refined; -1 where it was refined alone.
+            Number of the set with whose other causes it was refined; -1 where it was refined alone.
         """
         _, size, turned = np.linalg.svd(regression.shares(fitted.columns), full_matrices=False)
         kept = size > RANK * max(size.max(initial=0.0), np.finfo(float).tiny)

@@ -174,15 +174,11 @@ class ShapeRefinement:
         if not start.candidate.bends or others or amplitude <= 0.0:
             return start
         parameter, now = effect.shape[0], start.candidate.shapes[0][0]
-        low, high = parameter.typical
         if parameter.by_factors:
             value = now / amplitude if effect.swings else now * amplitude
-            value = float(np.clip(value, low / BEYOND, high * BEYOND))
         else:
             value = parameter.neutral + amplitude * (now - parameter.neutral)
-            beyond = MARGIN * (high - low)
-            value = float(np.clip(value, low - beyond, high + beyond))
-        ahead = self.fit(start.candidate.reshaped(0, value))
+        ahead = self.fit(start.candidate.reshaped(0, float(np.clip(value, *reach(parameter)))))
         return start if ahead is None or ahead.gain_as_is < start.gain_as_is else ahead
 
     def _slopes(self, fitted: Fitted, units: list[tuple[int, float]]) -> NDArray:

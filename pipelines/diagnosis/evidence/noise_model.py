@@ -133,16 +133,16 @@ Piece = tuple[NDArray, NDArray, NDArray]
 
 
 def _pieces(x: NDArray, rate_hz: float, band: tuple[float, float]) -> list[Piece]:
-    """Return frequencies (Hz), densities of what is left, and shares that are left, within a band."""
+    """Return each piece's spectrum within a band, as ``_of_piece`` gives it."""
     pieces = np.array_split(x, max(1, round(len(x) / (PIECE_S * rate_hz))))
     return [_of_piece(piece, rate_hz, band) for piece in pieces if np.isfinite(piece).sum() >= SHORTEST]
 
 
 def _of_piece(x: NDArray, rate_hz: float, band: tuple[float, float]) -> Piece:
-    """Return one piece's spectrum without what is slow, which would leak into the band through gaps.
+    """Return one piece's frequencies (Hz), power densities, and the share of white noise left at each.
 
-    Through gaps the slow cosines take some of what is faster, too: of white noise the share of the
-    density that they leave is known.
+    Slow cosines are fitted and subtracted, or what is slow would leak into the band through gaps.
+    Through gaps they also take some of what is faster: of white noise the share that is left is known.
     """
     known, n = np.isfinite(x), len(x)
     count = min(int(2.0 * band[0] * n / rate_hz) + 1, int(LARGEST_SLOW * known.sum()))

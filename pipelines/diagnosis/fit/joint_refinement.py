@@ -69,10 +69,10 @@ class Refinement:
         return best
 
     def _forms(self, best: Fit, runs: Sequence[Run]) -> Fit:
-        """Return the best of each cause's forms, its other shapes refined beside each.
+        """Return the best fit of all that change the form of one cause, shapes refined at each form.
 
-        The library has a transmission's straight form only, and the forms of others side by side:
-        beside the other causes, and at the full rate, another may be the best.
+        The library chose forms at the rate of the decision band, and a transmission's is always straight:
+        with the other causes, and in shorter blocks, another form may be the best.
         """
         tried = [best]
         for number, cause in enumerate(best.causes):

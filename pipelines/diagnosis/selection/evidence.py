@@ -100,9 +100,9 @@ class Evidence:
         """Multiply a library's columns out."""
         X, at = _stack(library)
         regression = library.regression
-        own = [regression.output == o for o in range(len(regression.torque))]
-        gram = np.array([X[rows].T @ X[rows] for rows in own])
-        right = np.array([X[rows].T @ regression.measured[rows] for rows in own])
+        outputs = [regression.output == o for o in range(len(regression.torque))]
+        parts = [(X[rows], regression.measured[rows]) for rows in outputs]
+        gram, right = np.array([x.T @ x for x, _ in parts]), np.array([x.T @ y for x, y in parts])
         return cls(
             gram, right, (elements := tuple(_elements(library, at))), tuple(_background(library, at)),
             dict(heard), np.array([explained(g, r) for g, r in zip(gram, right, strict=True)]),

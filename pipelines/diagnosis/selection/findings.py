@@ -8,11 +8,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pipelines.diagnosis.selection.answer import Answer, Named
+from pipelines.diagnosis.selection.answer import LIKELY, Answer, Named
 from pipelines.diagnosis.selection.posterior import Posterior
 
-LIKELY = 0.5
-"""Probability from which a node is told."""
 CLOSEST = 3
 """Listed causes that are told where none is named."""
 LEVELS = ("repeats", "joint", "family")
@@ -64,8 +62,8 @@ def findings(posterior: Posterior, answer: Answer) -> list[Finding]:
     if 1.0 - posterior.nothing < LIKELY:
         return []
     found = [_of_cause(posterior, named) for named in answer.named]
-    told = {label for one in found for label, _ in one.causes}
-    rest = frozenset(i for i, element in enumerate(posterior.elements) if element.label not in told)
+    named = {label for one in found for label, _ in one.causes}
+    rest = frozenset(i for i, element in enumerate(posterior.elements) if element.label not in named)
     found += _remainder(posterior, rest)
     return sorted(found, key=lambda finding: -finding.probability)
 
@@ -95,12 +93,12 @@ def _remainder(posterior: Posterior, rest: Inside) -> Iterator[Finding]:
     joints = [{"joint": e.joint} for e in elements]
     anything: dict[str, Any] = {}
     for nodes in (families, joints, [anything]):
-        told: Inside = frozenset()
+        covered: Inside = frozenset()
         for node in _distinct(nodes):
             for finding, inside in _likely(posterior, rest, node):
                 yield finding
-                told |= inside
-        rest -= told
+                covered |= inside
+        rest -= covered
 
 
 def _distinct(nodes: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
