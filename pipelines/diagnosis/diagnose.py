@@ -46,7 +46,7 @@ def diagnose(motions: Sequence[Motion], report: Report = silent, known: Sequence
     """Find what the rigid body with Coulomb and viscous friction gets wrong, and why.
 
     Selection, shapes and shared parameters use ``train`` runs only. The ``validate`` runs measure
-    every error, and may lower the probability of a cause that does not help there.
+    every error, and may lower the probability of a cause that repeats and does harm there.
 
     Parameters
     ----------
@@ -143,7 +143,12 @@ def _judged(
     """
     while True:
         after, without = _fitted(selected, refine, prepared, before)
-        ratios = {label: log_likelihood_ratio(less, after, prepared.noise) for label, less in without.items()}
+        # What does not repeat on training runs need not be on the validation runs.
+        repeating = {one.element.label for one in selected.answer.named if one.element.repeats}
+        ratios = {
+            label: log_likelihood_ratio(less, after, prepared.noise)
+            for label, less in without.items() if label in repeating
+        }  # fmt: skip
         judged = selected.judged(ratios)
         harmful = ratios.keys() - {one.element.label for one in judged.answer.named}
         if not harmful:

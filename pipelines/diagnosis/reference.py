@@ -1,4 +1,4 @@
-"""The page docs/criteria.md: every number that decides, written from ``criteria.py`` itself.
+"""The page docs/criteria.md: the hyper-parameters of the decision, written from ``criteria.py`` itself.
 
 ``python -m pipelines.diagnosis.reference docs/criteria.md`` brings it up to date; what was measured
 with them (``make sensitivity``) stands in ``criteria_measured.json`` beside this file.
@@ -17,11 +17,12 @@ from pipelines.diagnosis.criteria import CRITERIA, Criteria
 
 MEASURED = Path(__file__).with_name("criteria_measured.json")
 INTRODUCTION = """\
-# Criteria: every number that decides
+# Criteria: the hyper-parameters of the decision
 
 For those who want to know why a verdict came out as it did, or who change the decision.
-Written by `make docs` from `pipelines/diagnosis/criteria.py`. `make learn` sets the values: they
-maximise the log probability that the posterior gives to the truth, over simulated sessions.
+Written by `make docs` from `pipelines/diagnosis/criteria.py`. All but
+`form_misfit` and `model_error` are learned (`make learn`): they maximise the log probability that
+the posterior gives to the truth, over simulated sessions.
 [science.md](science.md#9-the-decision) has the equations in which they stand.
 """
 

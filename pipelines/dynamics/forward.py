@@ -216,7 +216,7 @@ def _finish(a, w, t, state, memory, direction, load, drive, rates):
             rates[DTHETA, j] = rates[DQ, j]
 
 
-@njit(cache=True, inline="always")
+@njit(**HOT)
 def accelerations(a, w, t, state, memory, direction, load, drive, rates):
     """Write d(state)/dt into ``rates`` (4, J).
 
@@ -241,7 +241,7 @@ def accelerations(a, w, t, state, memory, direction, load, drive, rates):
     _finish(a, w, t, state, memory, direction, load, drive, rates)
 
 
-@njit(cache=True, inline="always")
+@njit(**HOT)
 def memory_rates(a, w, t, state, memory, direction, load, rates):
     """Write the rates of all memories into ``rates`` (m,)."""
     if rates.shape[0] > 0:

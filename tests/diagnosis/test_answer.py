@@ -56,6 +56,13 @@ def test_a_third_cause_beside_the_named_one_is_no_tie():
     assert named.probability == pytest.approx(0.9)
 
 
+def test_what_most_sets_have_is_named_though_the_most_probable_set_lacks_it():
+    apart = weighed(_2=0.35, _02=0.3, _025=0.25, _=0.1)
+    assert [one.element.label for one in answer_of(apart).named] == ["quadratic_drag@hip", "parallel_spring@knee"]
+    rare = weighed(_2=0.5, _02=0.2, _025=0.2, _=0.1)
+    assert [one.element.label for one in answer_of(rare).named] == ["quadratic_drag@hip"]
+
+
 def test_two_causes_are_named_each_with_its_own_ties():
     posterior = weighed(_02=0.6, _12=0.3, _0=0.05, _2=0.05)
     named = {one.element.label: one for one in answer_of(posterior).named}

@@ -40,11 +40,6 @@ class Session:
     features: NDArray
     """(sets, features) by which the prior knows them."""
 
-    @property
-    def forms(self) -> tuple[str, ...]:
-        """The forms of what is hidden, ``effect:form``."""
-        return tuple(f"{h['effect']}:{h['form']}" for h in self.truth["hidden"])
-
 
 def rows(root: Path, worlds: Sequence[str] = ()) -> Iterator[dict[str, Any]]:
     """Yield the stored rows that have evidence."""

@@ -5,12 +5,11 @@ from typing import Any
 
 from pipelines.diagnosis.candidates.smooth_laws import FAMILIES
 
-STRUCTURAL = (
+ALIKE = (
     {"torque_offset", "coulomb_asymmetry"},
     {"base_tilt", "encoder_offset"},
-    {"torque_gain"},
 )
-"""Causes that no data can tell apart, at one joint or, of one name, at two."""
+"""Causes that no data can tell apart, at one joint."""
 NOTHING = ("none", "imperfect")
 
 Right = Callable[[frozenset[str]], bool]
@@ -49,8 +48,8 @@ def _tied(label: str, truth: Mapping[str, Any]) -> set[str]:
     """Return labels that no data of this session can tell from one."""
     name, _, joint = label.partition("@")
     tied = set()
-    for names in STRUCTURAL:
-        if name not in names or names == {"torque_gain"}:
+    for names in ALIKE:
+        if name not in names:
             continue
         for other in names - {name}:
             tied.add("base_tilt" if other == "base_tilt" else f"{other}@{joint or 'hip'}")

@@ -8,8 +8,12 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.criteria import Criteria
 from pipelines.diagnosis.selection.prior import FEATURES
 
-BEFORE = ("form_misfit",)
-"""What acts before the evidence is stored."""
+HELD = ("form_misfit", "model_error")
+"""What is not learned: what acts before the evidence is stored, and what the score hardly tells from values three times
+as large, while a second cause beside a large one is lost under those."""
+
+AT_MOST_ONE = ("lines",)
+"""Shares of a likelihood ratio that counts: to count one more than once is to invent data."""
 
 
 def names() -> list[str]:
@@ -26,6 +30,7 @@ def from_vector(vector: NDArray, like: Criteria) -> Criteria:
     """Return criteria with a vector's numbers, the rest as in ``like``."""
     changed: dict[str, float | tuple[float, ...]] = {}
     for (name, k, several, _), value in zip(_places(like), np.exp(vector).tolist(), strict=True):
+        value = min(value, 1.0) if name in AT_MOST_ONE else value
         if several:
             old = changed.get(name, getattr(like, name))
             changed[name] = (*old[:k], value, *old[k + 1 :])
@@ -39,7 +44,7 @@ def _places(criteria: Criteria) -> list[tuple[str, int, bool, float]]:
     found = []
     for field in fields(Criteria):
         value = getattr(criteria, field.name)
-        if field.name in (*FEATURES, *BEFORE):
+        if field.name in (*FEATURES, *HELD):
             continue
         several = isinstance(value, tuple)
         found += [(field.name, k, several, v) for k, v in enumerate(value if several else (value,)) if v > 0.0]

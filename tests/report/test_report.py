@@ -371,7 +371,7 @@ def test_an_unlisted_law_among_the_sets_is_called_so_and_a_set_has_its_probabili
     tried = CANDIDATES.read(folder / "diagnosed" / "candidates.parquet")
     tried.frame["causes"] = [["cogging@knee"], ["law:friction_by_angle@hip", "cogging@knee"]]
     tried.frame["probability"] = [0.9, 0.0012]
-    tried.frame["reason"] = ["its causes are the most probable", "its probability is 0.0012; it holds a law"]
+    tried.frame["reason"] = ["its causes are likely", "its probability is 0.0012; it holds a law"]
     CANDIDATES.write(folder / "diagnosed" / "candidates.parquet", tried.frame, tried.metadata)
     page = report(find([folder]))
     assert "unlisted law at the hip: friction by angle" in page

@@ -1,16 +1,11 @@
-"""Candidates: an effect at a joint with a shape, and what it would add to each measured torque.
-
-Every candidate becomes columns beside the baseline's. Torque effects give their own columns. Effects
-that change kinematics or readings are not linear: the baseline is rebuilt as they would have it and
-refitted there, and its difference from the untouched baseline under the same parameters is the column.
-Linearised at biased parameters, elasticity would pass for an encoder offset.
-"""
+"""A candidate cause: an effect at a joint, and its shape in each run."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import prod
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.observed_run import Run
@@ -64,24 +59,37 @@ class Candidate:
         return bends_motion(self.effect)
 
     def columns_in(self, kinds: Sequence[str], start: int = 0) -> TermColumns:
-        """Return the places of the columns that ``signatures`` gives for runs of some kinds."""
+        """Return the places of the candidate's columns in runs of some kinds."""
         width = max(1, len(self.directions))
         per_run = [self.effect.per_run] * width if self.bends else None
         return TermColumns.of(self.effect, kinds, per_run, start)
+
+    def typical(self, kinds: Sequence[str]) -> NDArray:
+        """Return how large the amplitude of each column is where the effect is as large as on other machines, (k,).
+
+        Where the effect transforms the motion a column has its shape, or is in proportion to its direction.
+        """
+        if self.directions:
+            sizes = [_largest(self.effect, direction) for direction in self.directions]
+        elif self.bends:
+            sizes = [1.0]
+        else:
+            sizes = [max(map(abs, parameter.typical)) for parameter in self.effect.linear]
+        return np.array([sizes[k] for k, _ in self.columns_in(kinds).columns])
 
     @property
     def log_prior(self) -> float:
         """Log prior density of its shape over that of a uniform one in the typical range; forms are equally likely.
 
-        A free shape is normal about the middle of its typical range, which holds 95 % of machines. Where a joint's
-        way decides the range, or each run has a value, the density is the uniform one.
+        A free shape has Student's distribution about the middle of its typical range, a quarter of the range wide:
+        its tails are heavy, for ranges are known roughly. Where a joint's way decides the range, or each run has a
+        value, the density is the uniform one.
         """
         forms = prod(max(len(parameter.forms), 1) for parameter in self.effect.shape)
         free = [i for i, p in enumerate(self.effect.shape) if self.is_free(i) and not (p.swept or p.per_run)]
         offs = [self.effect.shape[i].off_middle(self.shapes[0][i]) for i in free if not self.directions]
-        # A normal density with a quarter of the range as its standard deviation, times the range.
-        shapes = sum(np.log(4.0 / np.sqrt(2.0 * np.pi)) - 0.5 * (2.0 * off) ** 2 for off in offs)
-        return float(shapes - np.log(forms))
+        # The standard density at a value twice as many quarters off as halves, times the range in quarters.
+        return float(sum(np.log(4.0) + _log_student(2.0 * off) for off in offs) - np.log(forms))
 
     def is_free(self, i: int) -> bool:
         """Tell whether shape parameter ``i`` is fitted, and not held at its usual value or at one of its forms."""
@@ -102,10 +110,21 @@ class Candidate:
         return next(own, None)
 
 
+def _log_student(x: float) -> float:
+    """Return the log density of Student's distribution with three degrees of freedom."""
+    return float(np.log(2.0 / (np.pi * np.sqrt(3.0))) - 2.0 * np.log1p(x * x / 3.0))
+
+
 def bends_motion(effect: Effect) -> bool:
     """Tell whether an effect changes kinematics or readings rather than adding torque of its own."""
     shaped = any(p.default is None for p in effect.shape)
     return type(effect).corrected is not Effect.corrected or (effect.torque_reading is not None and shaped)
+
+
+def _largest(effect: Effect, direction: Sequence[float]) -> float:
+    """Return how far along a direction of its shapes an effect may typically be."""
+    pairs = zip(effect.shape, direction, strict=True)
+    return max(max(map(abs, parameter.typical)) / abs(value) for parameter, value in pairs if value)
 
 
 def lowest(effect: Effect, parameter: Parameter, runs: Sequence[Run]) -> float:

@@ -27,6 +27,8 @@ class Cause:
     """(N, k)."""
     amplitudes: NDArray
     """(p, k): the effect's own amplitudes per coefficient."""
+    variance: NDArray
+    """(k,) prior variance of each coefficient relative to their sum: larger where typical amplitudes make more of it."""
     derivative: NDArray
     """(N, d) what a change of its shape does: along each shape, and towards another form."""
     first: bool
@@ -52,14 +54,17 @@ class Cause:
         context : int, optional
             Number of the set with whose other causes it was refined; -1 where it was refined alone.
         """
-        _, size, turned = np.linalg.svd(regression.shares(fitted.columns), full_matrices=False)
+        typical = fitted.candidate.typical(regression.kinds)
+        _, size, turned = np.linalg.svd(regression.shares(fitted.columns) * typical, full_matrices=False)
         kept = size > RANK * max(size.max(initial=0.0), np.finfo(float).tiny)
         if not kept.any():
             return None
-        amplitudes = turned[kept].T / size[kept]
+        amplitudes = typical[:, np.newaxis] * turned[kept].T / size[kept]
         columns = regression.project(fitted.columns @ amplitudes)
+        # Typical amplitudes are known roughly: were they exact, variances would be as the squares of sizes.
+        variance = size[kept] / size[kept].sum()
         derivative = regression.project(slopes)
-        return cls(fitted.candidate, columns, amplitudes, derivative, first, context)
+        return cls(fitted.candidate, columns, amplitudes, variance, derivative, first, context)
 
 
 def towards(best: Fitted, others: Sequence[Fitted]) -> NDArray:

@@ -6,46 +6,11 @@ baseline under the same parameters is the column. Linearised at biased parameter
 pass for an encoder offset.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates.candidate import Candidate
-from pipelines.diagnosis.evidence.baseline import Baseline
-from pipelines.diagnosis.evidence.baseline_columns import columns_under, gram_of_runs
-from pipelines.diagnosis.evidence.gram import solve
 from pipelines.diagnosis.evidence.observed_run import Run
-
-
-def signatures(
-    candidate: Candidate, runs: Sequence[Run], baseline: Baseline, untouched: Sequence[NDArray], weights: NDArray
-) -> list[NDArray]:
-    """Return the candidate's columns in each run, (m, O, k).
-
-    Parameters
-    ----------
-    untouched : the baseline's columns in each run
-    weights : (O,) inverse variances, for the refit of effects that bend the motion
-    """
-    if not candidate.bends:
-        return [torque_columns(candidate, r, run) for r, run in enumerate(runs)]
-    if candidate.directions:
-        parts = [
-            signatures(Candidate(candidate.effect, (shape,) * len(runs)), runs, baseline, untouched, weights)
-            for shape in candidate.directions
-        ]
-        return [np.concatenate(columns, axis=2) for columns in zip(*parts, strict=True)]
-    under = [
-        columns_under([candidate.term(r)], run, baseline) if candidate.effect.explains(run.motion)
-        else (untouched[r], run.measured)
-        for r, run in enumerate(runs)
-    ]  # fmt: skip
-    values = solve(gram_of_runs(runs, *zip(*under, strict=True)), weights)
-    return [
-        bent_column(columns, measured, values, plain, run)
-        for (columns, measured), plain, run in zip(under, untouched, runs, strict=True)
-    ]
 
 
 def bent_column(columns: NDArray, measured: NDArray, values: NDArray, untouched: NDArray, run: Run) -> NDArray:

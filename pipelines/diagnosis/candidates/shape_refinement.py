@@ -19,8 +19,10 @@ from pipelines.effects import Parameter
 
 STEPS = 3
 """Steps at most."""
-HALVINGS = 2
-"""Times that a step which gains nothing is halved."""
+LENGTHS = 3
+"""Lengths at which a step is tried, until one gains."""
+SHORTER = 0.3
+"""Factor from each of these lengths to the next."""
 ENOUGH = 0.2
 """Log likelihood that a step must gain to be followed by another."""
 DIFFERENCE = 0.02
@@ -200,7 +202,7 @@ class ShapeRefinement:
         left = self._measured - self._project(fitted.columns).sum(axis=1) * transforms
         solution, _ = _solved(plain, left)
         length = 1.0
-        for _ in range(HALVINGS + 1):
+        for _ in range(LENGTHS):
             candidate = fitted.candidate
             steps = length * solution[len(solution) - len(units) :]
             for (i, unit), step in zip(units, steps, strict=True):
@@ -208,7 +210,7 @@ class ShapeRefinement:
             ahead = self.fit(candidate)
             if ahead is not None and ahead.gain_as_is > fitted.gain_as_is:
                 return ahead
-            length *= 0.3
+            length *= SHORTER
         return None
 
 

@@ -151,7 +151,7 @@ class Sight:
         weights = np.minimum([CRITERIA.drive_weight, CRITERIA.cuff_weight], 1.0)
         counts = np.repeat(weights, drives)
         root = np.where(there, np.sqrt(counts * share) / noise, 0.0)
-        independent = float(np.max(share * plain.count.sum(axis=0)))
+        independent = float(np.max(share * plain.count))
         values = solve(plain, root**2)
         loaded = tuple(with_load(run, baseline, values) for run in runs)
         torque = np.concatenate([(c @ values)[run.valid] for run, c in zip(runs, untouched, strict=True)])

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.gram import Gram, gram_of
-from pipelines.diagnosis.evidence.observed_run import FOLDS, Run
+from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.model import Model, Term
 
 
@@ -30,7 +30,7 @@ def columns_under(terms: Sequence[Term], run: Run, baseline: Baseline) -> tuple[
 def gram_of_runs(runs: Sequence[Run], columns: Sequence[NDArray], measured: Sequence[NDArray] | None = None) -> Gram:
     """Multiply out all runs; ``measured`` (m, O) each where it is not the runs' own."""
     measured = measured or [run.measured for run in runs]
-    grams = [gram_of(c, y, r.usable, r.fold, FOLDS) for r, c, y in zip(runs, columns, measured, strict=True)]
+    grams = [gram_of(c, y, r.usable) for r, c, y in zip(runs, columns, measured, strict=True)]
     total = grams[0]
     for gram in grams[1:]:
         total = total + gram

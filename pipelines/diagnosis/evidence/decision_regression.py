@@ -26,6 +26,8 @@ RANK = 1e-9
 class DecisionRegression:
     """N weighted rows: outputs within averages within runs."""
 
+    kinds: tuple[str, ...]
+    """The kind of each run."""
     bands: tuple[DecisionBand, ...]
     roots: tuple[NDArray, ...]
     """(M, O) of each run: the root of each row's weight over its noise, 1/(N·m)."""
@@ -84,7 +86,8 @@ class DecisionRegression:
         operator = whitening @ averaging.tocsr()[weighty]
         operator.eliminate_zeros()
         empty = [np.zeros(0)] * 4
-        blank = cls(bands, roots, operator, whitening, weighty, output[weighty], torque, *empty)
+        kinds = tuple(run.motion.run for run in runs)
+        blank = cls(kinds, bands, roots, operator, whitening, weighty, output[weighty], torque, *empty)
         rows = blank.rows(baseline)
         measured = blank.rows([run.measured[:, :, np.newaxis] for run in runs])[:, 0]
         basis = _orthonormal(rows)

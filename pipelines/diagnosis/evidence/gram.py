@@ -1,10 +1,9 @@
-"""Sums of products of columns, by output and fold: all that a search over combinations needs.
+"""Sums of products of columns, by output: all that a weighted fit needs.
 
 With Gram matrices in hand a fit of any set of columns costs a solve of that set's size, whatever the
-length of the recordings, and its error on a fold that the fit has not seen costs no more.
+length of the recordings.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,21 +17,16 @@ RIDGE = 1e-9
 
 @dataclass(frozen=True)
 class Gram:
-    """Products of c columns and the measured torque, O outputs, F folds."""
+    """Products of c columns and the measured torque, O outputs."""
 
     columns: NDArray
-    """(F, O, c, c)."""
+    """(O, c, c)."""
     measured: NDArray
-    """(F, O, c)."""
+    """(O, c)."""
     square: NDArray
-    """(F, O) of the measured torque."""
+    """(O,) of the measured torque."""
     count: NDArray
-    """(F, O) usable blocks."""
-
-    def select(self, chosen: Sequence[int] | NDArray) -> "Gram":
-        """Return the products of some of the columns, (k,) places."""
-        chosen = np.asarray(chosen)
-        return Gram(self.columns[:, :, chosen[:, None], chosen], self.measured[:, :, chosen], self.square, self.count)
+    """(O,) usable blocks."""
 
     def __add__(self, other: "Gram") -> "Gram":
         """Return the products over both sets of runs."""
@@ -44,7 +38,7 @@ class Gram:
         )
 
 
-def gram_of(columns: NDArray, measured: NDArray, usable: NDArray, fold: NDArray, folds: int) -> Gram:
+def gram_of(columns: NDArray, measured: NDArray, usable: NDArray) -> Gram:
     """Multiply out one run.
 
     Parameters
@@ -52,50 +46,40 @@ def gram_of(columns: NDArray, measured: NDArray, usable: NDArray, fold: NDArray,
     columns : (m, O, c) array
     measured : (m, O) array
     usable : (m, O) array of bool
-    fold : (m,) array of int
     """
     _, outputs, c = columns.shape
-    by_output = np.zeros((2, folds, outputs))
-    out = Gram(np.zeros((folds, outputs, c, c)), np.zeros((folds, outputs, c)), *by_output)
-    for f in range(folds):
-        for o in range(outputs):
-            rows = (fold == f) & usable[:, o]
-            if not rows.any():
-                continue
-            A, y = columns[rows, o], measured[rows, o]
-            out.columns[f, o] = A.T @ A
-            out.measured[f, o] = A.T @ y
-            out.square[f, o] = y @ y
-            out.count[f, o] = rows.sum()
+    out = Gram(np.zeros((outputs, c, c)), np.zeros((outputs, c)), np.zeros(outputs), np.zeros(outputs))
+    for o in range(outputs):
+        rows = usable[:, o]
+        A, y = columns[rows, o], measured[rows, o]
+        out.columns[o] = A.T @ A
+        out.measured[o] = A.T @ y
+        out.square[o] = y @ y
+        out.count[o] = rows.sum()
     return out
 
 
-def solve(gram: Gram, weights: NDArray, folds: NDArray | None = None) -> NDArray:
-    """Return the coefficients (c,) of the weighted fit on the chosen folds (all of them by default).
-
-    ``weights`` (O,) are the outputs' inverse variances.
-    """
-    chosen = slice(None) if folds is None else folds
-    A = np.einsum("o,foij->ij", weights, gram.columns[chosen])
-    b = np.einsum("o,foi->i", weights, gram.measured[chosen])
+def solve(gram: Gram, weights: NDArray) -> NDArray:
+    """Return the coefficients (c,) of the weighted fit; ``weights`` (O,) are the outputs' inverse variances."""
+    A = np.einsum("o,oij->ij", weights, gram.columns)
+    b = np.einsum("o,oi->i", weights, gram.measured)
     size = np.sqrt(np.maximum(np.diag(A), np.finfo(float).tiny))
     scaled = A / np.outer(size, size) + RIDGE * np.eye(len(b))
     return np.linalg.solve(scaled, b / size) / size
 
 
-def error(gram: Gram, values: NDArray, folds: NDArray | None = None) -> NDArray:
-    """Return the sum of squared errors of given coefficients on the chosen folds, (O,)."""
-    chosen = slice(None) if folds is None else folds
-    quadratic = np.einsum("i,foij,j->o", values, gram.columns[chosen], values)
-    linear = np.einsum("i,foi->o", values, gram.measured[chosen])
-    return np.maximum(gram.square[chosen].sum(axis=0) - 2 * linear + quadratic, 0.0)
+def error(gram: Gram, values: NDArray) -> NDArray:
+    """Return the sum of squared errors of given coefficients, (O,)."""
+    quadratic = np.einsum("i,oij,j->o", values, gram.columns, values)
+    linear = np.einsum("i,oi->o", values, gram.measured)
+    return np.maximum(gram.square - 2 * linear + quadratic, 0.0)
 
 
 def weights_under(gram: Gram) -> NDArray:
     """Return each output's inverse variance under the fit to all columns, iterated, (O,) 1/(N·m)²."""
-    counts = gram.count.sum(axis=0)
-    weights = np.where(counts > 0, 1.0, 0.0)
+    weights = np.where(gram.count > 0, 1.0, 0.0)
     for _ in range(PASSES):
         squares = error(gram, solve(gram, weights))
-        weights = np.where(counts > 0, counts / np.maximum(squares, 1e-9 * np.maximum(counts, 1)), 0.0)
+        least = 1e-9 * np.maximum(gram.count, 1)
+        weights = np.where(gram.count > 0, gram.count / np.maximum(squares, least), 0.0)
     return weights

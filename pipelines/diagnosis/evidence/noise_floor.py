@@ -10,12 +10,8 @@ from scipy.ndimage import uniform_filter1d
 from pipelines.diagnosis.evidence.observed_run import Run
 
 LONGEST_LAG_S = 1.0
-LONGEST_NOISE_S = 0.25
-"""How long noise of a sensor or a drive resembles itself; what is slower wanders."""
-IN_BURSTS = 5.0
-"""Fourth moment over the square of the second, 3 of noise, from which scatter comes in bursts: kicks are no noise."""
 MOST_INDEPENDENT = 1 / 6
-"""Of 25 ms blocks: what a model leaves of a leg is never white (DESIGN section 5)."""
+"""Of 25 ms blocks: what a model leaves of a leg is never white."""
 
 
 @dataclass(frozen=True)
@@ -54,26 +50,6 @@ def noise_floor(runs: Sequence[Run], residuals: Sequence[NDArray]) -> Floor:
             rms[o] = np.sqrt(np.mean(known**2) / max(1.0 - time / averaged, 0.5))
             share[o] = 1.0 / time
     return Floor(rms, share, from_periods)
-
-
-def independent_share(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray:
-    """Return how many independent samples there are for each sample of a model's own residual (m, O), (O,).
-
-    What a model gets wrong resembles itself for longer than noise does.
-    """
-    series = [np.where(run.usable, residual, np.nan) for run, residual in zip(runs, residuals, strict=True)]
-    there = [any(np.isfinite(s[:, o]).sum() > 40 for s in series) for o in range(residuals[0].shape[1])]
-    return np.array([1.0 / _correlation_time([s[:, o] for s in series]) if t else 1.0 for o, t in enumerate(there)])
-
-
-def slow_scatter(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray:
-    """Return the scatter's power density below 1 Hz over what noise as fast as it has there, for each output, (O,).
-
-    About 1 for noise, white or coloured; many times that where a person or a drift does not repeat; 1 without periods.
-    """
-    pairs = [scatter(run, residual) for run, residual in zip(runs, residuals, strict=True)]
-    rate = runs[0].motion.sample_rate_hz / runs[0].block.decimation
-    return np.array([_slow_share([p[:, o] for p in pairs], rate) for o in range(residuals[0].shape[1])])
 
 
 def scatter(run: Run, residual: NDArray) -> NDArray:
@@ -127,35 +103,3 @@ def _correlation_time(series: Sequence[NDArray]) -> float:
             break
         total += 2 * rho
     return float(total)
-
-
-def _slow_share(series: Sequence[NDArray], rate_hz: float) -> float:
-    """Compare slow scatter with that of noise which is as strong between 2 and 6 Hz, and as much alike from 1 to 8 Hz.
-
-    Noise of a first order has the density 1 / (1 + (2 pi f tau)^2): how it falls from 1.5 to 6 Hz tells tau. What comes
-    in bursts is held against white noise. Samples that are not usable count as nought, which leaves ratios as they are.
-    """
-    slow, fast, before, behind = (
-        sum(_density(s, rate_hz, band) for s in series) for band in ((0.05, 1.0), (2.0, 6.0), (1.0, 2.0), (4.0, 8.0))
-    )
-    if not fast > 0.0 or not behind > 0.0:
-        return 1.0
-    known = np.concatenate(series)
-    known = known[np.isfinite(known)]
-    if np.mean(known**4) > IN_BURSTS * np.mean(known**2) ** 2:
-        return slow / fast
-    falls = before / behind
-    longest = (2.0 * np.pi * LONGEST_NOISE_S) ** 2
-    room = 36.0 - 2.25 * falls  # of the density's ratio at 1.5 and 6 Hz, solved for (2 pi tau)^2
-    squared = float(np.clip((falls - 1.0) / room, 0.0, longest)) if room > 0.0 else longest
-    return slow / fast * (1.0 + 0.25 * squared) / (1.0 + 16.0 * squared)  # that of noise, at 0.5 and 4 Hz
-
-
-def _density(series: NDArray, rate_hz: float, band: tuple[float, float]) -> float:
-    """Return the mean power of a series (k,) within a band, Hz; nought of one that is too short to tell."""
-    filled = np.nan_to_num(series)
-    if len(filled) < 64:
-        return 0.0
-    frequency = np.fft.rfftfreq(len(filled), 1.0 / rate_hz)
-    power = np.abs(np.fft.rfft(filled * np.hanning(len(filled)))) ** 2
-    return float(power[(frequency > band[0]) & (frequency < band[1])].mean())

@@ -39,8 +39,6 @@ class Run:
     """(m,) bool."""
     fold: NDArray
     """(m,) number of the fold: whole periods, dealt out in turn."""
-    period: NDArray
-    """(m,) number of the excitation's period, -1 where it does not repeat."""
     cutoff_hz: float | None = None
     """Above which neither torque nor columns are looked at; None where all that blocks pass is."""
     fast: NDArray | None = None
@@ -117,7 +115,6 @@ def observe(motion: Motion, cutoff_hz: float | None = None) -> Run:
         usable=usable,
         valid=valid,
         fold=np.floor((time - time[0]) / part).astype(int) % FOLDS if part < length else number % FOLDS,
-        period=number if motion.period_s else np.full(len(time), -1),
         cutoff_hz=cutoff_hz,
         fast=None if cutoff_hz is None else block.mean(whole - slow, starts),
     )

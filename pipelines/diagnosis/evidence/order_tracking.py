@@ -61,8 +61,6 @@ class Line:
     """rad, of amplitude sin(n q + phase); NaN for a hum, whose phase each run has for itself."""
     log_likelihood_ratio: float
     """Of the line, beside all others, against noise of the same local colour."""
-    of_other_kind: float
-    """The same of the best line of the other kind in its place."""
     false_alarm: float
     """Chance that noise alone shows such a line anywhere in the session."""
 
@@ -366,19 +364,13 @@ class _Search:
             amplitudes=now.amplitudes + share * (then.amplitudes - now.amplitudes),
         )
 
-    def _restored(
-        self,
-        line: Sinusoids,
-        channels: Sequence[Channel],
-    ) -> tuple[float, list[Channel]]:
-        """Return the likelihood ratio of a line that was subtracted, and channels that hold it."""
-        ratio, restored = 0.0, []
+    def _ratio(self, line: Sinusoids, channels: Sequence[Channel]) -> float:
+        """Return the log likelihood ratio of a line that was subtracted."""
+        ratio = 0.0
         for r, (waves, channel) in enumerate(zip(self.waves, channels, strict=True)):
             torque = line.torque(waves, r)
-            score = channel.score_of(torque)
-            ratio += 0.5 * float(torque @ score)
-            restored.append(replace(channel, score=channel.score + score))
-        return ratio, restored
+            ratio += 0.5 * float(torque @ channel.score_of(torque))
+        return ratio
 
     def reported(
         self,
@@ -389,21 +381,19 @@ class _Search:
     ) -> tuple[Line, ...]:
         """Return the lines that are significant beside all others, the strongest first."""
         made = []
-        for k, (known, spectrum) in enumerate(zip(lines, spectra, strict=True)):
+        for known, spectrum in zip(lines, spectra, strict=True):
             level = spectrum.steep_level if len(known) else spectrum.level
             for number, cycles in enumerate(known.cycles):
                 amplitudes = known.amplitudes[:, number]
-                ratio, restored = self._restored(known.only(number), channels)
+                ratio = self._ratio(known.only(number), channels)
                 ratio /= float(np.interp(cycles, spectrum.cycles, level))
                 alarm = spectrum.false_alarm(ratio, searches)
                 if alarm > FALSE_ALARMS:
                     continue
-                other = self.spectrum(spectra[1 - k].kind, restored)
-                rival = float(other.log_likelihood_ratio.max(initial=0.0))
                 size = float(np.sqrt(np.mean(np.sum(amplitudes**2, axis=1))))
                 sine, cosine = amplitudes[0]
                 phase = float(np.arctan2(cosine, sine)) if known.kind is Kind.ANGLE else np.nan
-                made.append(Line(known.kind, float(cycles), size, phase, ratio, rival, alarm))
+                made.append(Line(known.kind, float(cycles), size, phase, ratio, alarm))
         made.sort(key=lambda line: -line.log_likelihood_ratio)
         widths = {spectrum.kind: spectrum.width for spectrum in spectra}
         alone = [not _is_trace_of(line, made[:i], widths) for i, line in enumerate(made)]

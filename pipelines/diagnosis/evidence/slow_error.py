@@ -2,7 +2,7 @@
 
 The torque is averaged over 25 ms, the acceleration comes from a filter that lets 8 to 12 Hz pass. Between the two
 lies what the drive's control makes of counted angles: it repeats with the motion, is no missing physics, and no
-model of the motion can foretell it. Whether error is systematic is therefore asked of longer averages.
+model of the motion can predict it. Whether error is systematic is therefore asked of longer averages.
 """
 
 from collections.abc import Sequence
@@ -34,15 +34,6 @@ class SlowError:
     def excess(self) -> NDArray:
         """Systematic error, (O,) N·m."""
         return np.sqrt(np.maximum(self.rms**2 - self.floor**2, 0.0))
-
-    @property
-    def sureness(self) -> NDArray:
-        """Systematic power in standard errors of the floor's, (O,)."""
-        return ((self.rms / self.floor) ** 2 - 1.0) / np.sqrt(2.0 / np.maximum(self.independent, 1.0))
-
-    def over(self, other: "SlowError") -> "SlowError":
-        """Return the same error over another's floor: what does not repeat in itself is in one's own."""
-        return replace(self, floor=other.floor, independent=other.independent)
 
 
 def slow_error(runs: Sequence[Run], residuals: Sequence[NDArray]) -> SlowError:

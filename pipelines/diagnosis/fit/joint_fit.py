@@ -138,14 +138,14 @@ def fit(
     gram = gram_of_runs(runs, *zip(*stacked_columns(causes, runs, baseline), strict=True))
     values = solve(gram, weights)
     found, rms, cost = _errors(gram, values)
-    normal = np.einsum("o,foij->ij", found, gram.columns)
+    normal = np.einsum("o,oij->ij", found, gram.columns)
     layout = _layout(causes, runs, baseline)
     return Fit(causes, values, found, rms, cost, layout, _shares(gram, values), normal, loads)
 
 
 def _shares(gram: Gram, values: NDArray) -> NDArray:
-    squares = np.einsum("foii->oi", gram.columns) * values**2
-    return np.sqrt(squares / np.maximum(gram.square.sum(axis=0), np.finfo(float).tiny)[:, np.newaxis])
+    squares = np.einsum("oii->oi", gram.columns) * values**2
+    return np.sqrt(squares / np.maximum(gram.square, np.finfo(float).tiny)[:, np.newaxis])
 
 
 def laden(runs: Sequence[Run], made: Fit, baseline: Baseline) -> list[Run]:
@@ -179,7 +179,7 @@ def stacked_columns(
 
 
 def _errors(gram: Gram, values: NDArray) -> tuple[NDArray, NDArray, float]:
-    count = gram.count.sum(axis=0)
+    count = gram.count
     there = count > 0
     squares = error(gram, values)
     rms = np.sqrt(squares / np.maximum(count, 1))

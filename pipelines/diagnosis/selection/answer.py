@@ -57,7 +57,7 @@ class Answer:
 
 
 def answer_of(posterior: Posterior) -> Answer:
-    """Name the causes of the most probable set that are likely, each with its ties."""
+    """Name the likely causes of the median probability set, each with its ties."""
     best = _best(posterior)
     found = [_named(posterior, best, i) for i in best if not posterior.elements[i].is_law]
     named = [one for one in found if one.probability >= LIKELY]
@@ -76,8 +76,14 @@ def _lowered(probability: float, ratio: float) -> float:
 
 
 def _best(posterior: Posterior) -> Set:
-    """Return the most probable shapes of the most probable set of labels."""
-    labels = max(posterior.by_labels, key=lambda key: posterior.by_labels[key])
+    """Return the most probable shapes of the most probable set of labels that has all that are likely.
+
+    What most sets have in common may be likely where the most probable single set lacks it (Barbieri and Berger,
+    2004, Annals of Statistics 32(3): the median probability model).
+    """
+    likely = {label for label, p in posterior.marginals.items() if p >= LIKELY}
+    has_all = [labels for labels in posterior.by_labels if likely <= labels]
+    labels = max(has_all or posterior.by_labels, key=lambda key: posterior.by_labels[key])
     return next(chosen for chosen in posterior.sets if frozenset(posterior.elements[i].label for i in chosen) == labels)
 
 

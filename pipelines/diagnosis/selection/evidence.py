@@ -18,7 +18,7 @@ from pipelines.diagnosis.candidates.shape_refinement import log_searched
 from pipelines.diagnosis.candidates.smooth_laws import FAMILIES, HUM, TIME, LawColumn, law_label
 from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
-from pipelines.effects import Cogging, Effect
+from pipelines.effects import Cogging, Effect, Family
 
 Shown = tuple[float, float, int]
 """A line's log likelihood ratio, its share of the torque, and the phases that it has."""
@@ -40,7 +40,7 @@ class Element:
     variance: list[float]
     """Relative prior variance of each coefficient; they add up to one."""
     derivative: list[int] = field(default_factory=list)
-    """Places of what its shapes do."""
+    """Places of the derivative columns along its shapes, and towards another form."""
     resembles: list[int] = field(default_factory=list)
     """Places of the laws that its true form may differ by."""
     resembles_variance: list[float] = field(default_factory=list)
@@ -51,6 +51,7 @@ class Element:
     first: bool = True
     """Whether it is the best shape of its cause."""
     each_run: bool = False
+    """Whether its value is another in every run."""
     worn: bool = False
     """Whether the person carries it."""
     wearer: str = "all"
@@ -191,13 +192,20 @@ def _elements(library: Library, at: _Places) -> list[Element]:
     ]
     elements += [
         Element(
-            law_label(kind, j, names), kind, names[j], FAMILIES[kind], True,
-            [int(p) for p, _ in own], _normalised([v for _, v in own]),
-            repeats=FAMILIES[kind] != TIME, wearer=wearer,
+            label=law_label(kind, j, names),
+            name=kind,
+            joint=names[j],
+            family=FAMILIES[kind],
+            is_law=True,
+            columns=[int(p) for p, _ in own],
+            variance=_normalised([v for _, v in own]),
+            repeats=FAMILIES[kind] != Family.TIME,
+            wearer=wearer,
             shown=_shown(Kind.TIME, j, library.prepared) if kind == HUM else [],
         )
-        for (kind, j, wearer), own in laws.items() if wearer != "cuffs"
-    ]  # fmt: skip
+        for (kind, j, wearer), own in laws.items()
+        if wearer != "cuffs"
+    ]
     effects = [cause.candidate.effect for cause in library.causes]
     return _in_any_form(elements, {effect.label: effect.any_form for effect in effects if effect.any_form})
 
@@ -243,19 +251,29 @@ def _of_cause(number: int, cause: Cause, at: _Places, laws: Laws, prepared: Prep
     effect, names = cause.candidate.effect, prepared.baseline.joints
     joint = effect.joint
     tracked = isinstance(effect, Cogging) and joint and cause.candidate.shapes[0] == orders_of(joint, prepared)
-    places = at.causes[number].tolist()
     resembles = list(_resembled(effect, laws, names, two))
-    total = sum(v for _, v in resembles)
     return Element(
-        effect.label, effect.name, effect.joint, str(effect.family), False, places,
-        [1.0 / len(places)] * len(places), at.derivatives[number].tolist(),
-        [p for p, _ in resembles], [v / total for _, v in resembles],
-        cause.amplitudes[_positive(cause)].tolist(),
-        not effect.goes_with_time and effect.family != TIME, cause.first, effect.each_run,
-        effect.run is not None, place=number, log_prior=cause.candidate.log_prior,
-        log_searched=log_searched(cause.candidate), context=cause.context,
+        label=effect.label,
+        name=effect.name,
+        joint=joint,
+        family=str(effect.family),
+        is_law=False,
+        columns=at.causes[number].tolist(),
+        variance=cause.variance.tolist(),
+        derivative=at.derivatives[number].tolist(),
+        resembles=[p for p, _ in resembles],
+        resembles_variance=_normalised([v for _, v in resembles]),
+        amplitudes=cause.amplitudes[_positive(cause)].tolist(),
+        repeats=not effect.goes_with_time and effect.family != Family.TIME,
+        first=cause.first,
+        each_run=effect.each_run,
+        worn=effect.run is not None,
+        place=number,
+        log_prior=cause.candidate.log_prior,
+        log_searched=log_searched(cause.candidate),
         shown=_shown(Kind.ANGLE, names.index(joint), prepared) if tracked and joint else [],
-    )  # fmt: skip
+        context=cause.context,
+    )
 
 
 def _positive(cause: Cause) -> list[int]:
@@ -293,7 +311,7 @@ def _background(library: Library, at: _Places):
         effect = cause.candidate.effect
         alone = cause.first and cause.context < 0
         if alone and not effect.each_run and effect.run is None:
-            yield from (("cause", int(place), 1.0 / len(places), 0.0) for place in places)
+            yield from (("cause", int(p), float(v), 0.0) for p, v in zip(places, cause.variance, strict=True))
 
 
 def _contexts(library: Library, elements: Sequence[Element]):

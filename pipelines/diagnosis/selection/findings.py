@@ -31,7 +31,7 @@ class Finding:
     probability: float
     """Of a cause with its ties, or of something in the deepest node besides what others tell."""
     causes: tuple[tuple[str, float], ...]
-    """Listed causes that come closest, with their probabilities."""
+    """Of level ``cause`` the named one and its ties; else the listed causes that come closest. With probabilities."""
     laws: tuple[tuple[str, float], ...]
     """Unlisted laws in the deepest node above a cause, with their probabilities."""
     path: tuple[tuple[str, Any, float], ...]

@@ -112,7 +112,7 @@ class MarginalLikelihood:
         values = np.linalg.solve(system, self.right[columns])
         ends = np.cumsum([0, *(len(self.parts[i]) for i in chosen)])
         own = [values[a : a + len(e.columns)] for a, e in zip(ends[:-1], elements, strict=True)]
-        return np.maximum([_share(e, v) for e, v in zip(elements, own, strict=True)], LEAST_SIZE)
+        return np.maximum([_share(v) for v in own], LEAST_SIZE)
 
     def _log_evidence(self, columns: NDArray, variance: NDArray, elements: Sequence[Element]) -> float:
         """Return the log Bayes factor of columns with prior variances, signs included."""
@@ -190,7 +190,7 @@ class MarginalLikelihood:
 
 
 def _power(explained: NDArray, criteria: Criteria) -> NDArray:
-    """Return how much of each output's likelihood counts, (O,): at each joint, what may be explained is not exact."""
+    """Return how much of each output's likelihood counts, (O,): less where much is explained, for no form is exact."""
     weight = np.repeat([criteria.drive_weight, criteria.cuff_weight], len(explained) // 2)
     return np.asarray(weight / (1.0 + criteria.model_error * weight * explained))
 
@@ -210,7 +210,7 @@ def _forward(lower: NDArray, right: NDArray) -> NDArray:
     return np.asarray(dtrtrs(lower, right, lower=1)[0])
 
 
-def _share(element: Element, values: NDArray) -> float:
+def _share(values: NDArray) -> float:
     """Return the share that coefficients make; the columns of a cause are orthonormal."""
     return float(np.linalg.norm(values))
 
@@ -218,7 +218,7 @@ def _share(element: Element, values: NDArray) -> float:
 def _shown(element: Element, c: Criteria) -> float:
     """Return how much likelier a ripple's or tone's lines are of a cause than of a good rig.
 
-    The amplitudes of a line are Gaussian about nought in both, of a cause with the shares that any
+    The amplitudes of a line are Gaussian about zero in both, of a cause with the shares that any
     cause may have, of a good rig with a small one; a good rig need not have it at all.
     """
     if not element.shown:
@@ -252,7 +252,8 @@ def _together(elements: Sequence[Element], sizes: NDArray) -> tuple[NDArray, NDA
 def _log_sign(amplitudes: NDArray, lower: NDArray, u: NDArray, sd: NDArray, at: int) -> float:
     """Return what knowing that amplitudes (p, k) are not negative adds to the log evidence.
 
-    The prior is symmetric, so the factor is twice the posterior probability of the sign.
+    The prior is symmetric, so the factor is twice the posterior probability of the sign; of several, the product, as
+    if they were independent.
     """
     k = amplitudes.shape[1]
     units = np.zeros((len(u), k))

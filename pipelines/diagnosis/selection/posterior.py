@@ -1,7 +1,8 @@
 """The posterior over sets of causes and laws, and what it says of each.
 
-Every single element and every pair is weighed; triples extend the best pairs. What is reported are
-marginals: of nothing missing, of each cause, of something unlisted, of each family at each joint.
+Every element is weighed alone. Pairs of their two best shapes are screened, and the best weighed in
+full; triples extend the best pairs. What is reported are marginals: of nothing missing, of each
+cause, of something unlisted, of each family at each joint.
 """
 
 from collections.abc import Sequence

@@ -93,7 +93,7 @@ def _parameters(fitted: Validated, d: Diagnosis) -> list[dict[str, Any]]:
 def _judged(d: Diagnosis, labels: frozenset[str], probability: float) -> tuple[str, str]:
     named = frozenset(d.causes)
     if named and labels == named:
-        return "named", "its causes are the most probable"
+        return "named", "its causes are likely"
     for one in d.named:
         rest = named - {one.element.label}
         rivals = labels - rest
