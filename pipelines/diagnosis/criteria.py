@@ -14,11 +14,13 @@ class Criteria:
 
     drive_weight: float = 1.17
     """How much of a drive row's likelihood counts where nothing is missing; above one where noise is overestimated."""
-    cuff_weight: float = 0.00407
+    cuff_weight: float = 0.2
     """The same of a cuff row."""
     model_error: float = 0.0075
     """An output counts with weight / (1 + model error x weight x what all causes and laws explain there): no form is
     exact. Held: the score of learning hardly tells values three times as large, under which a second cause is lost."""
+    cuff_model_error: float = 0.05
+    """The same of a cuff's output."""
     form_misfit: float = 0.1
     """Share of a residual's rms that counts as noise: no form of any cause follows it exactly."""
     background_law: float = 2.7e-05
@@ -39,23 +41,23 @@ class Criteria:
     """Prior standard deviation of a shape about its best value, in its unit of change."""
     cause: float = -2.14
     """Prior log odds of a cause against none."""
-    law: float = -2.3
+    law: float = -2.2
     """Prior log odds of an unlisted law against none."""
-    further: float = -2.44
+    further: float = -2.49
     """Prior log odds of each element beyond the first."""
-    other_shape: float = -0.422
+    other_shape: float = -0.46
     """Log odds of a shape that is not the one which explains most."""
-    searched: float = -0.885
+    searched: float = -0.81
     """Log odds per log number of the values among which a wave, a tone or an onset was sought."""
-    each_run: float = -2.76
+    each_run: float = -2.57
     """Log odds of a cause whose value is another in every run."""
-    worn: float = -4.65
+    worn: float = -4.77
     """Log odds of a mass that the person carries, against the machine."""
-    impacts: float = 0.119
+    impacts: float = 0.1
     """Share of the bursts' log likelihood that counts for backlash."""
     lines: float = 1.0
     """Share of a line's log likelihood ratio that counts for a ripple or a tone."""
-    coherence: float = 0.772
+    coherence: float = 0.79
     """Share of the cuffs' and drive's common scatter that counts for a voluntary torque."""
 
 

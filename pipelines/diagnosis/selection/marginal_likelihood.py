@@ -191,8 +191,10 @@ class MarginalLikelihood:
 
 def _power(explained: NDArray, criteria: Criteria) -> NDArray:
     """Return how much of each output's likelihood counts, (O,): less where much is explained, for no form is exact."""
-    weight = np.repeat([criteria.drive_weight, criteria.cuff_weight], len(explained) // 2)
-    return np.asarray(weight / (1.0 + criteria.model_error * weight * explained))
+    of_each = len(explained) // 2
+    weight = np.repeat([criteria.drive_weight, criteria.cuff_weight], of_each)
+    error = np.repeat([criteria.model_error, criteria.cuff_model_error], of_each)
+    return np.asarray(weight / (1.0 + error * weight * explained))
 
 
 def _without(gram: NDArray, right: NDArray, background: NDArray, sd: NDArray) -> tuple[NDArray, NDArray]:
