@@ -1,6 +1,7 @@
 """The hyper-parameters of the posterior, with their meanings.
 
-`make learn` learns all but two, `form_misfit` and `model_error`; whoever accepts what it finds copies it here.
+`make learn` learns all but four, `form_misfit`, `model_error`, `lines` and `base_rate`; whoever accepts what it finds
+copies it here.
 
 A share is of the joint's rms torque; a log odds is a natural logarithm.
 """
@@ -39,6 +40,9 @@ class Criteria:
     """Shares of a cause's own size by which its true form may differ from ours, equally likely."""
     shape_sd: float = 0.0724
     """Prior standard deviation of a shape about its best value, in its unit of change."""
+    base_rate: float = -1.39
+    """Log odds that anything is missing, over those in the simulated sessions: four in five of these lack something,
+    of a lab's one in two is assumed."""
     cause: float = -2.14
     """Prior log odds of a cause against none."""
     law: float = -2.2
@@ -55,7 +59,7 @@ class Criteria:
     """Log odds of a mass that the person carries, against the machine."""
     impacts: float = 0.1
     """Share of the bursts' log likelihood that counts for backlash."""
-    lines: float = 1.0
+    lines: float = 0.03
     """Share of a line's log likelihood ratio that counts for a ripple or a tone."""
     coherence: float = 0.79
     """Share of the cuffs' and drive's common scatter that counts for a voluntary torque."""

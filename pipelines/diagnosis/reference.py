@@ -21,7 +21,7 @@ INTRODUCTION = """\
 
 For those who want to know why a verdict came out as it did, or who change the decision.
 Written by `make docs` from `pipelines/diagnosis/criteria.py`. All but
-`form_misfit` and `model_error` are learned (`make learn`): they maximise the log probability that
+`form_misfit`, `model_error`, `lines` and `base_rate` are learned (`make learn`): they maximise the log probability that
 the posterior gives to the truth, over simulated sessions.
 [science.md](science.md#9-the-decision) has the equations in which they stand.
 """

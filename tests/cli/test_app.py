@@ -38,6 +38,18 @@ def test_help_loads_nothing_heavy():
     assert subprocess.check_output([sys.executable, "-c", code], text=True).strip() == "[]"
 
 
+@pytest.mark.parametrize(("told", "used"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])
+def test_numpy_uses_one_thread_unless_told_otherwise(told, used):
+    code = (
+        "import os, sys; sys.argv = ['exoid', '--help']\n"
+        "from exoid_cli.__main__ import main\n"
+        "try: main()\nexcept SystemExit: print(os.environ['OPENBLAS_NUM_THREADS'])"
+    )
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")} | told
+    said = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True).stdout
+    assert said.splitlines()[-1] == used
+
+
 def test_what_python_warns_of_reaches_who_changes_exoid_and_no_user():
     code = (
         "import warnings; from exoid_cli import app; "

@@ -1,4 +1,4 @@
-"""A gear that ripples at several lines beside friction that builds up over a travel: both are named, none thrown out."""
+"""A gear that ripples at several lines beside friction that builds up over a travel: both are named."""
 
 from dataclasses import replace
 

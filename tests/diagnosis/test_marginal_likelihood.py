@@ -44,7 +44,7 @@ def test_a_law_has_the_evidence_of_its_gaussian_model():
     plain = background_covariance(X)
     with_law = plain + amplitude**2 * (0.7 * np.outer(X[:, 3], X[:, 3]) + 0.3 * np.outer(X[:, 4], X[:, 4]))
     ratio = multivariate_normal.logpdf(y, cov=with_law) - multivariate_normal.logpdf(y, cov=plain)
-    assert weigh((2,)) == pytest.approx(ratio - np.log(3.0) + CRITERIA.law, abs=1e-8)
+    assert weigh((2,)) == pytest.approx(ratio - np.log(3.0) + CRITERIA.law + CRITERIA.base_rate, abs=1e-8)
 
 
 def test_a_cause_may_differ_by_its_shape_and_by_what_it_resembles():
@@ -60,7 +60,7 @@ def test_a_cause_may_differ_by_its_shape_and_by_what_it_resembles():
         free = (misfit * size) ** 2 * 0.5 * X[:, 3:5] @ X[:, 3:5].T
         logs.append(multivariate_normal.logpdf(y, cov=named + free))
     ratio = np.logaddexp.reduce(logs) - np.log(3.0) - multivariate_normal.logpdf(y, cov=plain)
-    expected = ratio - np.log(3.0) + CRITERIA.cause
+    expected = ratio - np.log(3.0) + CRITERIA.cause + CRITERIA.base_rate
     assert weigh((0,)) == pytest.approx(expected, abs=1e-7)
 
 

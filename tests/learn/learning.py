@@ -29,7 +29,8 @@ def learn(
     start: Criteria,
 ) -> dict[str, Any]:  # fmt: skip
     """Return the learned criteria, the scores before and after, and what they were learned from."""
-    criteria, history = start, []
+    # The sessions have a base rate of their own.
+    criteria, history = replace(start, base_rate=0.0), []
     for _ in range(ROUNDS):
         with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
             sessions = list(sessions_of(root, worlds, left_out, most, pool, criteria))
@@ -39,7 +40,7 @@ def learn(
         history.append({"sessions": len(sessions), "before": before, "after": after})
         print(f"{len(sessions)} sessions: {before:.4f} -> {after:.4f}", flush=True)
     return {
-        "criteria": asdict(criteria), "history": history, "worlds": list(worlds),
+        "criteria": asdict(replace(criteria, base_rate=start.base_rate)), "history": history, "worlds": list(worlds),
         "left_out": sorted(left_out),
     }  # fmt: skip
 

@@ -8,12 +8,10 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.criteria import Criteria
 from pipelines.diagnosis.selection.prior import FEATURES
 
-HELD = ("form_misfit", "model_error")
-"""What is not learned: what acts before the evidence is stored, and what the score hardly tells from values three times
-as large, while a second cause beside a large one is lost under those."""
-
-AT_MOST_ONE = ("lines",)
-"""Shares of a likelihood ratio that counts: to count one more than once is to invent data."""
+HELD = ("form_misfit", "model_error", "lines", "base_rate")
+"""What is not learned. The first acts before the evidence is stored; the sessions' mixture decides the last. The score
+is flat in the others: over a factor of three in the model error, under the larger of which a second cause beside a
+large one is lost, and of thirty in how much lines count, of which a drive that ripples asks for little."""
 
 
 def names() -> list[str]:
@@ -30,7 +28,6 @@ def from_vector(vector: NDArray, like: Criteria) -> Criteria:
     """Return criteria with a vector's numbers, the rest as in ``like``."""
     changed: dict[str, float | tuple[float, ...]] = {}
     for (name, k, several, _), value in zip(_places(like), np.exp(vector).tolist(), strict=True):
-        value = min(value, 1.0) if name in AT_MOST_ONE else value
         if several:
             old = changed.get(name, getattr(like, name))
             changed[name] = (*old[:k], value, *old[k + 1 :])

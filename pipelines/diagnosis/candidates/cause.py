@@ -28,7 +28,7 @@ class Cause:
     amplitudes: NDArray
     """(p, k): the effect's own amplitudes per coefficient."""
     variance: NDArray
-    """(k,) prior variance of each coefficient relative to their sum: larger where typical amplitudes make more of it."""
+    """(k,) prior variance of each coefficient over their sum: larger where typical amplitudes make more of it."""
     derivative: NDArray
     """(N, d) what a change of its shape does: along each shape, and towards another form."""
     first: bool

@@ -432,7 +432,7 @@ def _growth(
     """Return the factor by which an effect's square must grow to be named, and what asks for it."""
     if _squared(left) <= NOTHING * _squared(sight.rows(column)[:, 0]):
         return np.inf, "noise"
-    price = 0.5 * columns * np.log(sight.independent) - CRITERIA.cause
+    price = 0.5 * columns * np.log(sight.independent) - CRITERIA.cause - CRITERIA.base_rate
     by_noise = needed_noncentrality(columns, price, power) / _squared(left)
     # A good rig has a little of the effect, as if its amplitude were known to so much.
     share = sight.share(effect, column)

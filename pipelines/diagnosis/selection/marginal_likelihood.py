@@ -148,7 +148,7 @@ class MarginalLikelihood:
                     s = np.hstack([sd[one[some], :a], sd[other[some], :b]])
                     odds[some] = self._rough(c, s)
         own = self.apart + self.features @ self._weights
-        odds += own[numbers[one]] + own[numbers[other]] + self.criteria.further
+        odds += own[numbers[one]] + own[numbers[other]] + self._weights[FEATURES.index("further")]
         return np.column_stack([numbers[one], numbers[other]]), odds
 
     def _padded(self, chosen: NDArray) -> tuple[NDArray, NDArray, NDArray]:

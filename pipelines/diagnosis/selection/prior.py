@@ -40,5 +40,9 @@ def of_set(chosen: Sequence[NDArray]) -> NDArray:
 
 
 def weights(criteria: Criteria) -> NDArray:
-    """Return the log odds of one unit of each feature, (f,)."""
-    return np.array([getattr(criteria, name) for name in FEATURES])
+    """Return the log odds of one unit of each feature, (f,); the base rate counts once in each set but the empty one."""
+    found = {name: getattr(criteria, name) for name in FEATURES}
+    found["cause"] += criteria.base_rate
+    found["law"] += criteria.base_rate
+    found["further"] -= criteria.base_rate
+    return np.array(list(found.values()))
