@@ -46,7 +46,7 @@ def diagnose(motions: Sequence[Motion], report: Report = silent, known: Sequence
     """Find what the rigid body with Coulomb and viscous friction gets wrong, and why.
 
     Selection, shapes and shared parameters use ``train`` runs only. The ``validate`` runs measure
-    every error, and may lower the probability of a cause that repeats and does harm there.
+    every error, and may lower the probability of a cause that does harm there.
 
     Parameters
     ----------
@@ -143,12 +143,13 @@ def _judged(
     """
     while True:
         after, without = _fitted(selected, refine, prepared, before)
-        # What does not repeat on training runs need not be on the validation runs.
-        repeating = {one.element.label for one in selected.answer.named if one.element.repeats}
+        # A torque whose size each run has for itself says nothing of another run.
+        shared = {c.label for c in selected.candidates if not any(p.per_run for p in c.effect.linear)}
         ratios = {
             label: log_likelihood_ratio(less, after, prepared.noise)
-            for label, less in without.items() if label in repeating
-        }  # fmt: skip
+            for label, less in without.items()
+            if label in shared
+        }
         judged = selected.judged(ratios)
         harmful = ratios.keys() - {one.element.label for one in judged.answer.named}
         if not harmful:

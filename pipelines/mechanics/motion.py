@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pipelines.contracts.joints import joints_of
 from pipelines.contracts.table import Table
+from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.load import Load, load_along
 from pipelines.mechanics.machine import Machine, machine_of
@@ -24,6 +25,12 @@ LOAD_CUTOFF_HZ = 5.0
 
 MOST_UNREAD_S = 0.1
 """Forces read further apart than this are not known between: a leg that moves at 1 Hz goes a tenth of its way there."""
+
+LONGEST_PERIOD = 10
+"""Recordings that a period is as long as, beyond which it tells nothing."""
+
+SHORTEST_PERIOD = 4
+"""Samples that a period has at least."""
 
 KEPT = ("transmitted", "on_limb", "link_swing", "limb_swing", "motor_temperature")
 """What a motion knows of loads and temperatures, and keeps with other kinematics."""
@@ -236,6 +243,19 @@ def geometry_of(metadata: dict[str, Any], default: Geometry | None = None) -> Ge
     return replace(default or (Geometry(gravity_m_s2=0.0) if slides else Geometry()), **known)
 
 
+def _period(table: Table) -> float | None:
+    """Return a recording's period, s; None of one so long that nothing in it could repeat."""
+    told, rate = table.metadata.get("period_s"), float(table.metadata["sample_rate_hz"])
+    if told is None or told * rate > LONGEST_PERIOD * len(table.frame):
+        return None
+    if told * rate < SHORTEST_PERIOD:
+        raise InputError(
+            f"{table.path or 'recording'}: period_s is {told:g} s, at {rate:g} Hz less than {SHORTEST_PERIOD} samples, "
+            "expected the period of the excitation; mend it in the metadata, or leave it out"
+        )
+    return float(told)
+
+
 def motion_from_table(table: Table, default_geometry: Geometry | None = None) -> Motion:
     """Take a ``motion/1`` table apart into arrays.
 
@@ -263,7 +283,7 @@ def motion_from_table(table: Table, default_geometry: Geometry | None = None) ->
         run=metadata["run"],
         purpose=metadata["purpose"],
         sample_rate_hz=float(metadata["sample_rate_hz"]),
-        period_s=metadata.get("period_s"),
+        period_s=_period(table),
         joints=tuple(joint.name for joint in joints),
         geometry=geometry_of(metadata, default_geometry),
         forces=frame[force_columns].to_numpy(float).reshape(-1, 4, 3) if has_forces else None,

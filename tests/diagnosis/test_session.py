@@ -9,7 +9,10 @@ from pipelines.diagnosis.data_faults import excluding, find_faults
 from pipelines.diagnosis.detectability.detectability import detectability_of_recorded
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.errors import InputError
-from tests.diagnosis.sessions import session
+from pipelines.mechanics.kinematics import motion_table
+from pipelines.mechanics.motion import motion_from_table
+from pipelines.settings.filter import FilterSettings
+from tests.diagnosis.sessions import recordings, session
 
 
 @pytest.fixture(scope="module")
@@ -162,3 +165,23 @@ def test_a_run_that_a_fault_leaves_nothing_of_is_left_out_where_others_suffice(m
     with_it, without = diagnose([*motions, stuck]), diagnose(motions)
     assert with_it.causes == without.causes and with_it.status == without.status
     assert {run.motion.file for run in with_it.train} == {run.motion.file for run in without.train}
+
+
+@pytest.mark.parametrize("factor", [1e-2, 1e-6])
+def test_torques_that_are_all_far_too_small_get_an_answer(motions, factor):
+    assert diagnose([replace(m, torque=factor * m.torque) for m in motions]).status
+
+
+@pytest.mark.parametrize(("period_s", "taken"), [(4.0, 4.0), (1e6, None)])
+def test_a_period_much_longer_than_its_recording_is_none(period_s, taken):
+    assert motion_from_table(recorded(period_s)).period_s == taken
+
+
+def test_a_period_of_less_than_four_samples_is_refused():
+    with pytest.raises(InputError, match=r"period_s is 0.001 s, at \d+ Hz less than 4 samples, expected the period"):
+        motion_from_table(recorded(0.001))
+
+
+def recorded(period_s):
+    table = motion_table(recordings(seconds=20.0)[0], FilterSettings())
+    return replace(table, metadata=table.metadata | {"period_s": period_s})

@@ -181,6 +181,8 @@ def _with_harmonics(
     step = hz[1] - hz[0]
     first, last = np.ceil(hz[0] * period_s), np.floor(hz[-1] * period_s)
     harmonics = np.arange(first, last + 1.0) / period_s
+    if not len(harmonics):
+        return level
     place = np.clip(np.round((harmonics - hz[0]) / step).astype(int), 1, len(hz) - 2)
     at = np.maximum(np.maximum(ratio[place - 1], ratio[place]), ratio[place + 1])
     padded = np.pad(at, HARMONICS, mode="edge")
