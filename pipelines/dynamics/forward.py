@@ -216,6 +216,7 @@ def _finish(a, w, t, state, memory, direction, load, drive, rates):
             rates[DTHETA, j] = rates[DQ, j]
 
 
+# Not inlined: each of its callers would compile it anew, ten seconds in all.
 @njit(**HOT)
 def accelerations(a, w, t, state, memory, direction, load, drive, rates):
     """Write d(state)/dt into ``rates`` (4, J).

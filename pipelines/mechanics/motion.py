@@ -26,11 +26,11 @@ LOAD_CUTOFF_HZ = 5.0
 MOST_UNREAD_S = 0.1
 """Forces read further apart than this are not known between: a leg that moves at 1 Hz goes a tenth of its way there."""
 
-LONGEST_PERIOD = 10
-"""Recordings that a period is as long as, beyond which it tells nothing."""
-
 SHORTEST_PERIOD = 4
-"""Samples that a period has at least."""
+"""Samples in a period, at least."""
+
+IGNORED_PERIOD = 10
+"""Recording lengths in a period, beyond which it is ignored."""
 
 KEPT = ("transmitted", "on_limb", "link_swing", "limb_swing", "motor_temperature")
 """What a motion knows of loads and temperatures, and keeps with other kinematics."""
@@ -244,16 +244,22 @@ def geometry_of(metadata: dict[str, Any], default: Geometry | None = None) -> Ge
 
 
 def _period(table: Table) -> float | None:
-    """Return a recording's period, s; None of one so long that nothing in it could repeat."""
-    told, rate = table.metadata.get("period_s"), float(table.metadata["sample_rate_hz"])
-    if told is None or told * rate > LONGEST_PERIOD * len(table.frame):
+    """Return the period of a recording's motion, s; None where it is unknown or far longer than the recording.
+
+    Raises
+    ------
+    InputError
+        Where the period is shorter than a few samples.
+    """
+    period_s, rate_hz = table.metadata.get("period_s"), float(table.metadata["sample_rate_hz"])
+    if period_s is None or period_s * rate_hz > IGNORED_PERIOD * len(table.frame):
         return None
-    if told * rate < SHORTEST_PERIOD:
+    if period_s * rate_hz < SHORTEST_PERIOD:
         raise InputError(
-            f"{table.path or 'recording'}: period_s is {told:g} s, at {rate:g} Hz less than {SHORTEST_PERIOD} samples, "
-            "expected the period of the excitation; mend it in the metadata, or leave it out"
+            f"{table.path or 'recording'}: period_s is {period_s:g} s, at {rate_hz:g} Hz less than "
+            f"{SHORTEST_PERIOD} samples, expected the period of the excitation; correct or remove it"
         )
-    return float(told)
+    return float(period_s)
 
 
 def motion_from_table(table: Table, default_geometry: Geometry | None = None) -> Motion:

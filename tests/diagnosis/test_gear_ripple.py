@@ -3,14 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 
-from pipelines.contracts.table import Table
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.motion import motion_from_table
 from pipelines.settings.filter import FilterSettings
+from tests.diagnosis.machines import table
 
 RATE_HZ, PERIOD_S, PERIODS = 64.0, 22.0, 8
 LINES = ((2.0, 88.3, 3.0), (1.0, 34.9, 1.0), (0.3, 70.7, -3.0), (0.15, 176.7, -1.4))
@@ -43,13 +42,10 @@ def built_up(angle, friction, travel):
 
 
 def motion(time, angle, torque, purpose):
-    frame = pd.DataFrame({"time_s": time, "joint_angle_rad": angle, "joint_torque_nm": torque})
-    metadata = {
-        "contract": "recording/1", "run": "exo_alone", "purpose": purpose, "sample_rate_hz": RATE_HZ,
-        "period_s": PERIOD_S, "joints": [{"name": "joint", "kind": "revolute"}], "geometry": {"gravity_m_s2": 0.0},
-    }  # fmt: skip
-    made = motion_from_table(motion_table(Table(frame, metadata, None), FilterSettings()))
-    return replace(made, file=f"{purpose}.parquet")
+    recording = table(time, angle, torque, {"name": "joint", "kind": "revolute"}, purpose, gravity_m_s2=0.0)
+    timing = {"sample_rate_hz": RATE_HZ, "period_s": PERIOD_S}
+    recording = replace(recording, metadata=recording.metadata | timing)
+    return replace(motion_from_table(motion_table(recording, FilterSettings())), file=f"{purpose}.parquet")
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -6,6 +6,7 @@ from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import t
 
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.observed_run import Run
@@ -16,6 +17,8 @@ WORN = ("mass_off_axis", "payload_change")
 """Effects of the structure that the person may carry instead: then in their runs only, and felt by the cuffs."""
 TURNS = ("1/turn", "rad/m")
 """Units of what is counted along a joint's way."""
+DEGREES = 3
+"""Of freedom of the prior of a free shape: its tails are heavy, for typical ranges are known roughly."""
 WAVES = 1.5
 """Of a ripple within the angles that are swept: with fewer it is not seen to repeat, and beside a spring it could
 imitate any function of the angle."""
@@ -81,15 +84,14 @@ class Candidate:
     def log_prior(self) -> float:
         """Log prior density of its shape over that of a uniform one in the typical range; forms are equally likely.
 
-        A free shape has Student's distribution about the middle of its typical range, a quarter of the range wide:
-        its tails are heavy, for ranges are known roughly. Where a joint's way decides the range, or each run has a
-        value, the density is the uniform one.
+        A free shape has Student's distribution about the middle of its typical range, with a quarter of the range as
+        its scale. Where a joint's way decides the range, or each run has a value, the density is the uniform one.
         """
         forms = prod(max(len(parameter.forms), 1) for parameter in self.effect.shape)
         free = [i for i, p in enumerate(self.effect.shape) if self.is_free(i) and not (p.swept or p.per_run)]
         offs = [self.effect.shape[i].off_middle(self.shapes[0][i]) for i in free if not self.directions]
-        # The standard density at a value twice as many quarters off as halves, times the range in quarters.
-        return float(sum(np.log(4.0) + _log_student(2.0 * off) for off in offs) - np.log(forms))
+        # Off the middle in halves of the range, with a scale of a quarter; a range is four scales long.
+        return float(np.sum(np.log(4.0) + t.logpdf(2.0 * np.array(offs), DEGREES)) - np.log(forms))
 
     def is_free(self, i: int) -> bool:
         """Tell whether shape parameter ``i`` is fitted, and not held at its usual value or at one of its forms."""
@@ -108,11 +110,6 @@ class Candidate:
         """Which shape parameter is the instant at which the effect begins in each run, None where it has none."""
         own = (i for i, p in enumerate(self.effect.shape) if p.per_run and not self.bends)
         return next(own, None)
-
-
-def _log_student(x: float) -> float:
-    """Return the log density of Student's distribution with three degrees of freedom."""
-    return float(np.log(2.0 / (np.pi * np.sqrt(3.0))) - 2.0 * np.log1p(x * x / 3.0))
 
 
 def bends_motion(effect: Effect) -> bool:

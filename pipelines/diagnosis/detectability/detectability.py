@@ -37,6 +37,7 @@ from pipelines.diagnosis.evidence.noise_floor import Floor, noise_floor
 from pipelines.diagnosis.evidence.observed_run import Run, observe
 from pipelines.diagnosis.fit.held_out import evaluate
 from pipelines.diagnosis.fit.joint_fit import fit
+from pipelines.diagnosis.selection.prior import FEATURES, weights
 from pipelines.effects import Effect, Parameter
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.scale import on_one_scale
@@ -432,7 +433,7 @@ def _growth(
     """Return the factor by which an effect's square must grow to be named, and what asks for it."""
     if _squared(left) <= NOTHING * _squared(sight.rows(column)[:, 0]):
         return np.inf, "noise"
-    price = 0.5 * columns * np.log(sight.independent) - CRITERIA.cause - CRITERIA.base_rate
+    price = 0.5 * columns * np.log(sight.independent) - weights(CRITERIA)[FEATURES.index("cause")]
     by_noise = needed_noncentrality(columns, price, power) / _squared(left)
     # A good rig has a little of the effect, as if its amplitude were known to so much.
     share = sight.share(effect, column)

@@ -460,7 +460,6 @@ def _step_over_time(
 
 def _solved(normal: NDArray, right: NDArray) -> NDArray:
     """Return the least-norm solution of normal equations, (p, p) and (p,), columns scaled alike."""
-    size = np.sqrt(np.diag(normal))
-    size[size == 0.0] = 1.0
+    size = np.sqrt(np.maximum(np.diag(normal), np.finfo(float).tiny))
     scaled = np.linalg.lstsq(normal / np.outer(size, size), right / size, rcond=1e-9)[0]
     return np.asarray(scaled / size)

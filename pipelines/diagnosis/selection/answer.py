@@ -9,7 +9,7 @@ from pipelines.diagnosis.selection.evidence import Element
 from pipelines.diagnosis.selection.posterior import Posterior, Set
 
 LIKELY = 0.5
-"""Probability from which a cause, alone or with its ties, is named, and from which a finding is told."""
+"""Probability at which a cause, alone or with its ties, is named, and at which a finding is reported."""
 TIED = 0.1
 """Odds against the named cause from which another counts as not told apart."""
 
