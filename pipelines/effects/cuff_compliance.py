@@ -63,7 +63,7 @@ class CuffCompliance(Effect):
         stiffness, held, hardening = self.completed(shape)
         direction = self._direction(motion, held > 0.0)
         if motion.limb_swing is not None:
-            return behind_spring(motion, motion.limb_swing, direction, self, (stiffness, held, hardening), 0.0)
+            return behind_spring(motion, motion.limb_swing, direction, self, (stiffness, held, hardening))
         q, dq, ddq = (
             state - direction * np.sum(direction * torque, axis=1, keepdims=True) / stiffness
             for state, torque in zip((motion.q, motion.dq, motion.ddq), motion.on_limb, strict=True)

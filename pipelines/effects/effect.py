@@ -232,6 +232,8 @@ class Effect(ABC):
     """True where ``spring`` stands between machine and limb, not between motor and link."""
     swings: ClassVar[bool] = False
     """True where ``corrected`` lets the load swing on the spring: what it does then depends on its frequency."""
+    reads_load: ClassVar[bool] = False
+    """True where ``reaction`` depends on the transmitted torque, which along a measured motion has to be smoothed."""
     reading_states: ClassVar[int] = 0
     reaction: ClassVar[Callable[..., Any] | None] = None
     derivative: ClassVar[Callable[..., Any] | None] = None
@@ -401,9 +403,8 @@ class Effect(ABC):
         return columns
 
     def _react(self, motion: Motion, values: NDArray, out: NDArray) -> None:
-        of_motion = (
-            motion.time, motion.q, motion.dq, motion.ddq, motion.transmitted[0], motion.motor_temperature,
-        )  # fmt: skip
+        load = motion.transmitted[0] if self.reads_load else np.zeros_like(motion.q)
+        of_motion = motion.time, motion.q, motion.dq, motion.ddq, load, motion.motor_temperature
         arrays = [np.ascontiguousarray(array) for array in of_motion]
         joint, geometry, joints = self.column(motion), motion.geometry.array(), len(motion.joints)
         if self.derivative is None:

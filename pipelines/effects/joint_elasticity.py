@@ -7,16 +7,20 @@ from numpy.typing import NDArray
 
 from pipelines.effects.effect import Effect, Family, Parameter, Side
 from pipelines.effects.kernel import spring
+from pipelines.effects.rotor_inertia import RotorInertia
 from pipelines.effects.swing import behind_spring
 from pipelines.mechanics.motion import Motion
 
 MOTOR_INERTIA = 0.1
 """kg·m², reflected to the joint; what little of a rigid drive's inertia stays with the motor."""
 
+ROTOR_INERTIA = 0.17
+"""kg·m² of a rotor that the rigid body's parameters hold: the middle of what is typical."""
+
 DAMPING_RATIO = 0.1
 """Of the motor's swing on the spring: a harmonic drive's flexspline."""
 
-SWING_RATIO = 0.1
+SWING_RATIO = 0.05
 """Damping ratio at which the link is let swing behind a measured motion; more forgets, less errs for longer."""
 
 
@@ -56,8 +60,15 @@ class JointElasticity(Effect):
         if motion.link_swing is not None:
             direction = np.zeros_like(motion.q)
             direction[:, j] = 1.0
-            return behind_spring(motion, motion.link_swing, direction, self, self.completed(shape), SWING_RATIO)
+            return behind_spring(
+                motion, motion.link_swing, direction, self, self.completed(shape), SWING_RATIO, self._rotor(motion)
+            )
         q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
         for state, load_rate in zip((q, dq, ddq), motion.transmitted, strict=True):
             state[:, j] -= load_rate[:, j] / shape[0]
         return motion.with_state(q, dq, ddq)
+
+    def _rotor(self, motion: Motion) -> float:
+        """Return the rotor's inertia that a fit of the rigid body counts among the links', kg·m²."""
+        counted = motion.machine.is_exoskeleton and motion.machine.place(str(self.joint)) in RotorInertia.absorbed
+        return ROTOR_INERTIA if counted else 0.0

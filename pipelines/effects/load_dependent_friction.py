@@ -21,6 +21,7 @@ class LoadDependentFriction(Effect):
     linear = (Parameter("load_coefficient", "1", "friction per unit of transmitted torque", "mu", (0.02, 0.3)),)
     parity = Parity.ODD
     dissipative = True
+    reads_load = True
 
     @reaction
     def reaction(at, state, values, geometry, joint, out):

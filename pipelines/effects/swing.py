@@ -18,8 +18,9 @@ LEAST_INERTIA = 0.02
 
 
 def behind_spring(
-    motion: Motion, load: Load, direction: NDArray, effect: Effect, values: NDArray | tuple[float, ...], ratio: float
-) -> Motion:
+    motion: Motion, load: Load, direction: NDArray, effect: Effect, values: NDArray | tuple[float, ...],
+    ratio: float = 0.0, with_motor: float = 0.0,
+) -> Motion:  # fmt: skip
     """Return the motion behind an effect's spring.
 
     Parameters
@@ -34,11 +35,15 @@ def behind_spring(
         Whose ``spring`` it is.
     values : sequence of float
         The effect's.
-    ratio : float
+    ratio : float, optional
         Damping ratio added to the spring's own. The motion drives a copy of the load: undamped, the copy would
         swing on with every error of the load for ever.
+    with_motor : float, optional
+        Inertia in the load that turns with the motor instead, kg·m².
     """
-    along = [np.ascontiguousarray(part) for part in load.along(direction)]
+    torque, inertia, *slopes = load.along(direction)
+    torque = torque - with_motor * np.sum(direction * motion.ddq, axis=1)
+    along = [np.ascontiguousarray(part) for part in (torque, inertia - with_motor, *slopes)]
     least = LEAST_INERTIA * effect.scale.of("kg·m²")
     h, twist = 1.0 / motion.sample_rate_hz, np.zeros(len(motion))
     joints = np.flatnonzero(direction.any(axis=0))

@@ -34,17 +34,34 @@ class Load(NamedTuple):
         return Load(np.sum(direction * self.torque, axis=1), *slopes)
 
 
-def load_along(mechanism: Mechanism, q: NDArray, dq: NDArray, ddq: NDArray, X: NDArray, geometry: Geometry) -> Load:
-    """Return the load of a body with inertial parameters ``X`` (p,) along a motion (n, J)."""
-    n, J = q.shape
-    slopes = np.empty((3, n, J, J))
+class LoadColumns(NamedTuple):
+    """A load per unit of each inertial parameter of a body, p of them."""
+
+    torque: NDArray
+    """(n, J, p)."""
+    inertia: NDArray
+    """(n, J, J, p)."""
+    damping: NDArray
+    """(n, J, J, p)."""
+    stiffness: NDArray
+    """(n, J, J, p)."""
+
+    def of(self, X: NDArray) -> Load:
+        """Return the load of a body with inertial parameters ``X`` (p,)."""
+        return Load(*(columns @ X for columns in self))
+
+
+def load_columns(mechanism: Mechanism, q: NDArray, dq: NDArray, ddq: NDArray, geometry: Geometry) -> LoadColumns:
+    """Return what each inertial parameter adds to a body's load along a motion (n, J)."""
+    J = q.shape[1]
 
     def torque(q: NDArray, dq: NDArray, ddq: NDArray) -> NDArray:
-        return mechanism.regressor(q, dq, ddq, geometry) @ X
+        return mechanism.regressor(q, dq, ddq, geometry)
 
     here = torque(q, dq, ddq)
+    slopes = np.empty((3, *here.shape[:2], J, here.shape[2]))
     for j, unit in enumerate(np.eye(J)):
         slopes[0, :, :, j] = torque(q, dq, ddq + unit) - here
         slopes[1, :, :, j] = (torque(q, dq + STEP * unit, ddq) - here) / STEP
         slopes[2, :, :, j] = (torque(q + STEP * unit, dq, ddq) - here) / STEP
-    return Load(here, *slopes)
+    return LoadColumns(here, *slopes)

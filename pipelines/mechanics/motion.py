@@ -13,7 +13,7 @@ from pipelines.contracts.joints import joints_of
 from pipelines.contracts.table import Table
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.load import Load, load_along
+from pipelines.mechanics.load import Load, LoadColumns, load_columns
 from pipelines.mechanics.machine import Machine, machine_of
 from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque
 from pipelines.mechanics.units import Scale
@@ -189,7 +189,12 @@ class Motion:
         return None if self.limb_body is None else self._load_of(self.limb_body)
 
     def _load_of(self, body: NDArray) -> Load:
-        return load_along(self.machine.mechanism, self.q, self.dq, self.ddq, body, self.geometry)
+        return self.load_columns.of(body)
+
+    @cached_property
+    def load_columns(self) -> LoadColumns:
+        """What each inertial parameter adds to the load of a body along this motion."""
+        return load_columns(self.machine.mechanism, self.q, self.dq, self.ddq, self.geometry)
 
     @property
     def _load_cutoff_hz(self) -> float:
@@ -212,8 +217,10 @@ class Motion:
 
         The measured torques would not do: their noise would stand on both sides of a regression.
         """
-        columns = self.machine.mechanism.regressor(self.q, self.dq, self.ddq, self.geometry)
-        return replace(self, load=columns @ body, limb_load=columns @ limb, body=body, limb_body=limb)
+        columns = self.load_columns
+        made = replace(self, load=columns.torque @ body, limb_load=columns.torque @ limb, body=body, limb_body=limb)
+        made.__dict__["load_columns"] = columns
+        return made
 
     def with_state(self, q: NDArray, dq: NDArray, ddq: NDArray) -> "Motion":
         """Return the same run with other kinematics, (n, J) each, as a corrected measurement has."""

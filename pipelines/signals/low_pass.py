@@ -1,8 +1,11 @@
 """Zero-phase low-pass and the derivatives of what it leaves."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, savgol_filter, sosfiltfilt
+from scipy.ndimage import correlate1d
+from scipy.signal import butter, savgol_coeffs, sosfiltfilt
 
 ORDER = 4
 """Order of one pass; forwards and backwards the filter falls with twice this."""
@@ -40,12 +43,32 @@ def low_pass(x: NDArray, rate_hz: float, cutoff_hz: float, order: int = ORDER) -
     rate_hz, cutoff_hz : float
         Sample rate; frequency at which one pass has fallen by 3 dB, below half the sample rate.
     """
-    sections = butter(order, cutoff_hz, fs=rate_hz, output="sos")
+    sections = _sections(order, cutoff_hz, rate_hz)
     padding = min(len(x) - 1, _padding(rate_hz, cutoff_hz))
     return np.ascontiguousarray(sosfiltfilt(sections, x, axis=0, padlen=padding))
 
 
+@lru_cache
+def _sections(order: int, cutoff_hz: float, rate_hz: float) -> NDArray:
+    """Return the filter's second-order sections: their design takes longer than a short stretch's filtering."""
+    return np.asarray(butter(order, cutoff_hz, fs=rate_hz, output="sos"))
+
+
+@lru_cache
+def _differences(order: int) -> NDArray:
+    """Return the weights of a stencil's samples in the derivative at each of them, per sample."""
+    size = DERIVATIVE_STENCIL
+    return np.array([savgol_coeffs(size, size - 1, deriv=order, pos=i, use="dot") for i in range(size)])
+
+
 def derivative(x: NDArray, rate_hz: float, order: int) -> NDArray:
-    """Differentiate uniform samples (n, ...) along the first axis, ``order`` 1 or 2, by central differences."""
-    differences = savgol_filter(x, DERIVATIVE_STENCIL, DERIVATIVE_STENCIL - 1, deriv=order, delta=1.0 / rate_hz, axis=0)
-    return np.ascontiguousarray(differences)
+    """Differentiate uniform samples (n, ...) along the first axis, ``order`` 1 or 2, by central differences.
+
+    ``scipy.signal.savgol_filter`` does the same, and fits a polynomial at both ends of each stretch anew.
+    """
+    weights = _differences(order) * rate_hz**order
+    half = DERIVATIVE_STENCIL // 2
+    out = correlate1d(x, weights[half], axis=0, mode="nearest")
+    out[:half] = np.tensordot(weights[:half], x[:DERIVATIVE_STENCIL], 1)
+    out[-half:] = np.tensordot(weights[-half:], x[-DERIVATIVE_STENCIL:], 1)
+    return np.asarray(out)

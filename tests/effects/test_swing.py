@@ -67,7 +67,7 @@ def test_a_copy_that_is_damped_more_forgets_an_error_of_the_load_sooner():
 @pytest.mark.parametrize("effect", [JointElasticity, CuffCompliance])
 @pytest.mark.parametrize("joint", JOINTS)
 def test_the_slower_the_motion_the_nearer_is_the_link_to_torque_over_stiffness(with_human, effect, joint):
-    bound, stiffness = effect(joint), 1500.0
+    bound, stiffness = effect(joint), 6000.0
     errors = []
     for slow in (2.0, 8.0):
         m = with_human

@@ -33,6 +33,8 @@ class Candidate:
     """One for each run; they differ in parameters that each run has for itself."""
     directions: tuple[tuple[float, ...], ...] = ()
     """Shapes that have a column each, where the effect is in proportion to them; empty where it has one shape."""
+    bodies: tuple[float, ...] = ()
+    """Values of the baseline on whose rigid bodies it swings, in the library; empty for those of the baseline alone."""
 
     @property
     def label(self) -> str:

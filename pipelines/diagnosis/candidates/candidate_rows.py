@@ -5,13 +5,14 @@ the angle that go by within a few blocks.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates.candidate import TURNS, Candidate
 from pipelines.diagnosis.candidates.columns import torque_columns
-from pipelines.diagnosis.evidence.baseline import Baseline
+from pipelines.diagnosis.evidence.baseline import Baseline, with_load
 from pipelines.diagnosis.evidence.baseline_columns import columns_under
 from pipelines.diagnosis.evidence.block_rate import at_block_rate
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
@@ -36,6 +37,7 @@ class CandidateRows:
         steps = np.max([np.quantile(np.abs(np.diff(run.state[0], axis=0)), 0.9, axis=0) for run in runs], axis=0)
         self._steps = dict(zip(names, steps, strict=True))
         self._kinds = [run.motion.run for run in runs]
+        self._swinging: tuple[tuple[float, ...], list[Run]] = (), self._slow
 
     def __call__(self, candidate: Candidate, beside: NDArray | None = None) -> NDArray | None:
         """Return a candidate's rows; None where they are not finite.
@@ -57,6 +59,23 @@ class CandidateRows:
             rows = self._transformed(candidate, beside)
         return rows if np.isfinite(rows).all() else None
 
+    def settled(self, candidate: Candidate) -> Candidate:
+        """Return a candidate that swings on the rigid bodies which the baseline has beside it.
+
+        Those that the baseline has alone are biased by what is missing.
+        """
+        _, values = self._changed(candidate, None, self._laden(candidate))
+        return replace(candidate, bodies=tuple(values.tolist()))
+
+    def _laden(self, candidate: Candidate) -> list[Run]:
+        """Return the runs with the bodies that a candidate swings on."""
+        if not candidate.bodies:
+            return self._slow
+        if self._swinging[0] != candidate.bodies:  # most often they are those of the call before
+            values = np.array(candidate.bodies)
+            self._swinging = candidate.bodies, [with_load(run, self._baseline, values) for run in self._slow]
+        return self._swinging[1]
+
     def _ripples_within_blocks(self, candidate: Candidate) -> bool:
         """Tell whether a wave over the angle goes by within a few blocks."""
         joint, shapes = candidate.effect.joint, candidate.effect.shape
@@ -74,7 +93,18 @@ class CandidateRows:
 
         Each run has a column of its own where its shape is its own.
         """
-        regression, runs = self._regression, self._slow
+        runs = self._laden(candidate)
+        row, _ = self._changed(candidate, beside, runs)
+        if not candidate.effect.per_run:
+            return row
+        numbers = [r for r, run in enumerate(runs) if candidate.effect.explains(run.motion)]
+        return row * (self._regression.run[:, np.newaxis] == np.array(numbers))
+
+    def _changed(
+        self, candidate: Candidate, beside: NDArray | None, runs: Sequence[Run]
+    ) -> tuple[NDArray, NDArray]:
+        """Return what the transformed baseline adds to the plain one, (N, 1), and the values (b,) that it then has."""
+        regression = self._regression
         acting = [candidate.effect.explains(run.motion) for run in runs]
         made = [
             columns_under([candidate.term(r)], run, self._baseline) if acts else self._plain[r]
@@ -85,11 +115,7 @@ class CandidateRows:
         target = regression.torque_rows + change[:, 0]
         wide = columns if beside is None else np.hstack([columns, beside])
         values = _least_squares(wide, target)[: columns.shape[1]]
-        row = ((columns - self._plain_rows) @ values)[:, np.newaxis] - change
-        if not candidate.effect.per_run:
-            return row
-        numbers = [r for r, acts in enumerate(acting) if acts]
-        return row * (regression.run[:, np.newaxis] == np.array(numbers))
+        return ((columns - self._plain_rows) @ values)[:, np.newaxis] - change, values
 
 
 def _least_squares(rows: NDArray, target: NDArray) -> NDArray:

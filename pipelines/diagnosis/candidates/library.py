@@ -190,24 +190,11 @@ def _shapes(fits: Sequence[Fitted], alone: ShapeRefinement, regression: Decision
         return []
     best, slopes = alone.refined(fits[0])
     others = others_of(fits, best, ALTERNATIVES)
-    if forms := _other_forms(best, alone):
-        other = max(forms, key=lambda fitted: fitted.gain_as_is)
-        if other.gain_as_is > best.gain_as_is:
-            forms = [best]
-            best, slopes = alone.refined(other)
-        others = [*forms, *others]
+    if best.candidate.effect.swings:
+        best, slopes = alone.settled(best)
     slopes = np.hstack([slopes, towards(best, others)])
     shaped = [Cause.of(best, slopes, regression, first=True)]
     none = np.zeros((len(slopes), 0))
     shaped += [Cause.of(other, none, regression, first=False) for other in others[:ALTERNATIVES]]
     return [cause for cause in shaped if cause is not None]
 
-
-def _other_forms(best: Fitted, alone: ShapeRefinement) -> list[Fitted]:
-    """Return a transmission's other forms at its best shape: the coarse search has only one."""
-    candidate, found = best.candidate, []
-    for i, parameter in enumerate(candidate.effect.shape):
-        for form in parameter.forms if candidate.effect.swings else ():
-            if form != candidate.shapes[0][i]:
-                found.append(alone.fit(candidate.reshaped(i, form)))
-    return [fitted for fitted in found if fitted is not None]

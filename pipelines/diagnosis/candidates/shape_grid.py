@@ -39,7 +39,8 @@ def screened(
         starts = [_from_the_begin(effect, len(runs))]
     else:
         starts = [Candidate(effect, (shape,) * len(runs)) for shape in _grid(effect, runs, regression)]
-    fits = [fitted for start in starts if (fitted := alone.fit(start)) is not None]
+    fit = alone.swung if effect.swings else alone.fit
+    fits = [fitted for start in starts if (fitted := fit(start)) is not None]
     return sorted(fits, key=lambda fitted: -fitted.gain)
 
 
@@ -86,8 +87,6 @@ def _grid(effect: Effect, runs: Sequence[Run], regression: DecisionRegression) -
 
 
 def _tried(effect: Effect, parameter: Parameter, few: int, runs: Sequence[Run]) -> NDArray:
-    if effect.swings and parameter.unit in HARDENING:
-        return np.array([parameter.default])
     values = values_in(effect, parameter, few, runs)
     least = lowest(effect, parameter, runs)
     # Faster waves are lines, known at the full sampling rate.

@@ -33,6 +33,8 @@ MARGIN, BEYOND = 0.5, 2.0
 """Share of its typical range, and factor, by which a shape may leave that range."""
 ROUNDING = 1e-5
 """Share of a column that is left by a projection where the column lies in what is projected out."""
+SETTLINGS = 2
+"""Times that a swinging load follows the fit beside which it swings."""
 ONSETS, SWEEPS = 40, 3
 """Instants tried in a run at a time, and times that all runs are gone through."""
 TONE_STEP_HZ = 0.01
@@ -127,6 +129,26 @@ class ShapeRefinement:
             if not enough:
                 break
         return best, slopes
+
+    def settled(self, start: Fitted) -> tuple[Fitted, NDArray]:
+        """Return a refined candidate as it is where it swings on the bodies of its own fit, refined anew.
+
+        Or as it was, where that explains no more.
+        """
+        best, slopes = start, self._slopes(start, free_shapes(start.candidate))
+        for _ in range(SETTLINGS):
+            ahead = self.fit(self._rows.settled(best.candidate))
+            refined = None if ahead is None else self.refined(ahead)
+            if refined is None or refined[0].gain_as_is < best.gain_as_is + ENOUGH:
+                break
+            best, slopes = refined
+        return best, slopes
+
+    def swung(self, candidate: Candidate) -> Fitted | None:
+        """Fit a transmission where it swings on the bodies of its own fit; None where its rows are not finite."""
+        for _ in range(SETTLINGS):
+            candidate = self._rows.settled(candidate)
+        return self.fit(candidate)
 
     def _with_onsets(self, candidate: Candidate) -> Fitted | None:
         """Return a candidate that begins in each run at the instant at which it explains most.
