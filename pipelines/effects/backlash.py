@@ -6,12 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.effects.effect import Effect, Family, Parameter, Side
-from pipelines.effects.joint_elasticity import MOTOR_INERTIA
+from pipelines.effects.joint_elasticity import MOTOR_INERTIA, rotor_among_links
 from pipelines.effects.kernel import spring
+from pipelines.effects.swing import behind_spring
 from pipelines.mechanics.motion import Motion
 
 CONTACT_STIFFNESS = 30000.0
 """N·m/rad of teeth in contact; stiff against every joint, soft enough for the integration step."""
+
+SHAFT_STIFFNESS = 4000.0
+"""N·m/rad of teeth on a shaft that twists."""
+
+STRIKING_RATIO = 1.0
+"""Damping ratio at which the link is let strike the teeth behind a measured motion: how it bounces no motion tells."""
 
 CONTACT_DAMPING_RATIO = 0.3
 """Of the motor's swing on its teeth."""
@@ -34,28 +41,41 @@ class Backlash(Effect):
     looks_like = "bursts of torque at 4 to 25 Hz wherever the load changes sign, and gravity that jumps there"
     confirm = "hold the motor and shake the link by hand: it moves freely by the play"
     by_angle = True
-    shape = (Parameter("play", "rad", "free travel from stop to stop", "p", (0.003, 0.06)),)
+    shape = (
+        Parameter("play", "rad", "free travel from stop to stop", "p", (0.003, 0.06)),
+        Parameter(
+            "contact_stiffness", "N·m/rad", "stiffness of the teeth in contact", "k", (1000.0, 100000.0),
+            default=CONTACT_STIFFNESS, forms=(CONTACT_STIFFNESS, SHAFT_STIFFNESS),
+        ),
+    )  # fmt: skip
     motor_inertia = MOTOR_INERTIA
     known_to = 0.2
+    swings = True
 
     @spring
     def spring(twist, twist_rate, values):
         """Return nothing within the play; beyond it teeth that push and never pull."""
         half = 0.5 * values[0]
-        damping = 2.0 * CONTACT_DAMPING_RATIO * sqrt(CONTACT_STIFFNESS * MOTOR_INERTIA)
+        damping = 2.0 * CONTACT_DAMPING_RATIO * sqrt(values[1] * MOTOR_INERTIA)
         if twist > half:
-            return max(0.0, CONTACT_STIFFNESS * (twist - half) + damping * twist_rate)
+            return max(0.0, values[1] * (twist - half) + damping * twist_rate)
         if twist < -half:
-            return min(0.0, CONTACT_STIFFNESS * (twist + half) + damping * twist_rate)
+            return min(0.0, values[1] * (twist + half) + damping * twist_rate)
         return 0.0
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
-        """Return the motion with the link's angle.
+        """Return the motion of the link, which falls through the play and strikes the teeth.
 
-        Speed and acceleration stay the motor's: how the link swings over and bounces while the torque changes
-        sign no measured motion tells, and a smooth guess at it does more harm than none.
+        Where its mass is unknown it hangs on that side towards which the transmitted torque pushes it.
         """
         j = self.column(motion)
+        if motion.link_swing is not None:
+            direction = np.zeros_like(motion.q)
+            direction[:, j] = 1.0
+            rotor = rotor_among_links(motion, str(self.joint))
+            return behind_spring(
+                motion, motion.link_swing, direction, self, self.completed(shape), STRIKING_RATIO, rotor
+            )
         q = motion.q.copy()
         q[:, j] -= 0.5 * shape[0] * np.tanh(motion.transmitted[0][:, j] / (CROSSING_TORQUE * self.scale.torque))
         return motion.with_state(q, motion.dq, motion.ddq)

@@ -60,15 +60,15 @@ class JointElasticity(Effect):
         if motion.link_swing is not None:
             direction = np.zeros_like(motion.q)
             direction[:, j] = 1.0
-            return behind_spring(
-                motion, motion.link_swing, direction, self, self.completed(shape), SWING_RATIO, self._rotor(motion)
-            )
+            rotor = rotor_among_links(motion, str(self.joint))
+            return behind_spring(motion, motion.link_swing, direction, self, self.completed(shape), SWING_RATIO, rotor)
         q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
         for state, load_rate in zip((q, dq, ddq), motion.transmitted, strict=True):
             state[:, j] -= load_rate[:, j] / shape[0]
         return motion.with_state(q, dq, ddq)
 
-    def _rotor(self, motion: Motion) -> float:
-        """Return the rotor's inertia that a fit of the rigid body counts among the links', kg·m²."""
-        counted = motion.machine.is_exoskeleton and motion.machine.place(str(self.joint)) in RotorInertia.absorbed
-        return ROTOR_INERTIA if counted else 0.0
+
+def rotor_among_links(motion: Motion, joint: str) -> float:
+    """Return the rotor's inertia that the rigid body's parameters count among the links, kg·m²."""
+    counted = motion.machine.is_exoskeleton and motion.machine.place(joint) in RotorInertia.absorbed
+    return ROTOR_INERTIA if counted else 0.0

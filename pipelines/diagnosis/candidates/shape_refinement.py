@@ -33,6 +33,8 @@ MARGIN, BEYOND = 0.5, 2.0
 """Share of its typical range, and factor, by which a shape may leave that range."""
 ROUNDING = 1e-5
 """Share of a column that is left by a projection where the column lies in what is projected out."""
+STIFFNESS = "N·m/rad"
+"""Unit of a shape of which more does less."""
 SETTLINGS = 2
 """Times that a swinging load follows the fit beside which it swings."""
 ONSETS, SWEEPS = 40, 3
@@ -199,7 +201,7 @@ class ShapeRefinement:
             return start
         parameter, now = effect.shape[0], start.candidate.shapes[0][0]
         if parameter.by_factors:
-            value = now / amplitude if effect.swings else now * amplitude
+            value = now / amplitude if parameter.unit == STIFFNESS else now * amplitude
         else:
             value = parameter.neutral + amplitude * (now - parameter.neutral)
         ahead = self.fit(start.candidate.reshaped(0, float(np.clip(value, *reach(parameter)))))
