@@ -12,10 +12,10 @@ from pipelines.effects.swing import behind_spring
 from pipelines.mechanics.motion import Motion
 
 CONTACT_STIFFNESS = 30000.0
-"""N·m/rad of teeth in contact; stiff against every joint, soft enough for the integration step."""
+"""N·m/rad of hard teeth in contact; stiff against every joint, soft enough for the integration step."""
 
 SHAFT_STIFFNESS = 4000.0
-"""N·m/rad of teeth on a shaft that twists."""
+"""N·m/rad of teeth on a shaft that twists. Only then a measured motion tells how the link strikes them."""
 
 STRIKING_RATIO = 1.0
 """Damping ratio at which the link is let strike the teeth behind a measured motion: how it bounces no motion tells."""
@@ -66,16 +66,16 @@ class Backlash(Effect):
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
         """Return the motion of the link, which falls through the play and strikes the teeth.
 
-        Where its mass is unknown it hangs on that side towards which the transmitted torque pushes it.
+        Where these are hard, or the link's mass is unknown, it hangs on that side towards which the transmitted
+        torque pushes it, at the motor's speed: a motor that hard teeth strike jumps faster than it is sampled.
         """
-        j = self.column(motion)
-        if motion.link_swing is not None:
+        j, contact = self.column(motion), self.completed(shape)[1]
+        if motion.link_swing is not None and contact < CONTACT_STIFFNESS:
             direction = np.zeros_like(motion.q)
             direction[:, j] = 1.0
             rotor = rotor_among_links(motion, str(self.joint))
-            return behind_spring(
-                motion, motion.link_swing, direction, self, self.completed(shape), STRIKING_RATIO, rotor
-            )
+            values = (shape[0], contact)
+            return behind_spring(motion, motion.link_swing, direction, self, values, STRIKING_RATIO, rotor)
         q = motion.q.copy()
         q[:, j] -= 0.5 * shape[0] * np.tanh(motion.transmitted[0][:, j] / (CROSSING_TORQUE * self.scale.torque))
         return motion.with_state(q, motion.dq, motion.ddq)

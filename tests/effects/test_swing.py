@@ -9,7 +9,8 @@ from numpy.testing import assert_allclose
 from pipelines.dynamics.assembly import assemble
 from pipelines.dynamics.forward import DTHETA, THETA, Q, accelerations, resting_state, stages, step, workspace
 from pipelines.effects.cuff_compliance import CuffCompliance
-from pipelines.effects.joint_elasticity import JointElasticity
+from pipelines.effects.backlash import SHAFT_STIFFNESS, STRIKING_RATIO, Backlash
+from pipelines.effects.joint_elasticity import JointElasticity, rotor_among_links
 from pipelines.effects.kernel import address, swing_along
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.effects.swing import behind_spring
@@ -67,13 +68,15 @@ def test_a_copy_that_is_damped_more_forgets_an_error_of_the_load_sooner():
 @pytest.mark.parametrize("effect", [JointElasticity, CuffCompliance])
 @pytest.mark.parametrize("joint", JOINTS)
 def test_the_slower_the_motion_the_nearer_is_the_link_to_torque_over_stiffness(with_human, effect, joint):
-    bound, stiffness = effect(joint), 6000.0
+    bound, stiffness = effect(joint), 1500.0
     errors = []
     for slow in (2.0, 8.0):
         m = with_human
         motion = replace(m, time=slow * m.time, sample_rate_hz=m.sample_rate_hz / slow, cutoff_hz=12.0 / slow,
                          dq=m.dq / slow, ddq=m.ddq / slow**2, body=X, limb_body=X)  # fmt: skip
-        load = Model((Term(RigidBody(), X),)).torque(motion)
+        # A rotor that the body holds turns with the motor.
+        rotor = rotor_among_links(motion, joint) if effect is JointElasticity else 0.0
+        load = Model((Term(RigidBody(), X - [rotor, 0.0, 0.0, 0.0]),)).torque(motion)
         swing = bound.corrected(motion, (stiffness,)).q
         at_once = bound.corrected(replace(motion, body=None, limb_body=None, load=load, limb_load=load), (stiffness,)).q
         inside = slice(200, -200)
@@ -83,11 +86,16 @@ def test_the_slower_the_motion_the_nearer_is_the_link_to_torque_over_stiffness(w
     assert errors[1] < 0.05
 
 
+@pytest.mark.parametrize(
+    ("effect", "shape", "ratio", "error"),
+    [(JointElasticity, (300.0, 0.0), 0.0, 0.05), (Backlash, (0.02, SHAFT_STIFFNESS), STRIKING_RATIO, 0.3)],
+    ids=["spring", "play"],
+)
 @pytest.mark.parametrize("joint", JOINTS)
-def test_the_link_behind_a_motor_is_where_forward_dynamics_puts_it(joint):
+def test_the_link_behind_a_motor_is_where_forward_dynamics_puts_it(joint, effect, shape, ratio, error):
     """Both from the same torque: one integrates motor and link, one the link behind the motor's motion."""
-    effect, stiffness = JointElasticity(joint), 300.0
-    model = Model((Term(RigidBody(), X), Term(effect, np.array([stiffness]))))
+    bound = effect(joint)
+    model = Model((Term(RigidBody(), X), Term(bound, np.array(shape))))
     states, ddtheta = simulated(model, seconds=6.0)
     n = len(states)
     motion = Motion(
@@ -95,11 +103,29 @@ def test_the_link_behind_a_motor_is_where_forward_dynamics_puts_it(joint):
         np.ones(n, bool), cutoff_hz=60.0, body=X,
     )  # fmt: skip
     direction = np.zeros((n, 2))
-    direction[:, effect.column(motion)] = 1.0
-    link = behind_spring(motion, motion.link_swing, direction, effect, (stiffness,), 0.0)
+    direction[:, bound.column(motion)] = 1.0
+    link = behind_spring(motion, motion.link_swing, direction, bound, shape, ratio)
     twist, found = motion.q - states[:, Q], motion.q - link.q
-    assert np.abs(twist).max() > 0.02
-    assert np.std((found - twist)[100:-100]) < 0.05 * np.std(twist)
+    assert np.abs(twist).max() > 0.4 * min(0.05, shape[0])
+    assert np.std((found - twist)[100:-100]) < error * np.std(twist)
+
+
+@pytest.mark.parametrize("rotor", [0.0, 0.3])
+def test_what_turns_with_the_motor_does_not_hang_on_the_spring(rotor):
+    """A body that holds a rotor, the rotor taken off, swings as the body without it."""
+    t = np.arange(0.0, 5.0, 0.005)
+    q = np.column_stack([0.3 * np.sin(4.0 * t), 0.2 * np.cos(5.0 * t)])
+    dq, ddq = np.gradient(q, 0.005, axis=0), np.gradient(np.gradient(q, 0.005, axis=0), 0.005, axis=0)
+    n, with_rotor = len(t), X + [rotor, 0.0, 0.0, 0.0]
+    motion = Motion(t, q, dq, ddq, np.zeros((n, 2)), np.zeros(n, np.int64), np.ones(n, bool), body=X)
+    direction = np.tile([1.0, 0.0], (n, 1))
+    swung_alone = behind_spring(motion, motion.link_swing, direction, JointElasticity("hip"), (400.0, 0.0))
+    holding = replace(motion, body=with_rotor)
+    less = behind_spring(holding, holding.link_swing, direction, JointElasticity("hip"), (400.0, 0.0), 0.0, rotor)
+    assert_allclose(less.q, swung_alone.q, atol=1e-12)
+    if rotor:
+        more = behind_spring(holding, holding.link_swing, direction, JointElasticity("hip"), (400.0, 0.0))
+        assert np.abs(more.q - swung_alone.q).max() > 1e-3
 
 
 def simulated(model, seconds):
