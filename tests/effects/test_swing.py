@@ -70,8 +70,9 @@ def test_a_copy_that_is_damped_more_forgets_an_error_of_the_load_sooner():
 def test_the_slower_the_motion_the_nearer_is_the_link_to_torque_over_stiffness(with_human, effect, joint):
     bound, stiffness = effect(joint), 1500.0
     errors = []
+    # Gravity would pull the twisted link a little further, at any speed.
+    m = replace(with_human, geometry=replace(with_human.geometry, gravity_m_s2=0.01))
     for slow in (2.0, 8.0):
-        m = with_human
         motion = replace(m, time=slow * m.time, sample_rate_hz=m.sample_rate_hz / slow, cutoff_hz=12.0 / slow,
                          dq=m.dq / slow, ddq=m.ddq / slow**2, body=X, limb_body=X)  # fmt: skip
         # A rotor that the body holds turns with the motor.
@@ -81,8 +82,7 @@ def test_the_slower_the_motion_the_nearer_is_the_link_to_torque_over_stiffness(w
         at_once = bound.corrected(replace(motion, body=None, limb_body=None, load=load, limb_load=load), (stiffness,)).q
         inside = slice(200, -200)
         errors.append(np.abs(swing - at_once)[inside].max() / np.abs(at_once - motion.q)[inside].max())
-    # Gravity pulls the twisted link a little further, at any speed.
-    assert errors[1] < errors[0]
+    assert errors[1] < 0.3 * errors[0]
     assert errors[1] < 0.05
 
 

@@ -39,17 +39,18 @@ class Refinement:
     def __call__(self, causes: Sequence[Candidate]) -> Fit:
         """Return the fit with every shape at its best."""
         best = self._fit(causes, self._runs, None)
+        made = [best]
         for _ in range(ROUNDS if causes else 0):
             # The bodies of the fit before were biased by what was missing, and so were the loads.
             loads = best.values
             runs = [with_load(run, self._baseline, loads) for run in self._runs]
             start = self._fit(best.causes, runs, loads)
             ahead = self._round(start, runs)
-            done = ahead.cost > best.cost - ENOUGH * abs(best.cost)
-            best = ahead
-            if done:
+            made.append(ahead)
+            if ahead.cost > best.cost - ENOUGH * abs(best.cost):
                 break
-        return best
+            best = ahead
+        return min(made, key=lambda one: one.cost)
 
     def _fit(self, causes: Sequence[Candidate], runs: Sequence[Run], loads: NDArray | None) -> Fit:
         return fit(causes, runs, self._baseline, self._weights, loads)
