@@ -17,7 +17,6 @@ from pipelines.diagnosis.evidence.model_error import imperfection
 from pipelines.diagnosis.evidence.noise_floor import noise_floor
 from pipelines.diagnosis.evidence.prepared_runs import Prepared, prepare
 from pipelines.diagnosis.evidence.residual_shares import ResidualShares, residual_shares
-from pipelines.diagnosis.evidence.training_data import TrainingData, training_data
 from pipelines.diagnosis.fit import parameter_rows
 from pipelines.diagnosis.fit.joint_refinement import Refinement
 from pipelines.diagnosis.fit.presliding_test import built_up
@@ -33,6 +32,7 @@ from pipelines.diagnosis.selection.posterior import (
     posterior,
     strongest,
 )
+from pipelines.diagnosis.training_data import TrainingData, training_data
 from pipelines.mechanics.motion import Motion
 
 LIBRARY_SHARE, FIT_SHARE = 0.6, 0.75

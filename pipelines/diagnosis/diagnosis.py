@@ -15,7 +15,6 @@ from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.noise_floor import Floor
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.evidence.residual_shares import ResidualShares
-from pipelines.diagnosis.evidence.training_data import TrainingData
 from pipelines.diagnosis.fit.fitted_model import values_of_each_run
 from pipelines.diagnosis.fit.presliding_test import BuildUp
 from pipelines.diagnosis.fit.uncertainty import Uncertainty
@@ -25,6 +24,7 @@ from pipelines.diagnosis.selection.answer import LIKELY, Answer, Named
 from pipelines.diagnosis.selection.evidence import Evidence
 from pipelines.diagnosis.selection.findings import Finding, findings
 from pipelines.diagnosis.selection.posterior import Posterior
+from pipelines.diagnosis.training_data import TrainingData
 from pipelines.effects import Effect
 from pipelines.effects.force_sensor_zero import ForceSensorZero
 from pipelines.effects.rigid_body import RigidBody

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.candidates.candidate import ALWAYS, NEVER, Candidate
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.evidence.baseline import baseline_of
 from pipelines.diagnosis.evidence.observed_run import observe
-from pipelines.diagnosis.fit.change_point import ALWAYS, NEVER, Onset
+from pipelines.diagnosis.fit.change_point import Onset
 from pipelines.diagnosis.fit.held_out import settled
 from pipelines.diagnosis.fit.joint_refinement import Refinement
 from pipelines.diagnosis.fit.uncertainty import uncertainty

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.candidates.candidate import NEVER, Candidate
 from pipelines.diagnosis.candidates.shape_refinement import ONSETS, log_searched
-from pipelines.diagnosis.fit.change_point import NEVER
 from pipelines.effects import Cogging
 from pipelines.effects.backlash import Backlash
 from pipelines.effects.end_stop import EndStop

@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 
 from pipelines.dynamics.assembly import assemble
 from pipelines.dynamics.forward import DTHETA, THETA, Q, accelerations, resting_state, stages, step, workspace
-from pipelines.effects.cuff_compliance import CuffCompliance
 from pipelines.effects.backlash import SHAFT_STIFFNESS, STRIKING_RATIO, Backlash
+from pipelines.effects.cuff_compliance import CuffCompliance
 from pipelines.effects.joint_elasticity import JointElasticity, rotor_among_links
 from pipelines.effects.kernel import address, swing_along
 from pipelines.effects.rigid_body import RigidBody
@@ -116,7 +116,7 @@ def test_what_turns_with_the_motor_does_not_hang_on_the_spring(rotor):
     t = np.arange(0.0, 5.0, 0.005)
     q = np.column_stack([0.3 * np.sin(4.0 * t), 0.2 * np.cos(5.0 * t)])
     dq, ddq = np.gradient(q, 0.005, axis=0), np.gradient(np.gradient(q, 0.005, axis=0), 0.005, axis=0)
-    n, with_rotor = len(t), X + [rotor, 0.0, 0.0, 0.0]
+    n, with_rotor = len(t), X + np.array([rotor, 0.0, 0.0, 0.0])
     motion = Motion(t, q, dq, ddq, np.zeros((n, 2)), np.zeros(n, np.int64), np.ones(n, bool), body=X)
     direction = np.tile([1.0, 0.0], (n, 1))
     swung_alone = behind_spring(motion, motion.link_swing, direction, JointElasticity("hip"), (400.0, 0.0))

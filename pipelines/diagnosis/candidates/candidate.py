@@ -15,6 +15,8 @@ from pipelines.model import BASELINE, Term, TermColumns
 
 WORN = ("mass_off_axis", "payload_change")
 """Effects of the structure that the person may carry instead: then in their runs only, and felt by the cuffs."""
+NEVER, ALWAYS = 1e6, -1e6
+"""s: onsets after every run's end and before every run's begin."""
 TURNS = ("1/turn", "rad/m")
 """Units of what is counted along a joint's way."""
 DEGREES = 3

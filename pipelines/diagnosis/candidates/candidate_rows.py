@@ -100,9 +100,7 @@ class CandidateRows:
         numbers = [r for r, run in enumerate(runs) if candidate.effect.explains(run.motion)]
         return row * (self._regression.run[:, np.newaxis] == np.array(numbers))
 
-    def _changed(
-        self, candidate: Candidate, beside: NDArray | None, runs: Sequence[Run]
-    ) -> tuple[NDArray, NDArray]:
+    def _changed(self, candidate: Candidate, beside: NDArray | None, runs: Sequence[Run]) -> tuple[NDArray, NDArray]:
         """Return what the transformed baseline adds to the plain one, (N, 1), and the values (b,) that it then has."""
         regression = self._regression
         acting = [candidate.effect.explains(run.motion) for run in runs]

@@ -197,4 +197,3 @@ def _shapes(fits: Sequence[Fitted], alone: ShapeRefinement, regression: Decision
     none = np.zeros((len(slopes), 0))
     shaped += [Cause.of(other, none, regression, first=False) for other in others[:ALTERNATIVES]]
     return [cause for cause in shaped if cause is not None]
-

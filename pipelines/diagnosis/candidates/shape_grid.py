@@ -6,11 +6,10 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.candidates.candidate import TURNS, Candidate, bends_motion, lowest
+from pipelines.diagnosis.candidates.candidate import ALWAYS, TURNS, Candidate, bends_motion, lowest
 from pipelines.diagnosis.candidates.shape_refinement import TONE_STEP_HZ, Fitted, ShapeRefinement
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.evidence.observed_run import Run
-from pipelines.diagnosis.fit.change_point import ALWAYS
 from pipelines.effects import Effect, Parameter
 
 VALUES = 8

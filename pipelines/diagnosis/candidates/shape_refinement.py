@@ -11,10 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.candidates.candidate import TURNS, Candidate
+from pipelines.diagnosis.candidates.candidate import ALWAYS, NEVER, TURNS, Candidate
 from pipelines.diagnosis.candidates.candidate_rows import CandidateRows
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
-from pipelines.diagnosis.fit.change_point import ALWAYS, NEVER
 from pipelines.effects import Parameter
 
 STEPS = 3

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pipelines.contracts.joints import either, the
 from pipelines.diagnosis.dependence.smooth_curve import Curve, fold_products, held_out_error
-from pipelines.diagnosis.dependence.spectral_lines import above_the_motion_hz
+from pipelines.diagnosis.evidence.motion_band import above_the_motion_hz
 from pipelines.diagnosis.evidence.noise_floor import Floor
 from pipelines.diagnosis.evidence.observed_run import FOLDS, Run
 from pipelines.mechanics.machine import Machine

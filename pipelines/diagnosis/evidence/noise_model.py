@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.dependence.spectral_lines import above_the_motion_hz
+from pipelines.diagnosis.evidence.motion_band import above_the_motion_hz
 from pipelines.diagnosis.evidence.noise_floor import scatter
 from pipelines.diagnosis.evidence.observed_run import Run
 

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.diagnosis.candidates.candidate import ALWAYS, NEVER
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.estimation.long_run import long_run_covariance
 
-NEVER, ALWAYS = 1e6, -1e6
-"""s: onsets after every run's end and before every run's begin."""
 ALIKE_S = 0.5
 """How long what a model gets wrong stays alike: it goes with the motion, whose fastest parts are about 1 Hz."""
 ALIKE = 4.0

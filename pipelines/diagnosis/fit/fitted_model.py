@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.diagnosis.candidates.candidate import ALWAYS, NEVER
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit import parameter_rows
-from pipelines.diagnosis.fit.change_point import ALWAYS, NEVER
 from pipelines.diagnosis.fit.held_out import settled
 from pipelines.diagnosis.fit.joint_fit import Fit
 from pipelines.diagnosis.fit.uncertainty import Uncertainty

@@ -9,11 +9,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.candidates.candidate import ALWAYS, NEVER, Candidate
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.baseline_columns import columns_under
 from pipelines.diagnosis.evidence.observed_run import Run
-from pipelines.diagnosis.fit.change_point import ALWAYS, NEVER, Onset
+from pipelines.diagnosis.fit.change_point import Onset
 from pipelines.diagnosis.fit.joint_fit import NEWTON_STEPS, Fit, laden, step_of, within_reach
 from pipelines.model import Model, Term
 

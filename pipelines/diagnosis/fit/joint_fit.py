@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from pipelines.diagnosis.candidates.candidate import Candidate, lowest
+from pipelines.diagnosis.candidates.candidate import ALWAYS, NEVER, Candidate, lowest
 from pipelines.diagnosis.evidence.baseline import Baseline, with_load
 from pipelines.diagnosis.evidence.baseline_columns import columns_under, gram_of_runs
 from pipelines.diagnosis.evidence.gram import Gram, error, solve
 from pipelines.diagnosis.evidence.observed_run import Run
-from pipelines.diagnosis.fit.change_point import ALWAYS, NEVER, Onset
+from pipelines.diagnosis.fit.change_point import Onset
 from pipelines.effects import Effect, Parameter, Side
 from pipelines.effects.friction import Friction
 from pipelines.mechanics.geometry import Geometry
