@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dtrtri
 
 from pipelines.diagnosis.candidates.cause import Cause
 from pipelines.diagnosis.candidates.library import Library, orders_of
@@ -146,9 +147,11 @@ LARGEST_SHARE = 0.3
 
 def explained(gram: NDArray, right: NDArray) -> float:
     """Return what columns, of products (n, n), explain together beyond what they explain of noise."""
-    system = gram + np.eye(len(gram)) / LARGEST_SHARE**2
-    both = np.linalg.solve(system, np.column_stack([right, gram]))
-    return max(float(right @ both[:, 0] - np.trace(both[:, 1:])), 0.0)
+    precision = 1.0 / LARGEST_SHARE**2
+    inverse, _ = dtrtri(np.linalg.cholesky(gram + precision * np.eye(len(gram))), lower=1)
+    # The trace of S^-1 G where S = G + precision I.
+    of_noise = len(gram) - precision * np.sum(inverse**2)
+    return max(float(np.sum((inverse @ right) ** 2) - of_noise), 0.0)
 
 
 def _symmetric(packed: bytes, shape: tuple[int, int]) -> NDArray:
