@@ -1,7 +1,7 @@
 """The hyper-parameters of the posterior, with their meanings.
 
-`make learn` learns all but four, `form_misfit`, `model_error`, `lines` and `base_rate`; whoever accepts what it finds
-copies it here.
+`make learn` learns all but five, `explained_share`, `form_misfit`, `model_error`, `lines` and
+`base_rate`; whoever accepts what it finds copies it here.
 
 A share is of the joint's rms torque; a log odds is a natural logarithm.
 """
@@ -22,6 +22,8 @@ class Criteria:
     exact. Held: the score of learning hardly tells values three times as large, under which a second cause is lost."""
     cuff_model_error: float = 0.05
     """The same of a cuff's output."""
+    explained_share: float = 0.3
+    """Prior standard deviation of each column's share where all explain an output together."""
     form_misfit: float = 0.1
     """Share of a residual's rms that counts as noise: no form of any cause follows it exactly."""
     background_law: float = 2.7e-05

@@ -17,6 +17,7 @@ from pipelines.diagnosis.candidates.cause import Cause
 from pipelines.diagnosis.candidates.library import Library, orders_of
 from pipelines.diagnosis.candidates.shape_refinement import log_searched
 from pipelines.diagnosis.candidates.smooth_laws import FAMILIES, HUM, TIME, LawColumn, law_label
+from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
 from pipelines.effects import Cogging, Effect, Family
@@ -141,13 +142,9 @@ class Evidence:
         )  # fmt: skip
 
 
-LARGEST_SHARE = 0.3
-"""Prior standard deviation of each column's share where all explain together."""
-
-
 def explained(gram: NDArray, right: NDArray) -> float:
     """Return what columns, of products (n, n), explain together beyond what they explain of noise."""
-    precision = 1.0 / LARGEST_SHARE**2
+    precision = 1.0 / CRITERIA.explained_share**2
     inverse, _ = dtrtri(np.linalg.cholesky(gram + precision * np.eye(len(gram))), lower=1)
     # The trace of S^-1 G where S = G + precision I.
     of_noise = len(gram) - precision * np.sum(inverse**2)
