@@ -38,7 +38,7 @@ class Refinement:
 
     def __call__(self, causes: Sequence[Candidate]) -> Fit:
         """Return the fit with every shape at its best."""
-        best = self._fit(causes, self._runs, None)
+        best = self._start(causes)
         made = [best]
         for _ in range(ROUNDS if causes else 0):
             # The bodies of the fit before were biased by what was missing, and so were the loads.
@@ -51,6 +51,14 @@ class Refinement:
                 break
             best = ahead
         return min(made, key=lambda one: one.cost)
+
+    def _start(self, causes: Sequence[Candidate]) -> Fit:
+        """Return the fit of the shapes as they are, loads swinging on the bodies on which the library let them."""
+        bodies = next((cause.bodies for cause in causes if cause.bodies), None)
+        if bodies is None:
+            return self._fit(causes, self._runs, None)
+        loads = np.array(bodies)
+        return self._fit(causes, [with_load(run, self._baseline, loads) for run in self._runs], loads)
 
     def _fit(self, causes: Sequence[Candidate], runs: Sequence[Run], loads: NDArray | None) -> Fit:
         return fit(causes, runs, self._baseline, self._weights, loads)
