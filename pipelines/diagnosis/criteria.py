@@ -26,19 +26,15 @@ class Criteria:
     """Prior standard deviation of each column's share where all explain an output together."""
     form_misfit: float = 0.1
     """Share of a residual's rms that counts as noise: no form of any cause follows it exactly."""
-    background_law: float = 2.7e-05
-    """Share by which each column of a smooth law is off on a good rig."""
     background_cause: float = 0.00341
     """Share of each cause of the catalogue on a good rig."""
-    background_cuff: float = 4.85e-06
-    """Share by which each column of a smooth law of the cuffs' own is off on a good rig."""
     background_wander: float = 0.00144
     """Share by which a good rig's torque wanders in each run."""
     background_line: float = 0.00343
     """Share of a line over the angle or over time on a good rig."""
     amplitudes: tuple[float, float, float] = (0.0296, 0.0669, 0.315)
     """Shares that a cause or a law may have, equally likely: prior standard deviations."""
-    misfits: tuple[float, float, float] = (0.0, 0.000226, 0.00475)
+    misfits: tuple[float, float] = (0.0, 0.1)
     """Shares of a cause's own size by which its true form may differ from ours, equally likely."""
     shape_sd: float = 0.0724
     """Prior standard deviation of a shape about its best value, in its unit of change."""
@@ -59,8 +55,6 @@ class Criteria:
     """Log odds of a cause whose value is another in every run."""
     worn: float = -4.77
     """Log odds of a mass that the person carries, against the machine."""
-    impacts: float = 0.1
-    """Share of the bursts' log likelihood that counts for backlash."""
     lines: float = 0.03
     """Share of a line's log likelihood ratio that counts for a ripple or a tone."""
     coherence: float = 0.79

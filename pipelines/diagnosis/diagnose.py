@@ -96,8 +96,8 @@ def _weighed(prepared: Prepared, report: Report) -> tuple[Library, Evidence, Pos
     """
     library = build_library(prepared, lambda share, what: report(LIBRARY_SHARE * share, what))
     report(LIBRARY_SHARE, "posterior")
-    heard = auxiliary_evidence(prepared)
-    evidence = Evidence.of(library, heard)
+    auxiliary = auxiliary_evidence(prepared)
+    evidence = Evidence.of(library, auxiliary)
     weighed = posterior(evidence)
     refined = library
     for number in strongest(weighed):
@@ -105,7 +105,7 @@ def _weighed(prepared: Prepared, report: Report) -> tuple[Library, Evidence, Pos
     refined = refined.refined_together(likely_contexts(weighed))
     if refined is library:
         return library, evidence, weighed
-    evidence = Evidence.of(refined, heard)
+    evidence = Evidence.of(refined, auxiliary)
     return refined, evidence, posterior(evidence)
 
 

@@ -1,4 +1,4 @@
-"""What counts as missing physics, what as noise, and what is heard rather than fitted."""
+"""What counts as missing physics, what as noise, and what cuffs and drives share."""
 
 from dataclasses import replace
 
@@ -8,11 +8,9 @@ from scipy.optimize import brentq
 
 from pipelines.diagnosis.candidates.candidate import Candidate, lowest
 from pipelines.diagnosis.candidates.shape_refinement import changed, free_shapes
-from pipelines.diagnosis.evidence import impact_bursts
 from pipelines.diagnosis.evidence.baseline import baseline_of, with_load
 from pipelines.diagnosis.evidence.baseline_columns import columns_under
-from pipelines.diagnosis.evidence.cuff_coherence import evidence_of_will
-from pipelines.diagnosis.evidence.impact_bursts import evidence_of_play
+from pipelines.diagnosis.evidence.cuff_coherence import cuff_coherence
 from pipelines.diagnosis.evidence.motion_band import above_the_motion_hz
 from pipelines.diagnosis.evidence.observed_run import FOLDS, observe
 from pipelines.diagnosis.evidence.slow_error import slow_error
@@ -74,37 +72,6 @@ def test_what_moves_fast_has_lines_further_up(run):
     assert above_the_motion_hz(run) < 4.3 < above_the_motion_hz(fast) < 8.9
 
 
-def test_play_is_heard_where_scatter_follows_the_load_through_zero_and_only_at_its_joint(run):
-    load = run.average(run.motion.load)
-    loud = noise(run)
-    for at in np.flatnonzero(np.diff(load[:, 1] > 0)):
-        loud[at : at + 14, 1] *= 3.0
-    gains = evidence_of_play([run], [loud], 1 / 6)
-    assert gains[1] > 6.0
-    assert gains[0] == 0.0
-    assert np.all(evidence_of_play([run], [noise(run)], 1 / 6) < 2.0)
-
-
-def test_what_goes_smoothly_with_a_motion_that_is_fast_where_the_load_changes_sign_is_no_play(run, monkeypatch):
-    at = 2 * np.pi * 0.25 * run.time
-    slow = 2 * np.pi * 0.25 * np.arange(len(run.motion.q)) / run.motion.sample_rate_hz
-    loaded = replace(run.motion, load=10.0 * np.sin(slow)[:, np.newaxis] * [1.0, 1.0])
-    # Faster and faster towards each change of the load's sign, as what swings is where it hangs.
-    swing = np.exp(-((np.sin(at) / 0.3) ** 2)) * np.sin(2 * np.pi * 5.0 * run.time)
-    q, dq, ddq = (x.copy() for x in run.state)
-    ddq[:, 1] += 6.0 * swing
-    fast = replace(run, motion=loaded, state=(q, dq, ddq))
-    eccentric = noise(run)
-    eccentric[:, 1] += 0.3 * ddq[:, 1] * (1.0 + 0.5 * np.sin(q[:, 1] + 1.0))
-    assert evidence_of_play([fast], [eccentric], 1 / 6)[1] < 2.0
-    with monkeypatch.context() as deaf:
-        deaf.setattr(impact_bursts, "BLOCKS_EACH", 10**9)
-        assert evidence_of_play([fast], [eccentric], 1 / 6)[1] > 6.0, "without a law taken off it passes for bursts"
-    loud = noise(run)
-    loud[np.abs(np.sin(at)) < 0.3, 1] *= 3.0
-    assert evidence_of_play([fast], [loud], 1 / 6)[1] > 6.0, "bursts are heard in the same motion"
-
-
 def bursts(run, seed=3):
     """A push of half a second every three seconds or so, at instants of its own."""
     starts = np.cumsum(np.random.default_rng(seed).exponential(3.0, 40))
@@ -114,7 +81,7 @@ def bursts(run, seed=3):
 def test_a_push_is_felt_where_cuffs_and_drive_scatter_alike_and_only_at_its_joint(worn):
     push = bursts(worn)[:, np.newaxis] * np.array([0.0, 1.0, 0.0, 1.0])
     quiet = noise(worn) * np.array([1.0, 1.0, 0.2, 0.2])
-    gains = evidence_of_will([worn], [quiet + push])
+    gains = cuff_coherence([worn], [quiet + push])
     assert gains[1] > 6.0
     assert gains[0] == 0.0
 
@@ -122,10 +89,10 @@ def test_a_push_is_felt_where_cuffs_and_drive_scatter_alike_and_only_at_its_join
 def test_a_drag_of_the_machines_own_and_noise_are_no_push(worn):
     quiet = noise(worn) * np.array([1.0, 1.0, 0.2, 0.2])
     drag = bursts(worn)[:, np.newaxis] * np.array([0.0, 1.0, 0.0, 0.0])
-    assert np.all(evidence_of_will([worn], [quiet + drag]) == 0.0)
+    assert np.all(cuff_coherence([worn], [quiet + drag]) == 0.0)
     repeated = np.sin(2 * np.pi * 5 * worn.time / worn.motion.period_s)[:, np.newaxis]
-    assert np.all(evidence_of_will([worn], [quiet + repeated]) == 0.0), "a spring on the limb repeats with the motion"
-    silent = [evidence_of_will([worn], [noise(worn, seed) * np.array([1, 1, 0.2, 0.2])]) for seed in range(20)]
+    assert np.all(cuff_coherence([worn], [quiet + repeated]) == 0.0), "a spring on the limb repeats with the motion"
+    silent = [cuff_coherence([worn], [noise(worn, seed) * np.array([1, 1, 0.2, 0.2])]) for seed in range(20)]
     assert np.all(np.array(silent) == 0.0)
 
 

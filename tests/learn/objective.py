@@ -97,7 +97,7 @@ def _compact(
     number = {i: n for n, i in enumerate(elements)}
     chosen = tuple(tuple(number[i] for i in s) for s in sets)
     true = np.array([right(frozenset(own[i].label for i in s)) for s in chosen])
-    of_elements = [features(e, evidence.heard) for e in own]
+    of_elements = [features(e, evidence.auxiliary) for e in own]
     told = np.array([of_set([of_elements[i] for i in s]) for s in chosen])
     return small, chosen, true, told
 

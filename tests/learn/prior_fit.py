@@ -13,8 +13,8 @@ FLOOR = 1e-4
 """Probability that a truth has at least: one hopeless session must not decide."""
 SPREAD = 3.0
 """Standard deviation of the weights about those at the start: keeps one that nothing tells of."""
-POSITIVE = ("impacts", "coherence")
-"""Weights that are not negative: to hear a cause never makes it less likely."""
+POSITIVE = ("coherence",)
+"""Weights that are not negative: evidence for a cause never makes it less likely."""
 
 
 @dataclass(frozen=True)

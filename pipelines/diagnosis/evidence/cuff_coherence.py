@@ -25,7 +25,7 @@ FEWEST = 30
 """Averages that a variance is told from."""
 
 
-def evidence_of_will(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray:
+def cuff_coherence(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray:
     """Return the log likelihood that a wearer's push gains by what does not repeat at each joint, (J,).
 
     Parameters

@@ -87,9 +87,9 @@ class Evidence:
     """(O, n) of the columns with the measured torque."""
     elements: tuple[Element, ...]
     background: tuple[tuple[str, int, float, float], ...]
-    """What a good rig has: kind (``law``, ``cuff``, ``wander``, ``cause``), column, its variance relative
-    to others of the kind, and that of noise besides."""
-    heard: Mapping[str, float]
+    """What a good rig has: kind (``wander``, ``cause``), column, its variance relative to others of the kind,
+    and that of noise besides."""
+    auxiliary: Mapping[str, float]
     """Log likelihood of causes besides what they do to the mean torque, by label."""
     explained: NDArray
     """(O,) what all columns together explain of each output's rows, squared and in units of the noise."""
@@ -99,7 +99,7 @@ class Evidence:
     """Noise, torque, kinds of run: for reports."""
 
     @classmethod
-    def of(cls, library: Library, heard: Mapping[str, float]) -> "Evidence":
+    def of(cls, library: Library, auxiliary: Mapping[str, float]) -> "Evidence":
         """Multiply a library's columns out."""
         X, at = _stack(library)
         regression = library.regression
@@ -108,7 +108,7 @@ class Evidence:
         gram, right = np.array([x.T @ x for x, _ in parts]), np.array([x.T @ y for x, y in parts])
         return cls(
             gram, right, (elements := tuple(_elements(library, at))), tuple(_background(library, at)),
-            dict(heard), np.array([explained(g, r) for g, r in zip(gram, right, strict=True)]),
+            dict(auxiliary), np.array([explained(g, r) for g, r in zip(gram, right, strict=True)]),
             tuple(_contexts(library, elements)), _about(library),
         )  # fmt: skip
 
@@ -121,7 +121,7 @@ class Evidence:
             "text": json.dumps(
                 {
                     "elements": [asdict(element) for element in self.elements],
-                    "background": self.background, "heard": self.heard,
+                    "background": self.background, "auxiliary": self.auxiliary,
                     "explained": self.explained.tolist(),
                     "contexts": self.contexts, "about": self.about,
                 }
@@ -138,7 +138,7 @@ class Evidence:
             _symmetric(row["gram"], right.shape), right,
             tuple(Element(**one) for one in text["elements"]),
             tuple((kind, place, v, noise) for kind, place, v, noise in text["background"]),
-            text["heard"], explained, tuple(map(tuple, text["contexts"])), text["about"],
+            text["auxiliary"], explained, tuple(map(tuple, text["contexts"])), text["about"],
         )  # fmt: skip
 
 
@@ -301,10 +301,6 @@ def _resembled(effect: Effect, laws: Laws, names: Sequence[str], two: bool):
 
 def _background(library: Library, at: _Places):
     """Yield what a good rig has: kind, column, relative variance, and the variance of noise."""
-    for law, place in zip(library.laws, at.laws, strict=True):
-        if law.kind == HUM:
-            continue
-        yield "cuff" if law.wearer == "cuffs" else "law", int(place), law.variance, 0.0
     for curve, place in zip(library.curves, at.curves, strict=True):
         yield "wander", int(place), curve.variance, curve.noise
     for cause, places in zip(library.causes, at.causes, strict=True):

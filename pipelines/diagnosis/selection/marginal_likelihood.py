@@ -41,17 +41,14 @@ class MarginalLikelihood:
         gram = np.einsum("o,oij->ij", power, evidence.gram)
         self.gram, self.right = _without(gram, power @ evidence.right, *self._background())
         self.parts = [np.array([*e.columns, *e.derivative], dtype=int) for e in evidence.elements]
-        own = [features(e, evidence.heard) for e in evidence.elements]
+        own = [features(e, evidence.auxiliary) for e in evidence.elements]
         self.features = np.array(own).reshape(-1, len(FEATURES))
         self._weights = weights(criteria)
         self.apart = np.array([e.log_prior + _shown(e, criteria) for e in evidence.elements])
 
     def _background(self) -> tuple[NDArray, NDArray]:
         c = self.criteria
-        share = {
-            "law": c.background_law, "cuff": c.background_cuff,
-            "wander": c.background_wander, "cause": c.background_cause,
-        }  # fmt: skip
+        share = {"wander": c.background_wander, "cause": c.background_cause}
         told = self.evidence.background
         sd = [np.sqrt(share[kind] ** 2 * variance + noise) for kind, _, variance, noise in told]
         return np.array([place for _, place, _, _ in told], dtype=int), np.array(sd)

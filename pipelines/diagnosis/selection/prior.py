@@ -8,18 +8,18 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.criteria import Criteria
 from pipelines.diagnosis.selection.evidence import Element
 
-FEATURES = ("cause", "law", "further", "other_shape", "searched", "each_run", "worn", "impacts", "coherence")
+FEATURES = ("cause", "law", "further", "other_shape", "searched", "each_run", "worn", "coherence")
 """Names of the criteria that the features of a set are multiplied by."""
-HEARD_BY = {"backlash": "impacts", "voluntary_torque": "coherence"}
-"""The criterion by which what is heard or felt of an effect counts."""
+AUXILIARY = {"voluntary_torque": "coherence"}
+"""The criterion by which an effect's auxiliary evidence counts."""
 
 
-def features(element: Element, heard: Mapping[str, float]) -> NDArray:
+def features(element: Element, auxiliary: Mapping[str, float]) -> NDArray:
     """Return the features (f,) of one element, in the order of ``FEATURES``, without units.
 
     Parameters
     ----------
-    heard : mapping
+    auxiliary : mapping
         Log likelihood of causes besides what they do to the mean torque, by label.
     """
     own = dict.fromkeys(FEATURES, 0.0)
@@ -27,8 +27,8 @@ def features(element: Element, heard: Mapping[str, float]) -> NDArray:
     own["other_shape"] = float(not element.first)
     own["searched"] = element.log_searched
     own["each_run"], own["worn"] = float(element.each_run), float(element.worn)
-    if element.name in HEARD_BY:
-        own[HEARD_BY[element.name]] = heard.get(element.label, 0.0)
+    if element.name in AUXILIARY:
+        own[AUXILIARY[element.name]] = auxiliary.get(element.label, 0.0)
     return np.array(list(own.values()))
 
 

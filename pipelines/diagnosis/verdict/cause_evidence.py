@@ -3,16 +3,14 @@
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.selection.answer import Named
-from pipelines.effects import Backlash, Effect, VoluntaryTorque
+from pipelines.effects import Effect, VoluntaryTorque
 from pipelines.label import amount, effect_labelled, in_words, number
 
 CERTAIN = 1000.0
 """Odds from which more is not told: no calibration could vouch for a figure."""
-HEARD = 3.0
+TELLING = 3.0
 """Log likelihood from which auxiliary evidence is mentioned: odds of 20."""
 AUXILIARY = {
-    Backlash.name: "bursts where the load changes sign speak for it: teeth cross their play there, "
-    "of which hardly anything shows in the mean torque",
     VoluntaryTorque.name: "cycle-to-cycle differences appear in cuff forces and drive torque "
     "alike, so they come from the wearer",
 }
@@ -36,7 +34,7 @@ def cause_evidence(d: Diagnosis, named: Named) -> list[str]:
     if effect.each_run:
         sentences.append(_differs(d, label, effect))
     assert d.selected.evidence is not None
-    if d.selected.evidence.heard.get(label, 0.0) > HEARD:
+    if d.selected.evidence.auxiliary.get(label, 0.0) > TELLING:
         sentences.append(AUXILIARY[effect.name])
     if lines := len(named.element.shown):
         plural = "s stand" if lines > 1 else " stands"
