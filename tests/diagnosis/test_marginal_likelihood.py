@@ -25,14 +25,14 @@ def problem(seed: int = 0, strength: float = 0.0) -> tuple[np.ndarray, np.ndarra
         Element("drag@knee", "drag", "knee", "speed", False, [1], [1.0]),
         Element("law:angle@hip", "angle", "hip", "angle", True, [3, 4], [0.7, 0.3]),
     )
-    background = (("law", 5, 1.0, 0.0), ("cuff", 6, 1.0, 0.0), ("wander", 7, 1.0, 0.0))
+    background = (("cause", 5, 1.0, 0.0), ("cause", 6, 1.0, 0.0), ("wander", 7, 1.0, 0.0))
     gram, right = np.zeros((2, 8, 8)), np.zeros((2, 8))
     gram[0], right[0] = X.T @ X, X.T @ y
     return X, y, Evidence(gram, right, elements, background, {}, np.zeros(2))
 
 
 def background_covariance(X: np.ndarray) -> np.ndarray:
-    shares = (CRITERIA.background_law, CRITERIA.background_cuff, CRITERIA.background_wander)
+    shares = (CRITERIA.background_cause, CRITERIA.background_cause, CRITERIA.background_wander)
     return np.eye(ROWS) + sum(s**2 * np.outer(x, x) for s, x in zip(shares, X.T[5:], strict=True))
 
 
