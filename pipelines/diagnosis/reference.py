@@ -13,16 +13,16 @@ from itertools import pairwise
 from pathlib import Path
 
 from pipelines.diagnosis import criteria
-from pipelines.diagnosis.criteria import CRITERIA, Criteria
+from pipelines.diagnosis.criteria import CRITERIA, HELD, Criteria
 
 MEASURED = Path(__file__).with_name("criteria_measured.json")
-INTRODUCTION = """\
+INTRODUCTION = f"""\
 # Criteria: the hyper-parameters of the decision
 
 For those who want to know why a verdict came out as it did, or who change the decision.
-Written by `make docs` from `pipelines/diagnosis/criteria.py`. All but
-`form_misfit`, `model_error`, `lines` and `base_rate` are learned (`make learn`): they maximise the log probability that
-the posterior gives to the truth, over simulated sessions.
+Written by `make docs` from `pipelines/diagnosis/criteria.py`. All but {", ".join(f"`{name}`" for name in HELD)}
+are learned (`make learn`): they maximise the log probability that the posterior gives to the truth, over
+simulated sessions.
 [science.md](science.md#9-the-decision) has the equations in which they stand.
 """
 

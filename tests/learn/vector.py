@@ -5,13 +5,8 @@ from dataclasses import fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.criteria import Criteria
+from pipelines.diagnosis.criteria import HELD, Criteria
 from pipelines.diagnosis.selection.prior import FEATURES
-
-HELD = ("explained_share", "form_misfit", "model_error", "lines", "base_rate")
-"""What is not learned. The first two act before the evidence is stored; the sessions' mixture decides the last. The
-score is flat in the others: over a factor of three in the model error, under the larger of which a second cause beside
-a large one is lost, and of thirty in how much lines count, of which a drive that ripples asks for little."""
 
 
 def names() -> list[str]:
