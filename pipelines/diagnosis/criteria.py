@@ -14,49 +14,49 @@ class Criteria:
 
     drive_weight: float = 1.17
     """How much of a drive row's likelihood counts where nothing is missing; above one where noise is overestimated."""
-    cuff_weight: float = 0.2
+    cuff_weight: float = 0.137
     """The same of a cuff row."""
     model_error: float = 0.0075
     """An output counts with weight / (1 + model error x weight x what all causes and laws explain there): no form is
     exact. Held: the score of learning hardly tells values three times as large, under which a second cause is lost."""
-    cuff_model_error: float = 0.05
+    cuff_model_error: float = 0.0138
     """The same of a cuff's output."""
     explained_share: float = 0.3
     """Prior standard deviation of each column's share where all explain an output together."""
     form_misfit: float = 0.1
     """Share of a residual's rms that counts as noise: no form of any cause follows it exactly."""
-    background_cause: float = 0.00341
+    background_cause: float = 0.00293
     """Share of each cause of the catalogue on a good rig."""
-    background_wander: float = 0.00144
+    background_wander: float = 0.000215
     """Share by which a good rig's torque wanders in each run."""
-    background_line: float = 0.00343
+    background_line: float = 0.00178
     """Share of a line over the angle or over time on a good rig."""
-    amplitudes: tuple[float, float, float] = (0.0296, 0.0669, 0.315)
+    amplitudes: tuple[float, float, float] = (0.0456, 0.137, 1.31)
     """Shares that a cause or a law may have, equally likely: prior standard deviations."""
-    misfits: tuple[float, float] = (0.0, 0.1)
+    misfits: tuple[float, float] = (0.0, 0.0578)
     """Shares of a cause's own size by which its true form may differ from ours, equally likely."""
-    shape_sd: float = 0.0724
+    shape_sd: float = 0.393
     """Prior standard deviation of a shape about its best value, in its unit of change."""
     base_rate: float = -1.39
     """Log odds that anything is missing, over those in the simulated sessions: four in five of these lack something,
     of a lab's one in two is assumed."""
-    cause: float = -2.14
+    cause: float = -2.67
     """Prior log odds of a cause against none."""
-    law: float = -2.2
+    law: float = -3.37
     """Prior log odds of an unlisted law against none."""
-    further: float = -2.49
+    further: float = -1.6
     """Prior log odds of each element beyond the first."""
-    other_shape: float = -0.46
+    other_shape: float = -0.713
     """Log odds of a shape that is not the one which explains most."""
-    searched: float = -0.81
+    searched: float = -0.663
     """Log odds per log number of the values among which a wave, a tone or an onset was sought."""
-    each_run: float = -2.57
+    each_run: float = -4.56
     """Log odds of a cause whose value is another in every run."""
-    worn: float = -4.77
+    worn: float = -4.84
     """Log odds of a mass that the person carries, against the machine."""
     lines: float = 0.03
     """Share of a line's log likelihood ratio that counts for a ripple or a tone."""
-    coherence: float = 0.79
+    coherence: float = 0.451
     """Share of the cuffs' and drive's common scatter that counts for a voluntary torque."""
 
 
