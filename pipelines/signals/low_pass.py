@@ -69,6 +69,7 @@ def derivative(x: NDArray, rate_hz: float, order: int) -> NDArray:
     weights = _differences(order) * rate_hz**order
     half = DERIVATIVE_STENCIL // 2
     out = correlate1d(x, weights[half], axis=0, mode="nearest")
-    out[:half] = np.tensordot(weights[:half], x[:DERIVATIVE_STENCIL], 1)
-    out[-half:] = np.tensordot(weights[-half:], x[-DERIVATIVE_STENCIL:], 1)
+    # Summed in one order whatever the shape of x, so that a column alone gives the same to the last digit.
+    for end, samples in ((slice(half), x[:DERIVATIVE_STENCIL]), (slice(-half, None), x[-DERIVATIVE_STENCIL:])):
+        out[end] = sum(np.multiply.outer(own, sample) for own, sample in zip(weights[end].T, samples, strict=True))
     return np.asarray(out)

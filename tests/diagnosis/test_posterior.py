@@ -20,7 +20,7 @@ def cause(name: str, columns: list[int]) -> Element:
 
 def evidence_from(X: np.ndarray, y: np.ndarray, elements: tuple[Element, ...], **more) -> Evidence:
     """Return the evidence of rows that are all of drives; the last column is a good rig's."""
-    background = (("law", X.shape[1] - 1, 1.0, 0.0),)
+    background = (("cause", X.shape[1] - 1, 1.0, 0.0),)
     gram, right = (np.array([part, np.zeros_like(part)]) for part in (X.T @ X, X.T @ y))
     return Evidence(gram, right, elements, background, {}, np.zeros(2), **more)
 

@@ -13,6 +13,7 @@ from pipelines.diagnosis.fit.joint_fit import fit
 from pipelines.diagnosis.fit.presliding_test import built_up, dahl
 from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.effects import Backlash
+from pipelines.effects.backlash import CONTACT_STIFFNESS
 from pipelines.estimation.angle_noise import CUTOFF_HZ
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.read import read_motions
@@ -114,7 +115,7 @@ def bristles(tmp_path_factory):
 
 def test_of_a_joint_whose_play_is_named_nothing_more_is_told(bristles):
     runs, baseline = bristles.train, bristles.baseline
-    play = Candidate(Backlash("hip", on=baseline.machine), ((1e-4,),) * len(runs))
+    play = Candidate(Backlash("hip", on=baseline.machine), ((1e-4, CONTACT_STIFFNESS),) * len(runs))
     made = fit((play,), runs, baseline, bristles.selected.library.prepared.weights)
     assert [one.joint for one in built_up(made, baseline, bristles.train, bristles.validate)] == ["knee"]
 

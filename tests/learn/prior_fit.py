@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import logsumexp
 
+from pipelines.diagnosis.criteria import HELD
 from pipelines.diagnosis.selection.prior import FEATURES
 
 FLOOR = 1e-4
@@ -49,6 +50,8 @@ class Sets:
             value = -float(self.weights @ np.log(likely)) + 0.5 * float(off @ off) / len(truth)
             return value, -gradient + off / SPREAD / len(truth)
 
-        bounds = [(0.0, 1.0) if name in POSITIVE else (None, None) for name in FEATURES]
+        free = {name: (0.0, 1.0) if name in POSITIVE else (None, None) for name in FEATURES}
+        held = {name: (value, value) for name, value in zip(FEATURES, start.tolist(), strict=True) if name in HELD}
+        bounds = list((free | held).values())
         found = minimize(cost, start, jac=True, method="L-BFGS-B", bounds=bounds)
         return found.x, float(self.weights @ self.scores(evidence, found.x))

@@ -16,8 +16,6 @@ VALUES = 8
 """Values of a shape parameter in a grid."""
 BENDING = 2
 """Values of one whose effect is nearly in proportion to it."""
-HARDENING = ("1/rad²", "1/m²")
-"""Units of a form that only bends a spring: left to the refinement."""
 SLOW_WAVES = 4.0
 """Times the fewest waves of a ripple, up to which block averages are searched for one."""
 OSCILLATING = {"Hz", *TURNS}

@@ -132,9 +132,9 @@ class ShapeRefinement:
         return best, slopes
 
     def settled(self, start: Fitted) -> tuple[Fitted, NDArray]:
-        """Return a refined candidate as it is where it swings on the bodies of its own fit, refined anew.
+        """Return a refined candidate where it swings on the bodies of its own fit, refined anew, and its slopes (N, d).
 
-        Or as it was, where that explains no more.
+        As it was, where that explains no more.
         """
         best, slopes = start, self._slopes(start, free_shapes(start.candidate))
         for _ in range(SETTLINGS):

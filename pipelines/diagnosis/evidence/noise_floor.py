@@ -10,8 +10,6 @@ from scipy.ndimage import uniform_filter1d
 from pipelines.diagnosis.evidence.observed_run import Run
 
 LONGEST_LAG_S = 1.0
-MOST_INDEPENDENT = 1 / 6
-"""Of 25 ms blocks: what a model leaves of a leg is never white."""
 
 
 @dataclass(frozen=True)
