@@ -64,7 +64,7 @@ HELD = ("explained_share", "form_misfit", "model_error", "background_line", "eac
 """What is not learned. The first two act before the evidence is stored; the sessions' mixture decides the last. The
 score is flat in the model error over a factor of three, under the larger of which a second cause beside a large one is
 lost, and in how much lines count over one of thirty. Drives that ripple by a percent of their torque, as good ones may,
-are too rare among the sessions to teach the size of a good rig's line: learned alone it called such ripple missing. So are
-sensors that are tared anew at each start, which labs have: their odds are those learned on sessions that had more."""
+are too rare among the sessions to teach the size of a good rig's line: learned alone it called such ripple missing.
+So are sensors that are tared anew at each start, which labs have: their odds are of sessions that had more."""
 
 CRITERIA = Criteria()
