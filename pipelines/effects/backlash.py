@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.effects.effect import Effect, Family, Parameter, Side
-from pipelines.effects.joint_elasticity import MOTOR_INERTIA, rotor_among_links
+from pipelines.effects.joint_elasticity import MOTOR_INERTIA
 from pipelines.effects.kernel import spring
-from pipelines.effects.swing import behind_spring
+from pipelines.effects.swing import link_behind_motor
 from pipelines.mechanics.motion import Motion
 
 CONTACT_STIFFNESS = 30000.0
@@ -69,13 +69,9 @@ class Backlash(Effect):
         Where these are hard, or the link's mass is unknown, it hangs on that side towards which the transmitted
         torque pushes it, at the motor's speed: a motor that hard teeth strike jumps faster than it is sampled.
         """
-        j, contact = self.column(motion), self.completed(shape)[1]
-        if motion.link_swing is not None and contact < CONTACT_STIFFNESS:
-            direction = np.zeros_like(motion.q)
-            direction[:, j] = 1.0
-            rotor = rotor_among_links(motion, str(self.joint))
-            values = (shape[0], contact)
-            return behind_spring(motion, motion.link_swing, direction, self, values, STRIKING_RATIO, rotor)
-        q = motion.q.copy()
+        values = self.completed(shape)
+        if motion.link_swing is not None and values[1] < CONTACT_STIFFNESS:
+            return link_behind_motor(motion, motion.link_swing, self, values, STRIKING_RATIO)
+        j, q = self.column(motion), motion.q.copy()
         q[:, j] -= 0.5 * shape[0] * np.tanh(motion.transmitted[0][:, j] / (CROSSING_TORQUE * self.scale.torque))
         return motion.with_state(q, motion.dq, motion.ddq)

@@ -2,20 +2,15 @@
 
 from math import sqrt
 
-import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.effects.effect import Effect, Family, Parameter, Side
 from pipelines.effects.kernel import spring
-from pipelines.effects.rotor_inertia import RotorInertia
-from pipelines.effects.swing import behind_spring
+from pipelines.effects.swing import link_behind_motor
 from pipelines.mechanics.motion import Motion
 
 MOTOR_INERTIA = 0.1
 """kg·m², reflected to the joint; what little of a rigid drive's inertia stays with the motor."""
-
-ROTOR_INERTIA = 0.17
-"""kg·m² of a rotor that the rigid body's parameters hold: the middle of what is typical."""
 
 DAMPING_RATIO = 0.1
 """Of the motor's swing on the spring: a harmonic drive's flexspline."""
@@ -56,19 +51,10 @@ class JointElasticity(Effect):
 
     def corrected(self, motion: Motion, shape: NDArray | tuple[float, ...]) -> Motion:
         """Return the motion of the link behind the spring; it follows its torque at once where its mass is unknown."""
-        j = self.column(motion)
         if motion.link_swing is not None:
-            direction = np.zeros_like(motion.q)
-            direction[:, j] = 1.0
-            rotor = rotor_among_links(motion, str(self.joint))
-            return behind_spring(motion, motion.link_swing, direction, self, self.completed(shape), SWING_RATIO, rotor)
+            return link_behind_motor(motion, motion.link_swing, self, self.completed(shape), SWING_RATIO)
+        j = self.column(motion)
         q, dq, ddq = motion.q.copy(), motion.dq.copy(), motion.ddq.copy()
         for state, load_rate in zip((q, dq, ddq), motion.transmitted, strict=True):
             state[:, j] -= load_rate[:, j] / shape[0]
         return motion.with_state(q, dq, ddq)
-
-
-def rotor_among_links(motion: Motion, joint: str) -> float:
-    """Return the rotor's inertia that the rigid body's parameters count among the links, kg·m²."""
-    counted = motion.machine.is_exoskeleton and motion.machine.place(joint) in RotorInertia.absorbed
-    return ROTOR_INERTIA if counted else 0.0

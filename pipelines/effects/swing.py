@@ -9,12 +9,30 @@ from numpy.typing import NDArray
 
 from pipelines.effects.effect import Effect
 from pipelines.effects.kernel import address, swing_along
+from pipelines.effects.rotor_inertia import RotorInertia
 from pipelines.mechanics.load import Load
 from pipelines.mechanics.motion import Motion
 from pipelines.signals.low_pass import derivative, low_pass, shortest
 
 LEAST_INERTIA = 0.02
 """kg·m² that any load of an exoskeleton has."""
+
+ROTOR_INERTIA = 0.17
+"""kg·m² of a rotor that the rigid body's parameters hold: the middle of what is typical."""
+
+
+def link_behind_motor(motion: Motion, load: Load, effect: Effect, values: NDArray, ratio: float) -> Motion:
+    """Return the motion of the link behind an effect's transmission; the arguments are those of ``behind_spring``."""
+    direction = np.zeros_like(motion.q)
+    direction[:, effect.column(motion)] = 1.0
+    rotor = rotor_among_links(motion, str(effect.joint))
+    return behind_spring(motion, load, direction, effect, values, ratio, rotor)
+
+
+def rotor_among_links(motion: Motion, joint: str) -> float:
+    """Return the rotor's inertia that the rigid body's parameters count among the links, kg·m²."""
+    counted = motion.machine.is_exoskeleton and motion.machine.place(joint) in RotorInertia.absorbed
+    return ROTOR_INERTIA if counted else 0.0
 
 
 def behind_spring(

@@ -1,5 +1,7 @@
 """What a rigid body asks of its joints along a motion, and how that changes where it moves a little otherwise."""
 
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -34,34 +36,39 @@ class Load(NamedTuple):
         return Load(np.sum(direction * self.torque, axis=1), *slopes)
 
 
-class LoadColumns(NamedTuple):
-    """A load per unit of each inertial parameter of a body, p of them."""
+@dataclass(frozen=True)
+class LoadColumns:
+    """A body's load along a motion (n, J), per unit of each of its p inertial parameters.
 
-    torque: NDArray
-    """(n, J, p)."""
-    inertia: NDArray
-    """(n, J, J, p)."""
-    damping: NDArray
-    """(n, J, J, p)."""
-    stiffness: NDArray
-    """(n, J, J, p)."""
+    The slopes are computed once, and only where something swings: they are many times as large as the motion.
+    """
+
+    mechanism: Mechanism
+    q: NDArray
+    dq: NDArray
+    ddq: NDArray
+    geometry: Geometry
+
+    @property
+    def torque(self) -> NDArray:
+        """The torque itself, (n, J, p)."""
+        return self._torque(self.q, self.dq, self.ddq)
+
+    @cached_property
+    def slopes(self) -> NDArray:
+        """Its slopes with acceleration, velocity and angle, (3, n, J, J, p)."""
+        here = self.torque
+        n, J, p = here.shape
+        slopes = np.empty((3, n, J, J, p))
+        for j, unit in enumerate(np.eye(J)):
+            slopes[0, :, :, j] = self._torque(self.q, self.dq, self.ddq + unit) - here
+            slopes[1, :, :, j] = (self._torque(self.q, self.dq + STEP * unit, self.ddq) - here) / STEP
+            slopes[2, :, :, j] = (self._torque(self.q + STEP * unit, self.dq, self.ddq) - here) / STEP
+        return slopes
 
     def of(self, X: NDArray) -> Load:
         """Return the load of a body with inertial parameters ``X`` (p,)."""
-        return Load(*(columns @ X for columns in self))
+        return Load(self.torque @ X, *(self.slopes @ X))
 
-
-def load_columns(mechanism: Mechanism, q: NDArray, dq: NDArray, ddq: NDArray, geometry: Geometry) -> LoadColumns:
-    """Return what each inertial parameter adds to a body's load along a motion (n, J)."""
-    J = q.shape[1]
-
-    def torque(q: NDArray, dq: NDArray, ddq: NDArray) -> NDArray:
-        return mechanism.regressor(q, dq, ddq, geometry)
-
-    here = torque(q, dq, ddq)
-    slopes = np.empty((3, *here.shape[:2], J, here.shape[2]))
-    for j, unit in enumerate(np.eye(J)):
-        slopes[0, :, :, j] = torque(q, dq, ddq + unit) - here
-        slopes[1, :, :, j] = (torque(q, dq + STEP * unit, ddq) - here) / STEP
-        slopes[2, :, :, j] = (torque(q + STEP * unit, dq, ddq) - here) / STEP
-    return LoadColumns(here, *slopes)
+    def _torque(self, q: NDArray, dq: NDArray, ddq: NDArray) -> NDArray:
+        return self.mechanism.regressor(q, dq, ddq, self.geometry)

@@ -13,7 +13,7 @@ from pipelines.contracts.joints import joints_of
 from pipelines.contracts.table import Table
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
-from pipelines.mechanics.load import Load, LoadColumns, load_columns
+from pipelines.mechanics.load import Load, LoadColumns
 from pipelines.mechanics.machine import Machine, machine_of
 from pipelines.mechanics.mechanisms.leg import LEG, cuff_torque
 from pipelines.mechanics.units import Scale
@@ -194,7 +194,7 @@ class Motion:
     @cached_property
     def load_columns(self) -> LoadColumns:
         """What each inertial parameter adds to the load of a body along this motion."""
-        return load_columns(self.machine.mechanism, self.q, self.dq, self.ddq, self.geometry)
+        return LoadColumns(self.machine.mechanism, self.q, self.dq, self.ddq, self.geometry)
 
     @property
     def _load_cutoff_hz(self) -> float:
@@ -217,9 +217,9 @@ class Motion:
 
         The measured torques would not do: their noise would stand on both sides of a regression.
         """
-        columns = self.load_columns
-        made = replace(self, load=columns.torque @ body, limb_load=columns.torque @ limb, body=body, limb_body=limb)
-        made.__dict__["load_columns"] = columns
+        torque = self.load_columns.torque
+        made = replace(self, load=torque @ body, limb_load=torque @ limb, body=body, limb_body=limb)
+        made.__dict__["load_columns"] = self.load_columns  # the motion is the same
         return made
 
     def with_state(self, q: NDArray, dq: NDArray, ddq: NDArray) -> "Motion":

@@ -22,7 +22,7 @@ def test_a_load_swings_on_the_bodies_of_its_own_fit(soft):
     runs = soft.prepared.runs
     start = soft.alone.fit(Candidate(JointElasticity("knee"), ((1.5 * SOFT, 0.0),) * len(runs)))
     biased, _ = soft.alone.refined(start)
-    settled, _ = soft.alone.settled(biased)
+    settled, _ = soft.alone.with_refitted_bodies(biased)
     assert settled.candidate.shapes[0][0] == pytest.approx(SOFT, rel=0.15)
     assert abs(settled.candidate.shapes[0][0] - SOFT) < 0.8 * abs(biased.candidate.shapes[0][0] - SOFT)
     assert settled.gain_as_is > 1.2 * biased.gain_as_is
@@ -32,13 +32,13 @@ def test_bodies_that_explain_no_more_are_not_taken(soft):
     """Beside a cause that is not there the rigid bodies are as good as before."""
     stiff = Candidate(JointElasticity("hip"), ((8000.0, 0.0),) * len(soft.prepared.runs))
     start = soft.alone.fit(stiff)
-    settled, _ = soft.alone.settled(start)
+    settled, _ = soft.alone.with_refitted_bodies(start)
     assert settled.gain_as_is >= start.gain_as_is
 
 
 def test_a_spring_that_hardens_is_found_in_its_own_form():
     look = Screening.of(session("joint_elasticity", "knee", stiffness=SOFT, hardening=HARDENING))
-    best, _ = look.alone.settled(look.alone.refined(look.fits(JointElasticity("knee"))[0])[0])
+    best, _ = look.alone.with_refitted_bodies(look.alone.refined(look.fits(JointElasticity("knee"))[0])[0])
     stiffness, hardening = best.candidate.shapes[0]
     assert hardening == HARDENING
     assert stiffness == pytest.approx(SOFT, rel=0.1)
@@ -47,7 +47,7 @@ def test_a_spring_that_hardens_is_found_in_its_own_form():
 @pytest.mark.parametrize("joint", ["hip", "knee"])
 def test_the_play_of_teeth_is_found(joint):
     look = Screening.of(session("backlash", joint, play=PLAY, contact_stiffness=4000.0))
-    best, _ = look.alone.settled(look.alone.refined(look.fits(Backlash(joint))[0])[0])
+    best, _ = look.alone.with_refitted_bodies(look.alone.refined(look.fits(Backlash(joint))[0])[0])
     assert best.candidate.shapes[0][0] == pytest.approx(PLAY, rel=0.25)
 
 
@@ -55,7 +55,7 @@ def test_bodies_are_the_candidates_own(soft):
     """Rows depend on nothing but the candidate, whatever was fitted in between."""
     plain = Candidate(JointElasticity("knee"), ((SOFT, 0.0),) * len(soft.prepared.runs))
     before = soft.rows(plain)
-    settled = soft.rows.settled(plain)
+    settled = soft.rows.with_refitted_bodies(plain)
     with_bodies = soft.rows(settled)
     assert (soft.rows(plain) == before).all()
     assert (soft.rows(replace(settled)) == with_bodies).all()

@@ -10,10 +10,10 @@ from pipelines.dynamics.assembly import assemble
 from pipelines.dynamics.forward import DTHETA, THETA, Q, accelerations, resting_state, stages, step, workspace
 from pipelines.effects.backlash import SHAFT_STIFFNESS, STRIKING_RATIO, Backlash
 from pipelines.effects.cuff_compliance import CuffCompliance
-from pipelines.effects.joint_elasticity import JointElasticity, rotor_among_links
+from pipelines.effects.joint_elasticity import JointElasticity
 from pipelines.effects.kernel import address, swing_along
 from pipelines.effects.rigid_body import RigidBody
-from pipelines.effects.swing import behind_spring
+from pipelines.effects.swing import behind_spring, rotor_among_links
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.motion import Motion
 from pipelines.model import Model, Term

@@ -24,7 +24,7 @@ ABOUT = """\
 Measured by `make sensitivity` on {sessions} simulated sessions whose evidence is stored. As they
 stand the criteria give the truth a mean log probability of {score:.3f}, and the most probable set
 is the truth in {share:.1%}. The table has the changes of both where one number is multiplied or
-divided by 1.3, all else as it stands. What is not learned is not in the table."""
+divided by 1.3, all else as it stands. What is not learned is there only where it is part of the prior."""
 
 
 def sensitivity(root: Path, worlds: Sequence[str], most: int, workers: int, criteria: Criteria) -> dict[str, Any]:

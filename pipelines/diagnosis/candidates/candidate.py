@@ -36,7 +36,7 @@ class Candidate:
     directions: tuple[tuple[float, ...], ...] = ()
     """Shapes that have a column each, where the effect is in proportion to them; empty where it has one shape."""
     bodies: tuple[float, ...] = ()
-    """Values of the baseline on whose rigid bodies it swings, in the library; empty for those of the baseline alone."""
+    """Baseline values (b,) with whose rigid bodies the library simulates a transmission; empty: the baseline's own."""
 
     @property
     def label(self) -> str:

@@ -37,7 +37,7 @@ class CandidateRows:
         steps = np.max([np.quantile(np.abs(np.diff(run.state[0], axis=0)), 0.9, axis=0) for run in runs], axis=0)
         self._steps = dict(zip(names, steps, strict=True))
         self._kinds = [run.motion.run for run in runs]
-        self._swinging: tuple[tuple[float, ...], list[Run]] = (), self._slow
+        self._last_laden: tuple[tuple[float, ...], list[Run]] = (), self._slow
 
     def __call__(self, candidate: Candidate, beside: NDArray | None = None) -> NDArray | None:
         """Return a candidate's rows; None where they are not finite.
@@ -59,22 +59,22 @@ class CandidateRows:
             rows = self._transformed(candidate, beside)
         return rows if np.isfinite(rows).all() else None
 
-    def settled(self, candidate: Candidate) -> Candidate:
-        """Return a candidate that swings on the rigid bodies which the baseline has beside it.
+    def with_refitted_bodies(self, candidate: Candidate) -> Candidate:
+        """Return a transmission with the rigid bodies that a fit of baseline and transmission finds.
 
-        Those that the baseline has alone are biased by what is missing.
+        A fit of the baseline alone is biased by what is missing.
         """
-        _, values = self._changed(candidate, None, self._laden(candidate))
+        _, values = self._change(candidate, None)
         return replace(candidate, bodies=tuple(values.tolist()))
 
     def _laden(self, candidate: Candidate) -> list[Run]:
-        """Return the runs with the bodies that a candidate swings on."""
+        """Return the runs with the loads of a candidate's rigid bodies."""
         if not candidate.bodies:
             return self._slow
-        if self._swinging[0] != candidate.bodies:  # most often they are those of the call before
+        if self._last_laden[0] != candidate.bodies:  # most often they are those of the call before
             values = np.array(candidate.bodies)
-            self._swinging = candidate.bodies, [with_load(run, self._baseline, values) for run in self._slow]
-        return self._swinging[1]
+            self._last_laden = candidate.bodies, [with_load(run, self._baseline, values) for run in self._slow]
+        return self._last_laden[1]
 
     def _ripples_within_blocks(self, candidate: Candidate) -> bool:
         """Tell whether a wave over the angle goes by within a few blocks."""
@@ -93,16 +93,15 @@ class CandidateRows:
 
         Each run has a column of its own where its shape is its own.
         """
-        runs = self._laden(candidate)
-        row, _ = self._changed(candidate, beside, runs)
+        row, _ = self._change(candidate, beside)
         if not candidate.effect.per_run:
             return row
-        numbers = [r for r, run in enumerate(runs) if candidate.effect.explains(run.motion)]
+        numbers = [r for r, run in enumerate(self._slow) if candidate.effect.explains(run.motion)]
         return row * (self._regression.run[:, np.newaxis] == np.array(numbers))
 
-    def _changed(self, candidate: Candidate, beside: NDArray | None, runs: Sequence[Run]) -> tuple[NDArray, NDArray]:
-        """Return what the transformed baseline adds to the plain one, (N, 1), and the values (b,) that it then has."""
-        regression = self._regression
+    def _change(self, candidate: Candidate, beside: NDArray | None) -> tuple[NDArray, NDArray]:
+        """Return the change of the baseline's prediction by a transformed motion, (N, 1), and its values then, (b,)."""
+        regression, runs = self._regression, self._laden(candidate)
         acting = [candidate.effect.explains(run.motion) for run in runs]
         made = [
             columns_under([candidate.term(r)], run, self._baseline) if acts else self._plain[r]

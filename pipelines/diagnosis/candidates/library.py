@@ -191,7 +191,7 @@ def _shapes(fits: Sequence[Fitted], alone: ShapeRefinement, regression: Decision
     best, slopes = alone.refined(fits[0])
     others = others_of(fits, best, ALTERNATIVES)
     if best.candidate.effect.swings:
-        best, slopes = alone.settled(best)
+        best, slopes = alone.with_refitted_bodies(best)
     slopes = np.hstack([slopes, towards(best, others)])
     shaped = [Cause.of(best, slopes, regression, first=True)]
     none = np.zeros((len(slopes), 0))

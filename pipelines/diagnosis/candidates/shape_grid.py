@@ -36,7 +36,7 @@ def screened(
         starts = [_from_the_begin(effect, len(runs))]
     else:
         starts = [Candidate(effect, (shape,) * len(runs)) for shape in _grid(effect, runs, regression)]
-    fit = alone.swung if effect.swings else alone.fit
+    fit = alone.fit_transmission if effect.swings else alone.fit
     fits = [fitted for start in starts if (fitted := fit(start)) is not None]
     return sorted(fits, key=lambda fitted: -fitted.gain)
 

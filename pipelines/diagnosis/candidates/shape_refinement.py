@@ -34,8 +34,8 @@ ROUNDING = 1e-5
 """Share of a column that is left by a projection where the column lies in what is projected out."""
 STIFFNESS = "N·m/rad"
 """Unit of a shape of which more does less."""
-SETTLINGS = 2
-"""Times that a swinging load follows the fit beside which it swings."""
+BODY_REFITS = 2
+"""Times that the rigid bodies with which a transmission is simulated are fitted anew."""
 ONSETS, SWEEPS = 40, 3
 """Instants tried in a run at a time, and times that all runs are gone through."""
 TONE_STEP_HZ = 0.01
@@ -131,24 +131,24 @@ class ShapeRefinement:
                 break
         return best, slopes
 
-    def settled(self, start: Fitted) -> tuple[Fitted, NDArray]:
-        """Return a refined candidate where it swings on the bodies of its own fit, refined anew, and its slopes (N, d).
+    def with_refitted_bodies(self, start: Fitted) -> tuple[Fitted, NDArray]:
+        """Return a refined transmission, its bodies and shapes fitted anew in turn, and its slopes (N, d).
 
-        As it was, where that explains no more.
+        A refit that does not explain more is left out.
         """
         best, slopes = start, self._slopes(start, free_shapes(start.candidate))
-        for _ in range(SETTLINGS):
-            ahead = self.fit(self._rows.settled(best.candidate))
+        for _ in range(BODY_REFITS):
+            ahead = self.fit(self._rows.with_refitted_bodies(best.candidate))
             refined = None if ahead is None else self.refined(ahead)
             if refined is None or refined[0].gain_as_is < best.gain_as_is + ENOUGH:
                 break
             best, slopes = refined
         return best, slopes
 
-    def swung(self, candidate: Candidate) -> Fitted | None:
-        """Fit a transmission where it swings on the bodies of its own fit; None where its rows are not finite."""
-        for _ in range(SETTLINGS):
-            candidate = self._rows.settled(candidate)
+    def fit_transmission(self, candidate: Candidate) -> Fitted | None:
+        """Fit a transmission with bodies fitted beside it; None where its rows are not finite."""
+        for _ in range(BODY_REFITS):
+            candidate = self._rows.with_refitted_bodies(candidate)
         return self.fit(candidate)
 
     def _with_onsets(self, candidate: Candidate) -> Fitted | None:

@@ -43,7 +43,7 @@ class Refinement:
         for _ in range(ROUNDS if causes else 0):
             # The bodies of the fit before were biased by what was missing, and so were the loads.
             loads = best.values
-            runs = [with_load(run, self._baseline, loads) for run in self._runs]
+            runs = self._laden(loads)
             start = self._fit(best.causes, runs, loads)
             ahead = self._round(start, runs)
             made.append(ahead)
@@ -53,12 +53,16 @@ class Refinement:
         return min(made, key=lambda one: one.cost)
 
     def _start(self, causes: Sequence[Candidate]) -> Fit:
-        """Return the fit of the shapes as they are, loads swinging on the bodies on which the library let them."""
+        """Return the fit of the shapes as they are, with the rigid bodies with which the library simulated them."""
         bodies = next((cause.bodies for cause in causes if cause.bodies), None)
         if bodies is None:
             return self._fit(causes, self._runs, None)
         loads = np.array(bodies)
-        return self._fit(causes, [with_load(run, self._baseline, loads) for run in self._runs], loads)
+        return self._fit(causes, self._laden(loads), loads)
+
+    def _laden(self, loads: NDArray) -> list[Run]:
+        """Return the runs with the loads of the rigid bodies in a fit's values."""
+        return [with_load(run, self._baseline, loads) for run in self._runs]
 
     def _fit(self, causes: Sequence[Candidate], runs: Sequence[Run], loads: NDArray | None) -> Fit:
         return fit(causes, runs, self._baseline, self._weights, loads)
