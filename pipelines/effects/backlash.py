@@ -70,7 +70,7 @@ class Backlash(Effect):
         torque pushes it, at the motor's speed: a motor that hard teeth strike jumps faster than it is sampled.
         """
         values = self.completed(shape)
-        if motion.link_swing is not None and values[1] < CONTACT_STIFFNESS:
+        if motion.link_swing is not None and values[1] < max(self.shape[1].forms):
             return link_behind_motor(motion, motion.link_swing, self, values, STRIKING_RATIO)
         j, q = self.column(motion), motion.q.copy()
         q[:, j] -= 0.5 * shape[0] * np.tanh(motion.transmitted[0][:, j] / (CROSSING_TORQUE * self.scale.torque))

@@ -27,7 +27,6 @@ class StribeckFriction(Effect):
     )
     parity = Parity.ODD
     dissipative = True
-    excess_over = "coulomb"
 
     @reaction
     def reaction(at, state, values, geometry, joint, out):

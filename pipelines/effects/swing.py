@@ -22,7 +22,10 @@ ROTOR_INERTIA = 0.17
 
 
 def link_behind_motor(motion: Motion, load: Load, effect: Effect, values: NDArray, ratio: float) -> Motion:
-    """Return the motion of the link behind an effect's transmission; the arguments are those of ``behind_spring``."""
+    """Return the motion of the link behind an effect's transmission.
+
+    The arguments are those of ``behind_spring``; ``values`` are (k,), in the effect's order.
+    """
     direction = np.zeros_like(motion.q)
     direction[:, effect.column(motion)] = 1.0
     rotor = rotor_among_links(motion, str(effect.joint))

@@ -4,19 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 from pipelines.diagnosis.candidates.candidate import Candidate, lowest
 from pipelines.diagnosis.candidates.shape_refinement import changed, free_shapes
 from pipelines.diagnosis.evidence.baseline import baseline_of, with_load
-from pipelines.diagnosis.evidence.baseline_columns import columns_under
 from pipelines.diagnosis.evidence.cuff_coherence import cuff_coherence
 from pipelines.diagnosis.evidence.motion_band import above_the_motion_hz
 from pipelines.diagnosis.evidence.observed_run import FOLDS, observe
 from pipelines.diagnosis.evidence.slow_error import slow_error
-from pipelines.diagnosis.fit.joint_fit import fit
 from pipelines.diagnosis.fit.joint_refinement import Refinement
-from pipelines.effects import Cogging, ViscousAsymmetry, VoluntaryTorque
+from pipelines.effects import Cogging, VoluntaryTorque
 from tests.diagnosis.sessions import session
 
 NOISE = 0.5
@@ -94,34 +91,6 @@ def test_a_drag_of_the_machines_own_and_noise_are_no_push(worn):
     assert np.all(cuff_coherence([worn], [quiet + repeated]) == 0.0), "a spring on the limb repeats with the motion"
     silent = [cuff_coherence([worn], [noise(worn, seed) * np.array([1, 1, 0.2, 0.2])]) for seed in range(20)]
     assert np.all(np.array(silent) == 0.0)
-
-
-@pytest.mark.parametrize(("speed_share", "absurd"), [(0.2, False), (3.0, True)])
-def test_a_large_amplitude_is_absurd_only_where_it_carries_most_of_the_joints_torque(run, speed_share, absurd):
-    cause, J = Candidate(ViscousAsymmetry(joint="hip"), ((),)), 2
-    direction = np.abs(run.state[1][:, 0])
-    measured = run.measured.copy()
-    largest = 6.0 * max(map(abs, cause.effect.linear[0].typical))
-    # The machine is strong in one case and weak in the other; the amplitude is the same.
-    wanted = largest * np.sqrt(np.mean(direction[run.usable[:, 0]] ** 2)) / speed_share
-    measured[:, :J] *= wanted / np.sqrt(np.mean(measured[run.usable[:, 0], 0] ** 2))
-    measured[:, 0] += largest * direction
-    strong = replace(run, measured=measured)
-    baseline = baseline_of([strong])
-    assert bool(fit([cause], [strong], baseline, np.ones(4)).absurdity(baseline, strong.motion.geometry)) == absurd
-
-
-@pytest.mark.parametrize(("least", "unreal"), [(0.4, False), (-0.01, False), (-0.4, True)])
-def test_causes_beside_which_the_machine_has_no_mass_are_absurd(run, least, unreal):
-    """Only plainly: of a body that hardly lacks any, the misfit of a cause's form may be the reason."""
-    baseline = baseline_of([run])
-    L1, X1, X3 = run.motion.geometry.thigh_length_m, 3.0, 1.0
-    # The X2 with which the matrix [[X1 - X2, L1 X3], [L1 X3, X2]] has this least eigenvalue.
-    X2 = brentq(lambda x: np.linalg.eigvalsh([[X1 - x, L1 * X3], [L1 * X3, x]])[0] - least, -1.0, 1.4)
-    measured = columns_under((), run, baseline)[0][..., :4] @ [X1, X2, X3, 4.0]
-    made = replace(run, measured=measured + 0.1 * noise(run))
-    found = fit([Candidate(ViscousAsymmetry(joint="hip"), ((),))], [made], baseline, np.ones(4))
-    assert bool(found.absurdity(baseline, run.motion.geometry)) == unreal
 
 
 def test_a_step_of_the_refinement_stays_at_the_maximum_that_the_search_found():

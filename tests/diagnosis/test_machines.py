@@ -195,3 +195,14 @@ def test_play_of_another_machine_is_not_simulated_with_an_exoskeletons_teeth():
     play = Term(Backlash("arm", on=machine), np.array([0.01]))
     with pytest.raises(InputError, match=r"backlash@arm: the teeth that a simulation has are those of an exoskeleton"):
         assemble(Model((*terms, play)), Geometry(), ["arm"])
+
+
+@pytest.mark.parametrize("form", [0, 1])
+def test_teeth_are_hard_or_soft_by_the_measure_of_their_own_joint(form):
+    """The link hangs on hard teeth at the motor's speed; soft ones it strikes, and has a speed of its own."""
+    (motion, _) = on_one_scale(motions(pendulum))
+    (joint,), body = motion.joints, np.ones(len(motion.machine.mechanism.parameters))
+    play = Backlash(joint, on=motion.machine)
+    loaded = motion.loaded(body, body)
+    link = play.corrected(loaded, (play.shape[0].typical[1], play.shape[1].forms[form]))
+    assert np.array_equal(link.dq, loaded.dq) == (form == 0)

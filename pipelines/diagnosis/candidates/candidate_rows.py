@@ -20,6 +20,9 @@ from pipelines.diagnosis.evidence.observed_run import Run
 
 LONGEST_STEP = 0.5
 """Angle of a wave from block to block, rad, above which block averages do not follow it."""
+RELAXATION = 0.5
+"""Share of the way to the rigid bodies of a refit: behind a soft spring heavier bodies make the refit find lighter
+ones, and the whole way leads past them for ever."""
 RIDGE = 1e-10
 """Relative to a column's square: keeps a refit of nearly dependent columns finite."""
 
@@ -38,6 +41,7 @@ class CandidateRows:
         self._steps = dict(zip(names, steps, strict=True))
         self._kinds = [run.motion.run for run in runs]
         self._last_laden: tuple[tuple[float, ...], list[Run]] = (), self._slow
+        self._last_change: tuple[Candidate, NDArray | None, tuple[NDArray, NDArray]] | None = None
 
     def __call__(self, candidate: Candidate, beside: NDArray | None = None) -> NDArray | None:
         """Return a candidate's rows; None where they are not finite.
@@ -59,12 +63,14 @@ class CandidateRows:
             rows = self._transformed(candidate, beside)
         return rows if np.isfinite(rows).all() else None
 
-    def with_refitted_bodies(self, candidate: Candidate) -> Candidate:
+    def with_refitted_bodies(self, candidate: Candidate, beside: NDArray | None = None) -> Candidate:
         """Return a transmission with the rigid bodies that a fit of baseline and transmission finds.
 
-        A fit of the baseline alone is biased by what is missing.
+        A fit of the baseline alone is biased by what is missing. ``beside`` (N, b) is as in a call.
         """
-        _, values = self._change(candidate, None)
+        _, values = self._change(candidate, beside)
+        if candidate.bodies:
+            values = RELAXATION * values + (1.0 - RELAXATION) * np.array(candidate.bodies)
         return replace(candidate, bodies=tuple(values.tolist()))
 
     def _laden(self, candidate: Candidate) -> list[Run]:
@@ -101,6 +107,12 @@ class CandidateRows:
 
     def _change(self, candidate: Candidate, beside: NDArray | None) -> tuple[NDArray, NDArray]:
         """Return the change of the baseline's prediction by a transformed motion, (N, 1), and its values then, (b,)."""
+        last = self._last_change
+        if last is None or last[0] != candidate or last[1] is not beside:  # its rows are asked for, then its bodies
+            last = self._last_change = candidate, beside, self._changed(candidate, beside)
+        return last[2]
+
+    def _changed(self, candidate: Candidate, beside: NDArray | None) -> tuple[NDArray, NDArray]:
         regression, runs = self._regression, self._laden(candidate)
         acting = [candidate.effect.explains(run.motion) for run in runs]
         made = [

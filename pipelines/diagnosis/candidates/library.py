@@ -188,12 +188,23 @@ def _shapes(fits: Sequence[Fitted], alone: ShapeRefinement, regression: Decision
     """Return an effect at its best shape, refined, and at the next best of the coarse search."""
     if not fits:
         return []
-    best, slopes = alone.refined(fits[0])
+    swings = fits[0].candidate.effect.swings
+    best, slopes = transmission(fits, alone) if swings else alone.refined(fits[0])
     others = others_of(fits, best, ALTERNATIVES)
-    if best.candidate.effect.swings:
-        best, slopes = alone.with_refitted_bodies(best)
     slopes = np.hstack([slopes, towards(best, others)])
     shaped = [Cause.of(best, slopes, regression, first=True)]
     none = np.zeros((len(slopes), 0))
     shaped += [Cause.of(other, none, regression, first=False) for other in others[:ALTERNATIVES]]
     return [cause for cause in shaped if cause is not None]
+
+
+def transmission(fits: Sequence[Fitted], alone: ShapeRefinement) -> tuple[Fitted, NDArray]:
+    """Return a transmission at its best shape, refined from several starts, and its slopes there, (N, d).
+
+    Where a load swings there are many maxima, and which of two is the higher one shows only after the bodies are
+    fitted: the best on the baseline's bodies and the best on refitted ones are tried.
+    """
+    plain = [fitted for fitted in fits if not fitted.candidate.bodies]
+    refitted = [fitted for fitted in fits if fitted.candidate.bodies]
+    refined = [alone.refined_transmission(kind[0]) for kind in (plain, refitted) if kind]
+    return max(refined, key=lambda found: found[0].gain_as_is)

@@ -36,8 +36,11 @@ def screened(
         starts = [_from_the_begin(effect, len(runs))]
     else:
         starts = [Candidate(effect, (shape,) * len(runs)) for shape in _grid(effect, runs, regression)]
-    fit = alone.fit_transmission if effect.swings else alone.fit
-    fits = [fitted for start in starts if (fitted := fit(start)) is not None]
+    if effect.swings:
+        # An amplitude would scale the twist, which the load does not follow.
+        fits = [fitted for start in starts for fitted in alone.transmission(start)]
+        return sorted(fits, key=lambda fitted: -fitted.gain_as_is)
+    fits = [fitted for start in starts if (fitted := alone.fit(start)) is not None]
     return sorted(fits, key=lambda fitted: -fitted.gain)
 
 

@@ -131,25 +131,29 @@ class ShapeRefinement:
                 break
         return best, slopes
 
-    def with_refitted_bodies(self, start: Fitted) -> tuple[Fitted, NDArray]:
-        """Return a refined transmission, its bodies and shapes fitted anew in turn, and its slopes (N, d).
+    def transmission(self, candidate: Candidate) -> list[Fitted]:
+        """Fit a transmission on the baseline's bodies, and on those fitted beside it, where its rows are finite."""
+        fits = [self.fit(candidate), self.fit(self._with_own_bodies(candidate))]
+        return [fitted for fitted in fits if fitted is not None]
 
-        A refit that does not explain more is left out.
+    def refined_transmission(self, start: Fitted) -> tuple[Fitted, NDArray]:
+        """Return a transmission at its best shape, its bodies and shapes fitted in turn, and its slopes there, (N, d).
+
+        A refit of the bodies that does not explain more is left out.
         """
-        best, slopes = start, self._slopes(start, free_shapes(start.candidate))
+        best, slopes = self.refined(self.fit(self._with_own_bodies(start.candidate)) or start)
         for _ in range(BODY_REFITS):
-            ahead = self.fit(self._rows.with_refitted_bodies(best.candidate))
+            ahead = self.fit(self._rows.with_refitted_bodies(best.candidate, self._beside))
             refined = None if ahead is None else self.refined(ahead)
             if refined is None or refined[0].gain_as_is < best.gain_as_is + ENOUGH:
                 break
             best, slopes = refined
         return best, slopes
 
-    def fit_transmission(self, candidate: Candidate) -> Fitted | None:
-        """Fit a transmission with bodies fitted beside it; None where its rows are not finite."""
+    def _with_own_bodies(self, candidate: Candidate) -> Candidate:
         for _ in range(BODY_REFITS):
-            candidate = self._rows.with_refitted_bodies(candidate)
-        return self.fit(candidate)
+            candidate = self._rows.with_refitted_bodies(candidate, self._beside)
+        return candidate
 
     def _with_onsets(self, candidate: Candidate) -> Fitted | None:
         """Return a candidate that begins in each run at the instant at which it explains most.
@@ -203,8 +207,12 @@ class ShapeRefinement:
             value = now / amplitude if parameter.unit == STIFFNESS else now * amplitude
         else:
             value = parameter.neutral + amplitude * (now - parameter.neutral)
-        ahead = self.fit(start.candidate.reshaped(0, float(np.clip(value, *reach(parameter)))))
+        ahead = self.fit(self._settled(start.candidate.reshaped(0, float(np.clip(value, *reach(parameter))))))
         return start if ahead is None or ahead.gain_as_is < start.gain_as_is else ahead
+
+    def _settled(self, candidate: Candidate) -> Candidate:
+        """Return a candidate at a new shape, a transmission with the bodies that this shape asks for."""
+        return self._rows.with_refitted_bodies(candidate, self._beside) if candidate.bodies else candidate
 
     def _slopes(self, fitted: Fitted, units: list[tuple[int, float]]) -> NDArray:
         """Return what each free shape does per unit of change, (N, d)."""
@@ -230,7 +238,7 @@ class ShapeRefinement:
             steps = length * solution[len(solution) - len(units) :]
             for (i, unit), step in zip(units, steps, strict=True):
                 candidate = changed(candidate, i, unit, float(step))
-            ahead = self.fit(candidate)
+            ahead = self.fit(self._settled(candidate))
             if ahead is not None and ahead.gain_as_is > fitted.gain_as_is:
                 return ahead
             length *= SHORTER

@@ -211,7 +211,7 @@ def variable_share(variable: Variable, runs: Sequence[Run], residuals: Sequence[
             continue
         curve = Curve.along([variable], some, j)
         design = pooled(some, [curve.design(run) for run in some], j)
-        error += held_out_error([fold_products(design, y, fold) for fold in _folds(variable, some, j)])[0]
+        error += held_out_error(fold_products(design, y, _folds(variable, some, j)))[0]
     return max(1.0 - error / total, 0.0) if total > 0 else 0.0
 
 

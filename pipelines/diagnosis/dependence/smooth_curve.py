@@ -73,19 +73,48 @@ class Products:
     square: NDArray
     """(F,)."""
 
-    def solve(self, folds: Sequence[int], ridge: float) -> NDArray:
-        """Return the coefficients (k,) of a ridge fit to some folds."""
-        A = self.columns[list(folds)].sum(axis=0)
-        scale = np.trace(A) / len(A)
-        shrunk = A + (ridge * scale + np.finfo(float).tiny) * np.eye(len(A))
-        return np.linalg.solve(shrunk, self.right[list(folds)].sum(axis=0))
+    def fitted(self, ridge: float) -> NDArray:
+        """Return the coefficients (k,) of a ridge fit to all folds."""
+        A = self.columns.sum(axis=0)
+        return np.linalg.solve(A + _shrinkage(A, np.array(ridge)), self.right.sum(axis=0))
+
+    def held_out(self, ridges: NDArray) -> NDArray:
+        """Return the squared error of ridge fits (r,) on folds that were not fitted, (r,)."""
+        there = np.flatnonzero(self.square)
+        columns, right = self.columns[there], self.right[there]
+        others = self.columns.sum(axis=0) - columns
+        shrunk = others + _shrinkage(others, ridges[:, np.newaxis])
+        rest = np.broadcast_to(self.right.sum(axis=0) - right, (len(ridges), *right.shape))
+        c = np.linalg.solve(shrunk, rest[..., np.newaxis])[..., 0]
+        explained = 2.0 * np.sum(c * right, axis=-1) - np.einsum("rfi,fij,rfj->rf", c, columns, c, optimize=True)
+        return np.sum(self.square[there] - explained, axis=1)
 
 
-def fold_products(design: NDArray, y: NDArray, fold: NDArray) -> Products:
-    """Multiply out a design (n, k) and a residual (n,), whose rows belong to folds (n,)."""
-    parts = [(design[fold == f], y[fold == f]) for f in range(FOLDS)]
+def _shrinkage(A: NDArray, ridges: NDArray) -> NDArray:
+    """Return what ridges (r, 1) or () add to matrices (..., k, k)."""
+    size = ridges * np.trace(A, axis1=-2, axis2=-1) / A.shape[-1] + np.finfo(float).tiny
+    return np.asarray(size)[..., np.newaxis, np.newaxis] * np.eye(A.shape[-1])
+
+
+def fold_products(design: NDArray, y: NDArray, ways: Sequence[NDArray]) -> list[Products]:
+    """Multiply out a design (n, k) and a residual (n,) whose rows are dealt out to folds (n,) in several ways.
+
+    Rows that all ways deal out alike are multiplied out once.
+    """
+    cell = np.ravel_multi_index(tuple(ways), (FOLDS,) * len(ways))
+    order = np.argsort(cell, kind="stable")
+    cells, starts = np.unique(cell[order], return_index=True)
+    parts = [(design[rows], y[rows]) for rows in np.split(order, starts[1:])]
     columns, right = np.array([A.T @ A for A, _ in parts]), np.array([A.T @ b for A, b in parts])
-    return Products(columns, right, np.array([b @ b for _, b in parts]))
+    square = np.array([b @ b for _, b in parts])
+    folds = np.array(np.unravel_index(cells, (FOLDS,) * len(ways)))
+    return [_summed(columns, right, square, own) for own in folds]
+
+
+def _summed(columns: NDArray, right: NDArray, square: NDArray, fold: NDArray) -> Products:
+    """Add up the products of cells (c, ...) by the fold (c,) to which each belongs."""
+    belongs = (fold == np.arange(FOLDS)[:, np.newaxis]).astype(float)
+    return Products(np.tensordot(belongs, columns, axes=1), belongs @ right, belongs @ square)
 
 
 def held_out_error(products: Sequence[Products]) -> tuple[float, float]:
@@ -93,12 +122,6 @@ def held_out_error(products: Sequence[Products]) -> tuple[float, float]:
 
     Of several ways to deal out the folds the worst counts.
     """
-    return min((max(_held_out(p, ridge) for p in products), ridge) for ridge in RIDGES)
-
-
-def _held_out(products: Products, ridge: float) -> float:
-    total = 0.0
-    for f in np.flatnonzero(products.square):
-        c = products.solve([g for g in range(FOLDS) if g != f], ridge)
-        total += float(products.square[f] - 2 * c @ products.right[f] + c @ products.columns[f] @ c)
-    return total
+    worst = np.max([p.held_out(np.array(RIDGES)) for p in products], axis=0)
+    best = int(np.argmin(worst))
+    return float(worst[best]), RIDGES[best]

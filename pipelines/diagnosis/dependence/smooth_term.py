@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.dependence.explained_share import VARIABLES, Together, Variable, parts_of_period, pooled
 from pipelines.diagnosis.dependence.smooth_curve import Curve, fold_products, held_out_error
-from pipelines.diagnosis.evidence.observed_run import FOLDS, Run
+from pipelines.diagnosis.evidence.observed_run import Run
 
 EARNED = 0.05
 """Share of a residual's square that a surface must foretell to be there."""
@@ -102,10 +102,10 @@ def _best(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surface 
 def _surface(variables: Sequence[Variable], runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surface:
     curve, kinds = Curve.along(variables, runs, j), list(dict.fromkeys(run.motion.run for run in runs))
     y, design = pooled(runs, residuals, j), pooled(runs, [curve.design(run) for run in runs], j)
-    dealt = [[run.fold for run in runs], [parts_of_period(run) for run in runs]]
+    ways = [[run.fold for run in runs], [parts_of_period(run) for run in runs]]
     if len(kinds) > 1:
-        dealt.append([np.full(len(run.time), kinds.index(run.motion.run)) for run in runs])
-    products = [fold_products(design, y, pooled(runs, folds, j)) for folds in dealt]
+        ways.append([np.full(len(run.time), kinds.index(run.motion.run)) for run in runs])
+    products = fold_products(design, y, [pooled(runs, folds, j) for folds in ways])
     error, ridge = held_out_error(products)
-    values, share = products[0].solve(range(FOLDS), ridge), 1.0 - error / float(y @ y)
+    values, share = products[0].fitted(ridge), 1.0 - error / float(y @ y)
     return Surface(runs[0].motion.joints[j], tuple(kinds), curve, values, share)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates.candidate import Candidate, lowest
+from pipelines.diagnosis.candidates.candidate_rows import RELAXATION
 from pipelines.diagnosis.candidates.shape_refinement import changed, free_shapes, unit_at
 from pipelines.diagnosis.evidence.baseline import Baseline, with_load
 from pipelines.diagnosis.evidence.baseline_columns import gram_of_runs
@@ -42,7 +43,7 @@ class Refinement:
         made = [best]
         for _ in range(ROUNDS if causes else 0):
             # The bodies of the fit before were biased by what was missing, and so were the loads.
-            loads = best.values
+            loads = self._loads_after(best)
             runs = self._laden(loads)
             start = self._fit(best.causes, runs, loads)
             ahead = self._round(start, runs)
@@ -59,6 +60,13 @@ class Refinement:
             return self._fit(causes, self._runs, None)
         loads = np.array(bodies)
         return self._fit(causes, self._laden(loads), loads)
+
+    def _loads_after(self, best: Fit) -> NDArray:
+        """Return the values (size,) whose bodies the loads of the round after a fit are of."""
+        found = best.values[: self._baseline.size]
+        if best.loads is None:
+            return found
+        return RELAXATION * found + (1.0 - RELAXATION) * best.loads[: self._baseline.size]
 
     def _laden(self, loads: NDArray) -> list[Run]:
         """Return the runs with the loads of the rigid bodies in a fit's values."""
