@@ -16,10 +16,13 @@ from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.mechanics.motion import CUFFS, Motion, motion_from_table
+from pipelines.mechanics.read import read_motions
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
 from pipelines.settings.filter import FilterSettings
 from pipelines.settings.plant import PlantSettings
+from tests.blind.cases import case
+from tests.blind.examine import Folders, neutral_name, prepare
 from tests.effects.catalogue import TERMS
 
 RICH = FourierTrajectory(
@@ -259,6 +262,15 @@ def test_a_torque_in_another_unit_is_named_with_the_unit(session, joint, factor,
     fault = only_fault(session)
     assert fault.channel == name and "unit" in fault.what
     assert unit in fault.what
+
+
+def test_drag_at_a_hip_that_hides_its_shank_is_no_other_unit(tmp_path):
+    """Drag leaves so much freedom that the hip may carry no shank at all; it carries one as well."""
+    hidden, folders = case(160_008, "single", 8), Folders(tmp_path)
+    prepare(hidden, folders)
+    assert hidden.hidden == (("quadratic_drag", 0),)
+    files = sorted(folders.recordings(neutral_name(hidden)).glob("*.parquet"))
+    assert not find_faults(read_motions(files, FilterSettings(), None))
 
 
 def test_an_angle_in_degrees_is_named(session):

@@ -82,6 +82,23 @@ def fit(
     typer.echo(json.dumps(result["criteria"], indent=1))
 
 
+@app.command("cross-validate")
+def cross_validate(
+    out: OUT = HERE,
+    most: Annotated[int, typer.Option(help="Sessions at most, of each world.")] = 1000,
+    workers: Annotated[int, typer.Option(min=1)] = os.cpu_count() or 1,
+) -> None:
+    """Learn without each world, and without each fold of forms, and judge on what was left out."""
+    from tests.learn.cross_validation import cross_validated
+
+    for variable in ONE_THREAD:
+        os.environ[variable] = "1"
+    typer.echo("| left out | learned from | judged on | learned without it | as shipped |\n|---|---|---|---|---|")
+    for part in cross_validated(out.resolve(), most, workers, CRITERIA):
+        cells = part.name, part.learned_from, part.judged_on, f"{part.learned:.2f}", f"{part.shipped:.2f}"
+        typer.echo(f"| {' | '.join(map(str, cells))} |")
+
+
 @app.command()
 def sensitivity(
     out: OUT = HERE,

@@ -35,7 +35,7 @@ def learn(
         with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
             sessions = list(sessions_of(root, worlds, left_out, most, pool, criteria))
         weigh = LogEvidence(sessions, workers)
-        criteria, before, after = _ascended(weigh, sets_of(sessions), criteria)
+        criteria, before, after = ascended(weigh, sets_of(sessions), criteria)
         weigh.close()
         history.append({"sessions": len(sessions), "before": before, "after": after})
         print(f"{len(sessions)} sessions: {before:.4f} -> {after:.4f}", flush=True)
@@ -86,7 +86,7 @@ def _weights(sessions: Sequence[Session]) -> NDArray:
     return np.array([1.0 / (len(counts) * counts[world]) for world in worlds])
 
 
-def _ascended(weigh: LogEvidence, sets: Sets, criteria: Criteria) -> tuple[Criteria, float, float]:
+def ascended(weigh: LogEvidence, sets: Sets, criteria: Criteria) -> tuple[Criteria, float, float]:
     """Return the best criteria found, and the scores at first and at last."""
     prior = weights(criteria)
     first = float(sets.weights @ sets.scores(weigh(criteria), prior))

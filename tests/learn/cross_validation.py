@@ -1,0 +1,75 @@
+"""Criteria learned without a world, or without a third of all forms, and judged on what was left out."""
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, fields, replace
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+from pipelines.diagnosis.criteria import HELD, Criteria
+from pipelines.diagnosis.selection.prior import FEATURES, weights
+from tests.blind.splits import FOLDS, fold_of
+from tests.learn.learning import ascended, sessions_of, sets_of
+from tests.learn.objective import LogEvidence, Session
+from tests.learn.vector import from_vector, to_vector
+
+AWAY = 2.0
+"""Factor by which each criterion is off where learning starts: none may be right because it was right before."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """What was left out, and how well the truth of it is told."""
+
+    name: str
+    learned_from: int
+    judged_on: int
+    learned: float
+    """Mean log probability of the truth, by criteria that never saw the part."""
+    shipped: float
+    """The same, by the criteria that exoid has, which were learned from all worlds and forms."""
+
+
+def cross_validated(root: Path, most: int, workers: int, shipped: Criteria) -> Iterator[Part]:
+    """Yield each part that is left out in turn: every world, then every fold of forms."""
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+        sessions = list(sessions_of(root, (), set(), most, pool, shipped))
+    for name, held in parts(sessions):
+        rest = [session for session in sessions if session not in held]
+        learned = _learned(rest, workers, shipped)
+        scores = [_score(held, workers, criteria) for criteria in (learned, replace(shipped, base_rate=0.0))]
+        yield Part(name, len(rest), len(held), *scores)
+
+
+def parts(sessions: Sequence[Session]) -> Iterator[tuple[str, list[Session]]]:
+    """Yield the name and the sessions of each part that there is."""
+    for world in sorted({session.world for session in sessions}):
+        yield f"world {world}", [session for session in sessions if session.world == world]
+    for fold in range(FOLDS):
+        yield f"forms of fold {fold}", [session for session in sessions if fold in _folds(session)]
+
+
+def _folds(session: Session) -> set[int | None]:
+    return {fold_of(one["effect"], one["form"]) for one in session.truth["hidden"]}
+
+
+def away(criteria: Criteria) -> Criteria:
+    """Return criteria whose learned numbers are all off, and whose prior knows nothing."""
+    ignorant = {f.name: 0.0 for f in fields(Criteria) if f.name in FEATURES and f.name not in HELD}
+    return replace(from_vector(to_vector(criteria) + np.log(AWAY), criteria), base_rate=0.0, **ignorant)
+
+
+def _learned(sessions: Sequence[Session], workers: int, shipped: Criteria) -> Criteria:
+    weigh = LogEvidence(sessions, workers)
+    learned, *_ = ascended(weigh, sets_of(sessions), away(shipped))
+    weigh.close()
+    return learned
+
+
+def _score(sessions: Sequence[Session], workers: int, criteria: Criteria) -> float:
+    weigh, sets = LogEvidence(sessions, workers), sets_of(sessions)
+    scores = sets.scores(weigh(criteria), weights(criteria))
+    weigh.close()
+    return float(np.mean(scores))
