@@ -139,6 +139,16 @@ def test_a_floor_that_is_measured_or_a_small_share_is_taken_as_it_is(stuck, shar
     assert not any("noise floor" in caveat for caveat in told["caveats"])
 
 
+@pytest.mark.parametrize(("p", "told"), [(0.3, True), (0.04, False)])
+def test_what_comes_closest_is_said_where_nothing_is_likely_to_be_missing(stuck, p, told):
+    silent = nothing_missing(stuck, 0.05, from_periods=True)
+    elements = stuck.selected.posterior.elements
+    offset = next(i for i, element in enumerate(elements) if element.label == "torque_offset@knee")
+    weighed = Posterior(elements, ((), (offset,)), np.array([1.0 - p, p]))
+    said = verdict(replace(silent, selected=replace(silent.selected, posterior=weighed)))["finding"]
+    assert said.endswith("Torque offset at the knee (0.30) comes closest.") == told
+
+
 def test_the_torque_that_an_error_is_of_is_told_on_the_samples_of_the_error(stuck):
     squares = [run.measured[scored(run), :2] ** 2 for run in stuck.validate]
     measured = np.sqrt(np.concatenate(squares).mean(axis=0))

@@ -14,7 +14,7 @@ from pipelines.label import amount, cause_label, effect_told, in_words
 MENTIONED = 3
 """Tied causes in the summary; ``indistinguishable_from`` has all."""
 CLOSEST = 0.05
-"""Probability from which a listed cause is said to come closest."""
+"""Probability from which a cause is said to come closest."""
 LIKELY = 0.5
 """Probability from which an unlisted law is said to be it."""
 
@@ -86,8 +86,18 @@ def _nothing(d: Diagnosis) -> str:
         f"{the(joint)}, is {_size(d)}"
     )
     if hiding := floor_that_hides(d).get(joint):
-        return f"{said}, but the floor itself is {hiding:.0%} of the {effort}: little could show."
-    return f"{said}."
+        said += f", but the floor itself is {hiding:.0%} of the {effort}: little could show"
+    return f"{said}.{_dropped(d) or _nearest(d)}"
+
+
+def _nearest(d: Diagnosis) -> str:
+    """Say what comes closest where nothing is likely to be missing."""
+    weighed = d.selected.posterior
+    label, p = max(weighed.marginals.items(), key=lambda one: one[1], default=("", 0.0)) if weighed else ("", 0.0)
+    if p < CLOSEST:
+        return ""
+    words = label_in_words(label, d.baseline.machine)
+    return f" {words[:1].upper()}{words[1:]} ({p:.2f}) comes closest."
 
 
 def _unlisted(d: Diagnosis) -> str:
