@@ -168,7 +168,7 @@ def odds_in_words(d, rival):
 
 
 @pytest.mark.parametrize(
-    ("rival", "said"), [(0.024390, "40 times"), (0.2, "4 times"), (1e-4, "over 1000 times"), (0.0, None)]
+    ("rival", "said"), [(0.024390, "40 times"), (0.2, "4 times"), (1e-4, "over 1000 times"), (0.6, "no"), (0.0, None)]
 )
 def test_odds_are_those_among_listed_causes_and_beyond_a_thousand_not_told_by_a_figure(stuck, rival, said):
     told = odds_in_words(stuck, rival)

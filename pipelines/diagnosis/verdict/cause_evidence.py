@@ -76,5 +76,5 @@ def _next(d: Diagnosis, named: Named) -> str | None:
         return None
     rival, p = others[0]
     odds = named.probability / p
-    times = f"{odds:.3g} times" if odds < CERTAIN else f"over {CERTAIN:g} times"
+    times = "no" if odds <= 1.0 else f"{odds:.3g} times" if odds < CERTAIN else f"over {CERTAIN:g} times"
     return f"the next listed cause, {in_words(effect_labelled(rival))}, is {times} less likely"

@@ -29,8 +29,8 @@ STRUCTURAL: dict[frozenset[str], Tie] = {
         "record with another load as well, a person or a known weight, or put a spirit level on the base",
     ),
     frozenset({"torque_gain"}): Tie(
-        "without cuff forces only the ratio of the two joints' gains shows: one too high is the other too low",
-        "hang a known weight on each joint in turn; on an exoskeleton, record the cuff forces",
+        "where nothing else tells the load only the ratio of both gains shows: one too high is the other too low",
+        "hang a known weight on each joint in turn; or record the cuff forces, with and without the person",
     ),
     frozenset({"backlash", "encoder_offset"}): Tie(
         "while the load pushes to one side only, play shifts the angle by a constant half of it",
