@@ -81,16 +81,16 @@ def test_a_record_reads_as_it_was_written(tmp_path):
 def test_the_page_sets_what_was_measured_beside_what_was_asked_for():
     said = section(page([MIXED]), "What was asked for, and what was measured")
     assert (
-        "| single: right cause and joint first | >= 96 % | 50.0 % of 2 (9 to 91) | **no** |" in said
+        "| single: right cause and joint first | >= 93 % | 50.0 % of 2 (9 to 91) | **no** |" in said
     )
     assert "| false alarms, nothing hidden | <= 1 % | 0.0 % of 1 (0 to 79) | yes |" in said
     assert (
-        "| outside the catalogue: called unlisted | >= 80 % | 100.0 % of 1 (21 to 100) | yes |"
+        "| outside the catalogue: called unlisted | >= 85 % | 100.0 % of 1 (21 to 100) | yes |"
         in said
     )
     assert "| data fault named |  | no cases |  |" in said
     # (0.1² + 0.6² + 0.1²) / 3
-    assert "| Brier score | <= 0.05 | 0.127 | **no** |" in said
+    assert "| Brier score | <= 0.06 | 0.127 | **no** |" in said
 
 
 def test_the_page_says_that_seeds_were_never_tuned_on_only_where_that_is_so():
