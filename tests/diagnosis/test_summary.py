@@ -210,6 +210,18 @@ def test_a_gain_that_is_plainly_negative_is_not_called_chance(stuck):
     assert not any("chance" in said for said in (told["summary"], *told["causes"][0]["evidence"]))
 
 
+@pytest.mark.parametrize(("knee", "said"), [(1.9, False), (2.5, True)])
+def test_a_cause_that_does_not_help_its_own_joint_is_said_not_to(stuck, knee, said):
+    told = finding_in_words(with_errors(stuck, [0.5, 0.3], [0.9, 2.4], [0.5, knee]), [SPRING], None)
+    assert ("The knee's own error does not fall." in told) == said
+
+
+def test_of_tied_causes_the_first_is_what_was_fitted(stuck):
+    tied = SPRING | {"indistinguishable_from": [{"effect": "base_tilt", "joint": None}]}
+    d = with_errors(stuck, [0.5, 0.3], [0.6, 2.4], [0.5, 0.3])
+    assert "(together 0.97). With the first of them the knee's" in finding_in_words(d, [tied], None)
+
+
 def test_ties_are_one_answer_with_one_probability():
     tied = SPRING | {"indistinguishable_from": [{"effect": "base_tilt", "joint": None}]}
     assert _in_words(tied) == (

@@ -149,14 +149,29 @@ def _named(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
     most = int(((before**2 - after**2) / d.floor_rms**2).argmax())
     joint, machine = d.baseline.joints[most], d.baseline.machine
     gain = (
-        f"With {'it' if len(causes) == 1 else 'them'} {the(joint)}'s {machine.joint(joint).effort} "
+        f"With {_they(causes)} {the(joint)}'s {machine.joint(joint).effort} "
         f"error falls from {amount(machine, joint, before[most])}, "
         f"{before[most] / d.floor_rms[most]:.2f} times the noise floor, to "
         f"{amount(machine, joint, after[most])}, {_remains(d, most)}."
     )
     rest = [one for one in findings(d) if one["level"] != "cause"]
     also = "".join(f" Also missing: {one['words']} ({one['probability']:.2f})." for one in rest)
-    return f"Missing from the simulation: {named}. {gain}{also}{_dropped(d)}"
+    return f"Missing from the simulation: {named}. {gain}{_no_gain_at_its_own(d, causes)}{also}{_dropped(d)}"
+
+
+def _they(causes: list[dict[str, Any]]) -> str:
+    """Return what stands for the causes that were fitted; of those tied with one another the first is."""
+    if len(causes) > 1:
+        return "them"
+    return "the first of them" if causes[0]["indistinguishable_from"] else "it"
+
+
+def _no_gain_at_its_own(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
+    """Say at which joints that have a cause the error does not fall."""
+    joints, after, before = d.baseline.joints, d.after.errors.rms, d.before.errors.rms
+    with_one = {cause["joint"] for cause in causes}
+    none = [joint for j, joint in enumerate(joints) if joint in with_one and after[j] >= before[j]]
+    return "".join(f" {the(joint).capitalize()}'s own error does not fall." for joint in none)
 
 
 def _remains(d: Diagnosis, most: int) -> str:
