@@ -1,9 +1,6 @@
 """Which causes are named, and what could stand in their place: read off the posterior."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import dataclass
 
 from pipelines.diagnosis.selection.evidence import Element
 from pipelines.diagnosis.selection.posterior import Posterior, Set
@@ -39,21 +36,10 @@ class Answer:
     unlisted: float
     """Probability that an unlisted law is missing."""
 
-    def judged(self, ratios: Mapping[str, float]) -> "Answer":
-        """Return the answer after validation: a cause that harms there is less probable.
-
-        ``ratios`` are log likelihoods of the validation runs with a cause over those without it.
-        A cause that helps there gains nothing: the posterior has counted what it explains.
-        """
-        lowered = [
-            replace(
-                one, probability=_lowered(one.probability, ratios.get(one.element.label, 0.0)),
-                alone=_lowered(one.alone, ratios.get(one.element.label, 0.0)),
-            )
-            for one in self.named
-        ]  # fmt: skip
-        kept = [one for one in lowered if one.probability >= LIKELY]
-        return replace(self, named=tuple(sorted(kept, key=lambda one: -one.probability)))
+    @property
+    def labels(self) -> frozenset[str]:
+        """What is named."""
+        return frozenset(one.element.label for one in self.named)
 
 
 def answer_of(posterior: Posterior) -> Answer:
@@ -67,12 +53,6 @@ def answer_of(posterior: Posterior) -> Answer:
         if any(posterior.elements[i].is_law for i in chosen)
     )
     return Answer(tuple(sorted(named, key=lambda one: -one.probability)), posterior.nothing, unlisted)
-
-
-def _lowered(probability: float, ratio: float) -> float:
-    """Return a probability whose odds fall with a negative log likelihood ratio."""
-    odds = float(np.exp(min(ratio, 0.0))) * probability
-    return odds / (odds + 1.0 - probability) if odds > 0.0 else 0.0
 
 
 def _best(posterior: Posterior) -> Set:
@@ -96,9 +76,10 @@ def _named(posterior: Posterior, best: Set, i: int) -> Named:
     for labels, p in posterior.by_labels.items():
         if not rest <= labels:
             continue
-        # A set that holds the named cause holds nothing in its place.
-        others = labels - rest if element.label not in labels else {element.label}
-        for label in others & listed:
+        # A set that holds the named cause holds nothing in its place, and two causes are no single one in its place.
+        others = (labels - rest if element.label not in labels else {element.label}) & listed
+        if len(others) == 1:
+            (label,) = others
             in_place[label] = in_place.get(label, 0.0) + p
     least = TIED * in_place[element.label]
     ties = sorted(
