@@ -18,7 +18,7 @@ SESSIONS ?= 2000
 
 .DEFAULT_GOAL := help
 .PHONY: help all test test-slow invariants check format bench estimators real fuzz blind blind-full blind-machines blind-fixed blind-page
-.PHONY: evidence learn sensitivity docs lock clean install
+.PHONY: evidence learn cross-validation sensitivity docs lock clean install
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | sort | expand -t 12
@@ -85,6 +85,9 @@ evidence: $(INSTALLED) ## what the decision needs of SESSIONS simulated sessions
 
 learn: $(INSTALLED) ## learn the decision's criteria from that evidence, into build/learn/learned.json
 	$(BIN)/python -m tests.learn fit
+
+cross-validation: $(INSTALLED) ## learn the criteria without each world and each third of forms, and judge on these; hours
+	$(BIN)/python -m tests.learn cross-validate
 
 sensitivity: $(INSTALLED) ## measure on that evidence how much each criterion matters; `make docs` then writes docs/criteria.md
 	$(BIN)/python -m tests.learn sensitivity

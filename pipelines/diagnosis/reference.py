@@ -1,16 +1,18 @@
 """The page docs/criteria.md: the hyper-parameters of the decision, written from ``criteria.py`` itself.
 
 ``python -m pipelines.diagnosis.reference docs/criteria.md`` brings it up to date; what was measured
-with them (``make sensitivity``) stands in ``criteria_measured.json`` beside this file.
+with them (``make sensitivity``, ``make cross-validation``) stands in ``criteria_measured.json`` beside this file.
 """
 
 import ast
 import inspect
 import json
 import sys
+from collections.abc import Sequence
 from dataclasses import fields
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 from pipelines.diagnosis import criteria
 from pipelines.diagnosis.criteria import CRITERIA, HELD, Criteria
@@ -43,11 +45,9 @@ def reference() -> str:
     """Return the page as Markdown."""
     told = meanings()
     rows = [
-        f"| `{field.name}` | {_written(getattr(CRITERIA, field.name))} | {told[field.name]} |"
-        for field in fields(Criteria)
+        [f"`{field.name}`", _written(getattr(CRITERIA, field.name)), told[field.name]] for field in fields(Criteria)
     ]
-    table = "| name | value | meaning |\n|---|---|---|\n" + "\n".join(rows) + "\n"
-    return "\n".join([INTRODUCTION, table, *_measured()])
+    return "\n".join([INTRODUCTION, _table(["name", "value", "meaning"], rows), *_measured()])
 
 
 def _written(value: float | tuple[float, ...]) -> str:
@@ -56,14 +56,20 @@ def _written(value: float | tuple[float, ...]) -> str:
 
 
 def _measured() -> list[str]:
-    """Return what was measured with the values, if anything was."""
-    if not MEASURED.exists():
-        return []
-    measured = json.loads(MEASURED.read_text())
-    head = "| changed by 30 % | " + " | ".join(measured["columns"]) + " |\n"
-    line = "|---" * (len(measured["columns"]) + 1) + "|\n"
-    rows = "\n".join(f"| {row[0]} | " + " | ".join(row[1:]) + " |" for row in measured["rows"])
-    return [f"## How much each matters\n\n{measured['about']}\n", head + line + rows + "\n"]
+    """Return what was measured with the values, a section each."""
+    measured = json.loads(MEASURED.read_text(encoding="utf-8"))
+    return [f"## {title}\n\n{one['about']}\n\n{_table(one['columns'], one['rows'])}" for title, one in measured.items()]
+
+
+def keep(title: str, measured: dict[str, Any]) -> None:
+    """Write what was measured with the values as a section: ``about``, ``columns`` and ``rows``."""
+    told = json.loads(MEASURED.read_text(encoding="utf-8")) | {title: measured}
+    MEASURED.write_text(json.dumps(told, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    head = [columns, ["---"] * len(columns)]
+    return "".join(f"| {' | '.join(row)} |\n" for row in (*head, *rows))
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import numpy as np
 import typer
 
 from pipelines.diagnosis.criteria import CRITERIA
-from pipelines.diagnosis.reference import MEASURED
+from pipelines.diagnosis.reference import MEASURED, keep
 from tests.blind.seeds import RANGES
 from tests.learn.evidence import ONE_THREAD, write_evidence
 
@@ -88,15 +88,17 @@ def cross_validate(
     most: Annotated[int, typer.Option(help="Sessions at most, of each world.")] = 1000,
     workers: Annotated[int, typer.Option(min=1)] = os.cpu_count() or 1,
 ) -> None:
-    """Learn without each world, and without each fold of forms, and judge on what was left out."""
-    from tests.learn.cross_validation import cross_validated
+    """Learn without each world and each fold of forms, and judge on what was left out, for docs/criteria.md."""
+    from tests.learn.cross_validation import ABOUT, COLUMNS, TITLE, cross_validated
 
     for variable in ONE_THREAD:
         os.environ[variable] = "1"
-    typer.echo("| left out | learned from | judged on | learned without it | as shipped |\n|---|---|---|---|---|")
+    rows = []
     for part in cross_validated(out.resolve(), most, workers, CRITERIA):
-        cells = part.name, part.learned_from, part.judged_on, f"{part.learned:.2f}", f"{part.shipped:.2f}"
-        typer.echo(f"| {' | '.join(map(str, cells))} |")
+        rows.append(part.as_row())
+        typer.echo(" ".join(rows[-1]))
+    keep(TITLE, {"about": ABOUT.format(most=most), "columns": COLUMNS, "rows": rows})
+    typer.echo(f"written to {MEASURED}")
 
 
 @app.command()
@@ -107,13 +109,13 @@ def sensitivity(
     workers: Annotated[int, typer.Option(min=1)] = os.cpu_count() or 1,
 ) -> None:
     """Measure what a change of each criterion does, for docs/criteria.md."""
+    from tests.learn.sensitivity import TITLE
     from tests.learn.sensitivity import sensitivity as measured
 
     for variable in ONE_THREAD:
         os.environ[variable] = "1"
     chosen = [w for w in worlds.split(",") if w]
-    result = measured(out.resolve(), chosen, most, workers, CRITERIA)
-    MEASURED.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    keep(TITLE, measured(out.resolve(), chosen, most, workers, CRITERIA))
     typer.echo(f"written to {MEASURED}")
 
 

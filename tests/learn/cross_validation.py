@@ -15,6 +15,14 @@ from tests.learn.learning import ascended, sessions_of, sets_of
 from tests.learn.objective import LogEvidence, Session
 from tests.learn.vector import from_vector, to_vector
 
+TITLE = "Worlds and forms left out"
+COLUMNS = ("left out", "learned from", "judged on", "learned without it", "as shipped")
+ABOUT = """\
+Measured by `python -m tests.learn cross-validate --most {most}`. Each world, and each third of all forms that effects
+have in the worlds, is left out in turn: the criteria are learned anew from the other sessions, from a start at which
+each is off by a factor of two and the prior knows nothing, and judged on those left out. The numbers are the mean log
+probability of the truth, beside that of the criteria as shipped, which have seen all worlds and forms and many more
+sessions."""
 AWAY = 2.0
 """Factor by which each criterion is off where learning starts: none may be right because it was right before."""
 
@@ -30,6 +38,12 @@ class Part:
     """Mean log probability of the truth, by criteria that never saw the part."""
     shipped: float
     """The same, by the criteria that exoid has, which were learned from all worlds and forms."""
+
+    def as_row(self) -> list[str]:
+        """Return it as ``COLUMNS`` has it."""
+        return [
+            self.name, str(self.learned_from), str(self.judged_on), f"{self.learned:.2f}", f"{self.shipped:.2f}",
+        ]  # fmt: skip
 
 
 def cross_validated(root: Path, most: int, workers: int, shipped: Criteria) -> Iterator[Part]:

@@ -17,9 +17,10 @@ from tests.learn.objective import LogEvidence
 from tests.learn.prior_fit import Sets
 from tests.learn.vector import from_vector, names, to_vector
 
+TITLE = "How much each matters"
 CHANGE = 1.3
 """Factor by which a number is changed, up and down."""
-COLUMNS = ("ln p, larger", "ln p, smaller", "right first, larger", "right first, smaller")
+COLUMNS = ("changed by 30 %", "ln p, larger", "ln p, smaller", "right first, larger", "right first, smaller")
 ABOUT = """\
 Measured by `make sensitivity` on {sessions} simulated sessions whose evidence is stored. As they
 stand the criteria give the truth a mean log probability of {score:.3f}, and the most probable set

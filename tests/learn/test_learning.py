@@ -1,12 +1,15 @@
 """Learning raises the probability of the truth, and what it starts from comes back unchanged."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.selection.prior import FEATURES, weights
+from tests.blind.splits import forms_by_fold
+from tests.learn.cross_validation import AWAY, away, parts
 from tests.learn.prior_fit import Sets
 from tests.learn.search import ascend
 from tests.learn.sensitivity import CHANGE, changes, told_of
@@ -86,3 +89,24 @@ def test_a_cause_that_no_data_can_tell_from_the_hidden_one_is_as_right():
     offset = right_sets(truth("single", hidden("torque_offset", "knee")))
     assert offset(frozenset({"coulomb_asymmetry@knee"}))
     assert not offset(frozenset({"coulomb_asymmetry@hip"}))
+
+
+def held(world, *forms):
+    return SimpleNamespace(world=world, truth={"hidden": [{"effect": e, "form": f} for e, f in forms]})
+
+
+def test_each_world_and_each_fold_of_forms_is_left_out_once():
+    (one, *_), (other, *_), _ = (sorted(forms) for forms in forms_by_fold())
+    sessions = [held("planar", one), held("mujoco", other), held("mujoco", one, other), held("planar")]
+    left_out = dict(parts(sessions))
+    assert left_out["world planar"] == [sessions[0], sessions[3]]
+    assert left_out["forms of fold 0"] == [sessions[0], sessions[2]]
+    assert left_out["forms of fold 1"] == [sessions[1], sessions[2]]
+    assert left_out["forms of fold 2"] == []
+
+
+def test_learning_anew_starts_from_nothing_that_was_learned():
+    start = away(CRITERIA)
+    np.testing.assert_allclose(to_vector(start) - to_vector(CRITERIA), np.log(AWAY))
+    assert start.cause == start.law == start.further == 0.0
+    assert start.model_error == CRITERIA.model_error, "held numbers are not learned"
