@@ -58,17 +58,13 @@ class Criteria:
     """Share of a line's log likelihood ratio that counts for a ripple or a tone."""
     coherence: float = 0.451
     """Share of the cuffs' and drive's common scatter that counts for a voluntary torque."""
-    harm: float = -2.0
-    """Least log likelihood ratio with which validation runs speak against a cause that does harm there."""
 
 
-HELD = ("explained_share", "form_misfit", "model_error", "background_line", "each_run", "lines", "base_rate", "harm")
+HELD = ("explained_share", "form_misfit", "model_error", "background_line", "each_run", "lines", "base_rate")
 """What is not learned. The first two act before the evidence is stored; the sessions' mixture decides the last. The
 score is flat in the model error over a factor of three, under the larger of which a second cause beside a large one is
 lost, and in how much lines count over one of thirty. Drives that ripple by a percent of their torque, as good ones may,
 are too rare among the sessions to teach the size of a good rig's line: learned alone it called such ripple missing.
-So are sensors that are tared anew at each start, which labs have: their odds are of sessions that had more.
-The harm is counted: of 169 true causes that the training runs named 7 raised the error on validation runs, of 29 false
-ones 9."""
+So are sensors that are tared anew at each start, which labs have: their odds are of sessions that had more."""
 
 CRITERIA = Criteria()

@@ -138,28 +138,24 @@ def _judged(
 ) -> tuple[Selected, Validated, dict[str, Validated]]:
     """Return the causes that the validation runs leave named, fitted, and the same without each.
 
-    The most harmful cause is judged first, and what the posterior then names fitted anew: beside it,
-    what others do may seem to harm too.
+    The most harmful cause is dropped first and the rest fitted anew: beside it, what others do may
+    seem to harm too.
     """
-    trained, ratios, tried = selected, dict[str, float](), set[frozenset[str]]()
     while True:
         after, without = _fitted(selected, refine, prepared, before)
         # A torque whose size each run has for itself says nothing of another run.
         shared = {c.label for c in selected.candidates if not any(p.per_run for p in c.effect.linear)}
-        now = {
+        ratios = {
             label: log_likelihood_ratio(less, after, prepared.noise)
             for label, less in without.items()
             if label in shared
         }
-        judged, named = trained.judged(ratios | now), selected.answer.labels
-        if judged.answer.labels == named:
+        judged = selected.judged(ratios)
+        harmful = ratios.keys() - {one.element.label for one in judged.answer.named}
+        if not harmful:
             return judged, after, without
-        if named in tried:  # it was fitted before, and led back to itself
-            return selected, after, without
-        tried.add(named)
-        worst = min(now, key=lambda label: now[label])
-        ratios[worst] = now[worst]
-        selected = trained.judged(ratios)
+        worst = min(harmful, key=lambda label: ratios[label])
+        selected = selected.judged({worst: ratios[worst]})
 
 
 def _fitted(

@@ -1,7 +1,7 @@
 """The result of a diagnosis: everything that a verdict is written from."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -20,7 +20,7 @@ from pipelines.diagnosis.fit.presliding_test import BuildUp
 from pipelines.diagnosis.fit.uncertainty import Uncertainty
 from pipelines.diagnosis.fit.validation import Validated, gains_of
 from pipelines.diagnosis.fit.validation_error import Gain, errors_of
-from pipelines.diagnosis.selection.answer import LIKELY, Answer, Named, answer_of
+from pipelines.diagnosis.selection.answer import LIKELY, Answer, Named
 from pipelines.diagnosis.selection.evidence import Evidence
 from pipelines.diagnosis.selection.findings import Finding, findings
 from pipelines.diagnosis.selection.posterior import Posterior
@@ -49,8 +49,6 @@ class Selected:
     findings: tuple[Finding, ...]
     router: tuple[ResidualShares, ...]
     """Of each joint: how its residual repeats."""
-    ratios: dict[str, float] = field(default_factory=dict)
-    """Log likelihood of the validation runs with a cause over that without it, of the causes that were fitted."""
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
@@ -63,10 +61,8 @@ class Selected:
         """Return the same after the validation runs, log likelihood ratios of causes by label."""
         if self.posterior is None or not ratios:
             return self
-        weighed = self.posterior.judged(ratios)
-        answer = answer_of(weighed)
-        found = tuple(findings(weighed, answer))
-        return replace(self, posterior=weighed, answer=answer, findings=found, ratios=dict(ratios))
+        answer = self.answer.judged(ratios)
+        return replace(self, answer=answer, findings=tuple(findings(self.posterior, answer)))
 
 
 @dataclass(frozen=True)

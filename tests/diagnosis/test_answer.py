@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.selection.answer import answer_of
 from pipelines.diagnosis.selection.evidence import Element
 from pipelines.diagnosis.selection.findings import findings
@@ -133,26 +132,17 @@ def test_nothing_missing_has_no_findings():
 
 
 def test_validation_lowers_a_cause_that_harms_and_raises_none():
-    trained = weighed(_02=0.8, _0=0.2)
-    helped = trained.judged({"parallel_spring@knee": 40.0, "quadratic_drag@hip": 9.0})
-    assert helped.by_labels == pytest.approx(trained.by_labels)
-    harmed = trained.judged({"parallel_spring@knee": 40.0, "quadratic_drag@hip": -6.0})
-    assert answer_of(harmed).labels == {"parallel_spring@knee"}
-    assert harmed.by_labels == pytest.approx(trained.judged({"quadratic_drag@hip": -600.0}).by_labels)
-    doubted = answer_of(trained.judged({"quadratic_drag@hip": -1.0}))
+    answer = answer_of(weighed(_02=0.95, _0=0.05))
+    helped = answer.judged({"parallel_spring@knee": 40.0, "quadratic_drag@hip": 9.0})
+    assert [one.probability for one in helped.named] == [one.probability for one in answer.named]
+    harmed = answer.judged({"parallel_spring@knee": 40.0, "quadratic_drag@hip": -6.0})
+    assert [one.element.label for one in harmed.named] == ["parallel_spring@knee"]
+    doubted = answer.judged({"quadratic_drag@hip": -1.0})
     (drag,) = [one for one in doubted.named if one.element.label == "quadratic_drag@hip"]
-    assert 0.5 < drag.probability < 0.8
+    assert 0.5 < drag.probability < 0.95
 
 
-def test_of_a_true_cause_in_another_form_validation_takes_no_more_than_it_does_on_average():
-    """One that is sure enough from the training runs stays named."""
-    named = answer_of(weighed(_02=0.95, _0=0.05).judged({"quadratic_drag@hip": -600.0}))
-    assert named.labels == {"parallel_spring@knee", "quadratic_drag@hip"}
-
-
-def test_what_harms_on_the_validation_runs_leaves_its_place_to_the_next():
-    """The posterior says what is likely instead; nothing of it is lost."""
-    trained = weighed(_0=0.60, _2=0.39, _=0.01)
-    (named,) = answer_of(trained.judged({"parallel_spring@knee": -6.0})).named
-    assert named.element.label == "quadratic_drag@hip"
-    assert named.alone == pytest.approx(0.39 / (0.40 + 0.60 * np.exp(CRITERIA.harm)))
+def test_two_causes_that_stand_for_one_are_no_ties_of_it():
+    """Each of them explains a part; neither is what cannot be told from the named one."""
+    (named,) = answer_of(weighed(_0=0.5, _2=0.2, _45=0.3)).named
+    assert [label for label, _ in named.ties] == ["quadratic_drag@hip"]

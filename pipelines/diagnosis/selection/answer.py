@@ -1,6 +1,9 @@
 """Which causes are named, and what could stand in their place: read off the posterior."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from pipelines.diagnosis.selection.evidence import Element
 from pipelines.diagnosis.selection.posterior import Posterior, Set
@@ -36,10 +39,21 @@ class Answer:
     unlisted: float
     """Probability that an unlisted law is missing."""
 
-    @property
-    def labels(self) -> frozenset[str]:
-        """What is named."""
-        return frozenset(one.element.label for one in self.named)
+    def judged(self, ratios: Mapping[str, float]) -> "Answer":
+        """Return the answer after validation: a cause that harms there is less probable.
+
+        ``ratios`` are log likelihoods of the validation runs with a cause over those without it.
+        A cause that helps there gains nothing: the posterior has counted what it explains.
+        """
+        lowered = [
+            replace(
+                one, probability=_lowered(one.probability, ratios.get(one.element.label, 0.0)),
+                alone=_lowered(one.alone, ratios.get(one.element.label, 0.0)),
+            )
+            for one in self.named
+        ]  # fmt: skip
+        kept = [one for one in lowered if one.probability >= LIKELY]
+        return replace(self, named=tuple(sorted(kept, key=lambda one: -one.probability)))
 
 
 def answer_of(posterior: Posterior) -> Answer:
@@ -53,6 +67,12 @@ def answer_of(posterior: Posterior) -> Answer:
         if any(posterior.elements[i].is_law for i in chosen)
     )
     return Answer(tuple(sorted(named, key=lambda one: -one.probability)), posterior.nothing, unlisted)
+
+
+def _lowered(probability: float, ratio: float) -> float:
+    """Return a probability whose odds fall with a negative log likelihood ratio."""
+    odds = float(np.exp(min(ratio, 0.0))) * probability
+    return odds / (odds + 1.0 - probability) if odds > 0.0 else 0.0
 
 
 def _best(posterior: Posterior) -> Set:

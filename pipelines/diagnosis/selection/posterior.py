@@ -5,7 +5,7 @@ full; triples extend the best pairs. What is reported are marginals: of nothing 
 cause, of something unlisted, of each family at each joint.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -47,20 +47,6 @@ class Posterior:
     """By falling probability."""
     probabilities: NDArray
     """(sets,); they add up to one."""
-
-    def judged(self, ratios: Mapping[str, float], criteria: Criteria = CRITERIA) -> "Posterior":
-        """Return the posterior after validation: sets with a cause that harms there are less probable.
-
-        ``ratios`` are log likelihoods of the validation runs with a cause over those without it, by label. A cause
-        that helps there gains nothing: the posterior has counted what it explains. One that harms may be the true one
-        in another form, and no harm speaks louder than the criteria say.
-        """
-        against = {label: min(max(ratio, criteria.harm), 0.0) for label, ratio in ratios.items()}
-        harm = np.array([against.get(element.label, 0.0) for element in self.elements])
-        lost = np.array([harm[list(chosen)].sum() for chosen in self.sets])
-        p = self.probabilities * np.exp(lost - lost.max())
-        order = np.argsort(-p, kind="stable")
-        return Posterior(self.elements, tuple(self.sets[n] for n in order), p[order] / p.sum())
 
     @cached_property
     def by_labels(self) -> dict[frozenset[str], float]:

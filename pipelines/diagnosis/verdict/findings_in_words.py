@@ -6,6 +6,7 @@ from typing import Any
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.candidates.smooth_laws import IN_WORDS
 from pipelines.diagnosis.diagnosis import Diagnosis
+from pipelines.diagnosis.selection.answer import answer_of
 from pipelines.diagnosis.selection.findings import Finding
 from pipelines.diagnosis.selection.posterior import Posterior
 from pipelines.label import effect_labelled, in_words
@@ -36,7 +37,10 @@ def findings(d: Diagnosis) -> list[dict[str, Any]]:
 
 def dropped(d: Diagnosis) -> frozenset[str]:
     """Return labels that the training runs would name, and the validation runs speak against."""
-    return frozenset(label for label, ratio in d.selected.ratios.items() if ratio < 0.0) - set(d.causes)
+    weighed = d.selected.posterior
+    if weighed is None:
+        return frozenset()
+    return frozenset(one.element.label for one in answer_of(weighed).named) - set(d.causes)
 
 
 def label_in_words(label: str, machine: Machine) -> str:
