@@ -213,7 +213,12 @@ def test_a_gain_that_is_plainly_negative_is_not_called_chance(stuck):
 @pytest.mark.parametrize(("knee", "said"), [(1.9, False), (2.5, True)])
 def test_a_cause_that_does_not_help_its_own_joint_is_said_not_to(stuck, knee, said):
     told = finding_in_words(with_errors(stuck, [0.5, 0.3], [0.9, 2.4], [0.5, knee]), [SPRING], None)
-    assert ("The knee's own error does not fall." in told) == said
+    assert ("At the knee, where a cause is named, the error does not fall." in told) == said
+
+
+def test_an_error_that_grows_is_not_said_to_fall(stuck):
+    told = finding_in_words(with_errors(stuck, [0.5, 0.3], [0.9, 2.4], [1.5, 2.5]), [SPRING], None)
+    assert "error rises from 2.40 N·m" in told and "falls" not in told
 
 
 def test_of_tied_causes_the_first_is_what_was_fitted(stuck):

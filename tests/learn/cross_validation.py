@@ -19,10 +19,11 @@ TITLE = "Worlds and forms left out"
 COLUMNS = ("left out", "learned from", "judged on", "learned without it", "as shipped")
 ABOUT = """\
 Measured by `python -m tests.learn cross-validate --most {most}`. Each world, and each third of all forms that effects
-have in the worlds, is left out in turn: the criteria are learned anew from the other sessions, from a start at which
-each is off by a factor of two and the prior knows nothing, and judged on those left out. The numbers are the mean log
-probability of the truth, beside that of the criteria as shipped, which have seen all worlds and forms and many more
-sessions."""
+have in the worlds, is left out in turn: the criteria are learned anew from the other sessions and judged on those left
+out. Each learned number starts at twice its shipped value, the prior's learned odds at zero. Numbers that are not
+learned, and the choice of the sets that are compared, are those of the shipped criteria, which saw all sessions: what
+is left out is not wholly unseen. The numbers are the mean log probability of the truth, beside that of the criteria
+as shipped."""
 AWAY = 2.0
 """Factor by which each criterion is off where learning starts: none may be right because it was right before."""
 
@@ -70,7 +71,7 @@ def _folds(session: Session) -> set[int | None]:
 
 
 def away(criteria: Criteria) -> Criteria:
-    """Return criteria whose learned numbers are all off, and whose prior knows nothing."""
+    """Return criteria with all learned numbers doubled, and the prior's learned odds at zero."""
     ignorant = {f.name: 0.0 for f in fields(Criteria) if f.name in FEATURES and f.name not in HELD}
     return replace(from_vector(to_vector(criteria) + np.log(AWAY), criteria), base_rate=0.0, **ignorant)
 

@@ -61,11 +61,6 @@ class Candidate:
         return self.with_own(i, [value if runs is None or r in runs else now[i] for r, now in enumerate(self.shapes)])
 
     @property
-    def form(self) -> tuple[float, ...]:
-        """Values of the shape parameters whose values are forms."""
-        return tuple(v for p, v in zip(self.effect.shape, self.shapes[0], strict=True) if p.forms)
-
-    @property
     def bends(self) -> bool:
         """Whether the effect changes kinematics or readings rather than adding torque of its own."""
         return bends_motion(self.effect)

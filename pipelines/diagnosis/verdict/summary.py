@@ -150,7 +150,7 @@ def _named(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
     joint, machine = d.baseline.joints[most], d.baseline.machine
     gain = (
         f"With {_they(causes)} {the(joint)}'s {machine.joint(joint).effort} "
-        f"error falls from {amount(machine, joint, before[most])}, "
+        f"error {'falls' if after[most] < before[most] else 'rises'} from {amount(machine, joint, before[most])}, "
         f"{before[most] / d.floor_rms[most]:.2f} times the noise floor, to "
         f"{amount(machine, joint, after[most])}, {_remains(d, most)}."
     )
@@ -171,7 +171,7 @@ def _no_gain_at_its_own(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
     joints, after, before = d.baseline.joints, d.after.errors.rms, d.before.errors.rms
     with_one = {cause["joint"] for cause in causes}
     none = [joint for j, joint in enumerate(joints) if joint in with_one and after[j] >= before[j]]
-    return "".join(f" {the(joint).capitalize()}'s own error does not fall." for joint in none)
+    return "".join(f" At {the(joint)}, where a cause is named, the error does not fall." for joint in none)
 
 
 def _remains(d: Diagnosis, most: int) -> str:
