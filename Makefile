@@ -86,7 +86,7 @@ evidence: $(INSTALLED) ## what the decision needs of SESSIONS simulated sessions
 learn: $(INSTALLED) ## learn the decision's criteria from that evidence, into build/learn/learned.json
 	$(BIN)/python -m tests.learn fit
 
-cross-validation: $(INSTALLED) ## learn the criteria without each world and each third of forms, and judge on these; hours
+cross-validation: $(INSTALLED) ## learn the criteria without each world and each third of the forms, and judge them on what was left out; hours
 	$(BIN)/python -m tests.learn cross-validate
 
 sensitivity: $(INSTALLED) ## measure on that evidence how much each criterion matters; `make docs` then writes docs/criteria.md

@@ -224,8 +224,6 @@ class Effect(ABC):
     """Relative standard error that the effect's approximation of itself adds to its first shape, whatever the data."""
     may_differ: ClassVar[str] = ""
     """What is set anew at every start, so that each run may have another; empty where all runs share it."""
-    more_than: ClassVar[str] = ""
-    """The effect that it is, in every run for itself, where what else it has is nought."""
     at_cuff: ClassVar[bool] = False
     """True where ``spring`` stands between machine and limb, not between motor and link."""
     swings: ClassVar[bool] = False

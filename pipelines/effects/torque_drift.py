@@ -25,7 +25,6 @@ class TorqueDrift(Effect):
         Parameter("level", "N·m", "offset when the run begins", "o", (-4.0, 4.0), per_run=True, default=0.0),
     )
     parity = Parity.EVEN
-    more_than = "torque_offset"
 
     def __post_init__(self) -> None:
         """Take the level as nought where the mechanism's own parameters take up a constant torque."""

@@ -40,7 +40,7 @@ class Load(NamedTuple):
 class LoadColumns:
     """A body's load along a motion (n, J), per unit of each of its p inertial parameters.
 
-    The slopes are computed once, and only where something swings: they are many times as large as the motion.
+    Each is computed once. The slopes are many times as large as the motion, so only where something swings.
     """
 
     mechanism: Mechanism
@@ -49,7 +49,7 @@ class LoadColumns:
     ddq: NDArray
     geometry: Geometry
 
-    @property
+    @cached_property
     def torque(self) -> NDArray:
         """The torque itself, (n, J, p)."""
         return self._torque(self.q, self.dq, self.ddq)

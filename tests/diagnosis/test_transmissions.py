@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.candidates.candidate import Candidate
-from pipelines.diagnosis.candidates.library import transmission
+from pipelines.diagnosis.candidates.library import best_transmission
 from pipelines.effects import Backlash, JointElasticity
 from tests.diagnosis.screening import Screening
 from tests.diagnosis.sessions import session
@@ -48,19 +48,28 @@ def test_bodies_that_explain_no_more_are_not_taken(soft):
     assert settled.gain_as_is >= start.gain_as_is
 
 
-def test_a_spring_that_hardens_is_found_in_its_own_form():
+@pytest.fixture(scope="module")
+def hardening():
+    """The shape that is found of a soft spring that hardens."""
     look = Screening.of(session("joint_elasticity", "knee", stiffness=SOFT, hardening=HARDENING))
-    best, _ = transmission(look.fits(JointElasticity("knee")), look.alone)
-    stiffness, hardening = best.candidate.shapes[0]
-    assert hardening == HARDENING
-    # The swing's added damping makes a soft spring come out too stiff, within what is stated for it.
-    assert stiffness == pytest.approx(SOFT, rel=2.0 * JointElasticity.known_to)
+    best, _ = best_transmission(look.fits(JointElasticity("knee")), look.alone)
+    return best.candidate.shapes[0]
+
+
+def test_a_spring_that_hardens_is_found_in_its_own_form(hardening):
+    assert hardening[1] == HARDENING
+    assert hardening[0] == pytest.approx(SOFT, rel=2.0 * JointElasticity.known_to)
+
+
+@pytest.mark.xfail(strict=True, reason="the damping added to the swing makes a soft spring come out 14 % too stiff")
+def test_a_spring_that_hardens_is_found_within_a_tenth(hardening):
+    assert hardening[0] == pytest.approx(SOFT, rel=0.1)
 
 
 @pytest.mark.parametrize("joint", ["hip", "knee"])
 def test_the_play_of_teeth_is_found(joint):
     look = Screening.of(session("backlash", joint, play=PLAY, contact_stiffness=4000.0))
-    best, _ = transmission(look.fits(Backlash(joint)), look.alone)
+    best, _ = best_transmission(look.fits(Backlash(joint)), look.alone)
     assert best.candidate.shapes[0][0] == pytest.approx(PLAY, rel=0.25)
 
 

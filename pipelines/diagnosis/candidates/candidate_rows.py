@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates.candidate import TURNS, Candidate
 from pipelines.diagnosis.candidates.columns import torque_columns
-from pipelines.diagnosis.evidence.baseline import Baseline, with_load
+from pipelines.diagnosis.evidence.baseline import Baseline, relaxed, with_load
 from pipelines.diagnosis.evidence.baseline_columns import columns_under
 from pipelines.diagnosis.evidence.block_rate import at_block_rate
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
@@ -20,9 +20,6 @@ from pipelines.diagnosis.evidence.observed_run import Run
 
 LONGEST_STEP = 0.5
 """Angle of a wave from block to block, rad, above which block averages do not follow it."""
-RELAXATION = 0.5
-"""Share of the way to the rigid bodies of a refit: behind a soft spring heavier bodies make the refit find lighter
-ones, and the whole way leads past them for ever."""
 RIDGE = 1e-10
 """Relative to a column's square: keeps a refit of nearly dependent columns finite."""
 
@@ -64,14 +61,18 @@ class CandidateRows:
         return rows if np.isfinite(rows).all() else None
 
     def with_refitted_bodies(self, candidate: Candidate, beside: NDArray | None = None) -> Candidate:
-        """Return a transmission with the rigid bodies that a fit of baseline and transmission finds.
+        """Return a transmission with the rigid bodies of a fit of baseline and transmission together.
 
-        A fit of the baseline alone is biased by what is missing. ``beside`` (N, b) is as in a call.
+        A fit of the baseline alone is biased by the missing transmission.
+
+        Parameters
+        ----------
+        beside : (N, b) array, optional
+            Rows of what else is fitted with them.
         """
-        _, values = self._change(candidate, beside)
-        if candidate.bodies:
-            values = RELAXATION * values + (1.0 - RELAXATION) * np.array(candidate.bodies)
-        return replace(candidate, bodies=tuple(values.tolist()))
+        _, refitted = self._change(candidate, beside)
+        bodies = relaxed(refitted, np.array(candidate.bodies) if candidate.bodies else None)
+        return replace(candidate, bodies=tuple(bodies.tolist()))
 
     def _laden(self, candidate: Candidate) -> list[Run]:
         """Return the runs with the loads of a candidate's rigid bodies."""
@@ -109,10 +110,10 @@ class CandidateRows:
         """Return the change of the baseline's prediction by a transformed motion, (N, 1), and its values then, (b,)."""
         last = self._last_change
         if last is None or last[0] != candidate or last[1] is not beside:  # its rows are asked for, then its bodies
-            last = self._last_change = candidate, beside, self._changed(candidate, beside)
+            last = self._last_change = candidate, beside, self._compute_change(candidate, beside)
         return last[2]
 
-    def _changed(self, candidate: Candidate, beside: NDArray | None) -> tuple[NDArray, NDArray]:
+    def _compute_change(self, candidate: Candidate, beside: NDArray | None) -> tuple[NDArray, NDArray]:
         regression, runs = self._regression, self._laden(candidate)
         acting = [candidate.effect.explains(run.motion) for run in runs]
         made = [

@@ -189,7 +189,7 @@ def _shapes(fits: Sequence[Fitted], alone: ShapeRefinement, regression: Decision
     if not fits:
         return []
     swings = fits[0].candidate.effect.swings
-    best, slopes = transmission(fits, alone) if swings else alone.refined(fits[0])
+    best, slopes = best_transmission(fits, alone) if swings else alone.refined(fits[0])
     others = others_of(fits, best, ALTERNATIVES)
     slopes = np.hstack([slopes, towards(best, others)])
     shaped = [Cause.of(best, slopes, regression, first=True)]
@@ -198,11 +198,11 @@ def _shapes(fits: Sequence[Fitted], alone: ShapeRefinement, regression: Decision
     return [cause for cause in shaped if cause is not None]
 
 
-def transmission(fits: Sequence[Fitted], alone: ShapeRefinement) -> tuple[Fitted, NDArray]:
+def best_transmission(fits: Sequence[Fitted], alone: ShapeRefinement) -> tuple[Fitted, NDArray]:
     """Return a transmission at its best shape, refined from several starts, and its slopes there, (N, d).
 
-    Where a load swings there are many maxima, and which of two is the higher one shows only after the bodies are
-    fitted: the best on the baseline's bodies and the best on refitted ones are tried.
+    Where a load swings the likelihood has several maxima, and which is the highest shows only with refitted bodies:
+    the shape that is best with the baseline's bodies and the one that is best with refitted bodies are both refined.
     """
     plain = [fitted for fitted in fits if not fitted.candidate.bodies]
     refitted = [fitted for fitted in fits if fitted.candidate.bodies]

@@ -38,7 +38,7 @@ def screened(
         starts = [Candidate(effect, (shape,) * len(runs)) for shape in _grid(effect, runs, regression)]
     if effect.swings:
         # An amplitude would scale the twist, which the load does not follow.
-        fits = [fitted for start in starts for fitted in alone.transmission(start)]
+        fits = [fitted for start in starts for fitted in alone.fits_of_transmission(start)]
         return sorted(fits, key=lambda fitted: -fitted.gain_as_is)
     fits = [fitted for start in starts if (fitted := alone.fit(start)) is not None]
     return sorted(fits, key=lambda fitted: -fitted.gain)

@@ -131,15 +131,15 @@ class ShapeRefinement:
                 break
         return best, slopes
 
-    def transmission(self, candidate: Candidate) -> list[Fitted]:
-        """Fit a transmission on the baseline's bodies, and on those fitted beside it, where its rows are finite."""
+    def fits_of_transmission(self, candidate: Candidate) -> list[Fitted]:
+        """Fit a transmission with the baseline's rigid bodies and with refitted ones, where its rows are finite."""
         fits = [self.fit(candidate), self.fit(self._with_own_bodies(candidate))]
         return [fitted for fitted in fits if fitted is not None]
 
     def refined_transmission(self, start: Fitted) -> tuple[Fitted, NDArray]:
         """Return a transmission at its best shape, its bodies and shapes fitted in turn, and its slopes there, (N, d).
 
-        A refit of the bodies that does not explain more is left out.
+        The bodies are refitted before the shapes are refined. A later refit that does not explain more is left out.
         """
         best, slopes = self.refined(self.fit(self._with_own_bodies(start.candidate)) or start)
         for _ in range(BODY_REFITS):
@@ -151,6 +151,7 @@ class ShapeRefinement:
         return best, slopes
 
     def _with_own_bodies(self, candidate: Candidate) -> Candidate:
+        """Return a transmission with rigid bodies refitted at its shape."""
         for _ in range(BODY_REFITS):
             candidate = self._rows.with_refitted_bodies(candidate, self._beside)
         return candidate
@@ -207,11 +208,11 @@ class ShapeRefinement:
             value = now / amplitude if parameter.unit == STIFFNESS else now * amplitude
         else:
             value = parameter.neutral + amplitude * (now - parameter.neutral)
-        ahead = self.fit(self._settled(start.candidate.reshaped(0, float(np.clip(value, *reach(parameter))))))
+        ahead = self.fit(self._following(start.candidate.reshaped(0, float(np.clip(value, *reach(parameter))))))
         return start if ahead is None or ahead.gain_as_is < start.gain_as_is else ahead
 
-    def _settled(self, candidate: Candidate) -> Candidate:
-        """Return a candidate at a new shape, a transmission with the bodies that this shape asks for."""
+    def _following(self, candidate: Candidate) -> Candidate:
+        """Return a candidate at a new shape; a transmission with rigid bodies that follow it."""
         return self._rows.with_refitted_bodies(candidate, self._beside) if candidate.bodies else candidate
 
     def _slopes(self, fitted: Fitted, units: list[tuple[int, float]]) -> NDArray:
@@ -238,7 +239,7 @@ class ShapeRefinement:
             steps = length * solution[len(solution) - len(units) :]
             for (i, unit), step in zip(units, steps, strict=True):
                 candidate = changed(candidate, i, unit, float(step))
-            ahead = self.fit(self._settled(candidate))
+            ahead = self.fit(self._following(candidate))
             if ahead is not None and ahead.gain_as_is > fitted.gain_as_is:
                 return ahead
             length *= SHORTER

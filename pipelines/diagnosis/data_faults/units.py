@@ -159,17 +159,18 @@ def _against_the_other_joint(run: Averages) -> dict[int, tuple[float, str]]:
 def shank(run: Averages) -> tuple[float, float]:
     """Return the shank's mass moment from the knee's torque, kg·m, and how many times it the hip's torque carries.
 
-    That is once where the hip's torque is explained so: other physics of the hip can make any share of it
-    undetermined, but only another unit makes the same shank too heavy for the hip.
+    The multiple is 1 where the hip's torque can be explained with exactly this shank. Drag at the hip can leave the
+    multiple undetermined, but a wrong unit makes the shank too heavy for the hip.
     """
     at_knee = fit(run.joint_columns(1), run.torque[:, 1])[1]
     at_hip, torque = run.joint_columns(0), run.torque[:, 0]
     same_shank, others = at_hip[:, 1:3] @ at_knee[:2], at_hip[:, [0, 3, 4, 5, 6, 7]]
     times = float(fit(np.column_stack([same_shank, others]), torque)[1][0])
-    rest = torque - same_shank
-    left = fit(others, rest)[0] * float(rest @ rest)
-    carried = times < 1.0 and left < (1.0 - EXPLAINED) * float(torque @ torque)
-    return float(at_knee[1]), 1.0 if carried else times
+    if times < 1.0:
+        rest = torque - same_shank
+        residual = fit(others, rest)[0] * float(rest @ rest)
+        times = 1.0 if residual < (1.0 - EXPLAINED) * float(torque @ torque) else times
+    return float(at_knee[1]), times
 
 
 def _between_runs(runs: Sequence[Averages]) -> Iterator[Fault]:

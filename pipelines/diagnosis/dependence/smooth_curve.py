@@ -96,18 +96,18 @@ def _shrinkage(A: NDArray, ridges: NDArray) -> NDArray:
     return np.asarray(size)[..., np.newaxis, np.newaxis] * np.eye(A.shape[-1])
 
 
-def fold_products(design: NDArray, y: NDArray, ways: Sequence[NDArray]) -> list[Products]:
-    """Multiply out a design (n, k) and a residual (n,) whose rows are dealt out to folds (n,) in several ways.
+def fold_products(design: NDArray, y: NDArray, partitions: Sequence[NDArray]) -> list[Products]:
+    """Multiply out a design (n, k) and a residual (n,) for several partitions of the rows into folds (n,).
 
-    Rows that all ways deal out alike are multiplied out once.
+    Rows that all partitions put into the same folds are multiplied out once.
     """
-    cell = np.ravel_multi_index(tuple(ways), (FOLDS,) * len(ways))
+    cell = np.ravel_multi_index(tuple(partitions), (FOLDS,) * len(partitions))
     order = np.argsort(cell, kind="stable")
     cells, starts = np.unique(cell[order], return_index=True)
     parts = [(design[rows], y[rows]) for rows in np.split(order, starts[1:])]
     columns, right = np.array([A.T @ A for A, _ in parts]), np.array([A.T @ b for A, b in parts])
     square = np.array([b @ b for _, b in parts])
-    folds = np.array(np.unravel_index(cells, (FOLDS,) * len(ways)))
+    folds = np.array(np.unravel_index(cells, (FOLDS,) * len(partitions)))
     return [_summed(columns, right, square, own) for own in folds]
 
 
@@ -120,7 +120,7 @@ def _summed(columns: NDArray, right: NDArray, square: NDArray, fold: NDArray) ->
 def held_out_error(products: Sequence[Products]) -> tuple[float, float]:
     """Return the squared error on folds that were not fitted, and the ridge that makes it least.
 
-    Of several ways to deal out the folds the worst counts.
+    Of several partitions the worst counts.
     """
     worst = np.max([p.held_out(np.array(RIDGES)) for p in products], axis=0)
     best = int(np.argmin(worst))

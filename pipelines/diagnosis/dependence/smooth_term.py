@@ -102,10 +102,10 @@ def _best(runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surface 
 def _surface(variables: Sequence[Variable], runs: Sequence[Run], residuals: Sequence[NDArray], j: int) -> Surface:
     curve, kinds = Curve.along(variables, runs, j), list(dict.fromkeys(run.motion.run for run in runs))
     y, design = pooled(runs, residuals, j), pooled(runs, [curve.design(run) for run in runs], j)
-    ways = [[run.fold for run in runs], [parts_of_period(run) for run in runs]]
+    partitions = [[run.fold for run in runs], [parts_of_period(run) for run in runs]]
     if len(kinds) > 1:
-        ways.append([np.full(len(run.time), kinds.index(run.motion.run)) for run in runs])
-    products = fold_products(design, y, [pooled(runs, folds, j) for folds in ways])
+        partitions.append([np.full(len(run.time), kinds.index(run.motion.run)) for run in runs])
+    products = fold_products(design, y, [pooled(runs, folds, j) for folds in partitions])
     error, ridge = held_out_error(products)
     values, share = products[0].fitted(ridge), 1.0 - error / float(y @ y)
     return Surface(runs[0].motion.joints[j], tuple(kinds), curve, values, share)

@@ -16,6 +16,10 @@ from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.run import kinds_of
 from pipelines.model import Model, ParameterLayout, Term, baseline
 
+RELAXATION = 0.5
+"""Share of the step from a rigid body to a refitted one. Behind a soft spring a full step overshoots, and alternates
+between heavier and lighter bodies for ever."""
+
 
 @dataclass(frozen=True)
 class Baseline:
@@ -66,6 +70,11 @@ def like_trained(run: Run, baseline: Baseline) -> Run:
     usable = run.usable.copy()
     usable[:, len(baseline.joints) :] = False
     return replace(run, usable=usable)
+
+
+def relaxed(refitted: NDArray, before: NDArray | None) -> NDArray:
+    """Return baseline values (b,) part of the way from those before to refitted ones; the refitted ones without any."""
+    return refitted if before is None else RELAXATION * refitted + (1.0 - RELAXATION) * before
 
 
 def with_load(run: Run, baseline: Baseline, values: NDArray) -> Run:

@@ -14,13 +14,16 @@ from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.baseline_columns import columns_under
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit.change_point import Onset
-from pipelines.diagnosis.fit.joint_fit import NEWTON_STEPS, Fit, laden, step_of, within_reach
+from pipelines.diagnosis.fit.joint_fit import Fit, laden, step_of
+from pipelines.effects import Parameter
 from pipelines.model import Model, Term
 
 STRETCH_S = 1.0
 """Of every second stretch a run's own onsets and phases are learnt, to be scored on the others."""
 ROUNDS = 2
 """How often onsets are sought and all else fitted anew, for each is found with the others held."""
+NEWTON_STEPS = 3
+"""Of Gauss and Newton along what bends each run in its own way, which the torque is nearly linear in."""
 
 
 def evaluate(fit: Fit, runs: Sequence[Run], baseline: Baseline) -> list[NDArray]:
@@ -99,7 +102,7 @@ def _bent(
 ) -> tuple[list[Term], tuple[NDArray, NDArray]]:
     """Fit to some samples, (m, O), what bends the run in a way of its own; return the terms, and columns under them.
 
-    By Gauss and Newton's steps, as in ``fit.refined``; ``plain`` are the columns and torques under the terms as given.
+    By Gauss and Newton's steps; ``plain`` are the columns and torques under the terms as given.
     """
     shared, own = fit.layout.select(fit.values, None), fit.layout.per_run
     places = [(number, i) for number, cause in enumerate(fit.causes) if (i := cause.own_bend) is not None]
@@ -109,7 +112,7 @@ def _bent(
         wide = np.concatenate([columns[:, :, own], *slopes], axis=2)
         steps = _solved(wide, measured - columns @ shared, learnt, fit.weights)[int(own.sum()) :]
         for (number, i), step in zip(places, steps, strict=True):
-            value = within_reach(terms[number].shape[i] + step, fit.causes[number].effect.shape[i])
+            value = _within_reach(terms[number].shape[i] + step, fit.causes[number].effect.shape[i])
             terms = _with_shape(terms, number, i, value)
         plain = columns_under(terms, run, baseline)
     return terms, plain
@@ -137,3 +140,15 @@ def _slope(
 def _with_shape(terms: list[Term], number: int, i: int, value: float) -> list[Term]:
     """Return the terms with another shape of one of them."""
     return [term.with_shape(i, value) if k == number else term for k, term in enumerate(terms)]
+
+
+def _within_reach(value: float, parameter: Parameter) -> float:
+    """Return the value that a fit may give to a shape parameter of either sign, as near as it may come to ``value``."""
+    return float(np.clip(value, *_farthest(parameter)))
+
+
+def _farthest(parameter: Parameter) -> tuple[float, float]:
+    """Return the least and the largest value that a fit may give to a shape parameter of either sign."""
+    low, high = parameter.typical
+    beyond = 0.5 * (high - low)
+    return low - beyond, high + beyond

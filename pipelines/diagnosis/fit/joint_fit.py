@@ -1,4 +1,4 @@
-"""The extended model: baseline and causes fitted together, shapes refined, uncertainty honest."""
+"""The extended model: baseline and causes fitted together, at given shapes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,11 +12,9 @@ from pipelines.diagnosis.evidence.baseline_columns import columns_under, gram_of
 from pipelines.diagnosis.evidence.gram import Gram, error, solve
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit.change_point import Onset
-from pipelines.effects import Parameter, Side
+from pipelines.effects import Side
 from pipelines.model import ParameterLayout, TermColumns
 
-NEWTON_STEPS = 3
-"""Of Gauss and Newton along what bends each run in its own way, which the torque is nearly linear in."""
 STEP = 0.01
 """Of a difference along a shape parameter, as a share of its typical range."""
 
@@ -134,15 +132,3 @@ def step_of(cause: Candidate, i: int, run: int = 0) -> float:
     """Return the step of a difference along a shape parameter, as large as in one run its value asks for."""
     low, high = cause.effect.shape[i].typical
     return STEP * (abs(cause.shapes[run][i]) if low > 0 and high / low > 4 else high - low)
-
-
-def within_reach(value: float, parameter: Parameter) -> float:
-    """Return the value that a fit may give to a shape parameter of either sign, as near as it may come to ``value``."""
-    return float(np.clip(value, *_farthest(parameter)))
-
-
-def _farthest(parameter: Parameter) -> tuple[float, float]:
-    """Return the least and the largest value that a fit may give to a shape parameter of either sign."""
-    low, high = parameter.typical
-    beyond = 0.5 * (high - low)
-    return low - beyond, high + beyond

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates.candidate import Candidate, lowest
-from pipelines.diagnosis.candidates.candidate_rows import RELAXATION
 from pipelines.diagnosis.candidates.shape_refinement import changed, free_shapes, unit_at
-from pipelines.diagnosis.evidence.baseline import Baseline, with_load
+from pipelines.diagnosis.evidence.baseline import Baseline, relaxed, with_load
 from pipelines.diagnosis.evidence.baseline_columns import gram_of_runs
 from pipelines.diagnosis.evidence.gram import solve
 from pipelines.diagnosis.evidence.observed_run import Run
@@ -62,11 +61,9 @@ class Refinement:
         return self._fit(causes, self._laden(loads), loads)
 
     def _loads_after(self, best: Fit) -> NDArray:
-        """Return the values (size,) whose bodies the loads of the round after a fit are of."""
-        found = best.values[: self._baseline.size]
-        if best.loads is None:
-            return found
-        return RELAXATION * found + (1.0 - RELAXATION) * best.loads[: self._baseline.size]
+        """Return the baseline values (size,) whose rigid bodies make the loads of the round after a fit."""
+        size = self._baseline.size
+        return relaxed(best.values[:size], None if best.loads is None else best.loads[:size])
 
     def _laden(self, loads: NDArray) -> list[Run]:
         """Return the runs with the loads of the rigid bodies in a fit's values."""

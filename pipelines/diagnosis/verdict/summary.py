@@ -93,7 +93,7 @@ def _nothing(d: Diagnosis) -> str:
 def _nearest(d: Diagnosis) -> str:
     """Say what comes closest where nothing is likely to be missing."""
     weighed = d.selected.posterior
-    label, p = max(weighed.marginals.items(), key=lambda one: one[1], default=("", 0.0)) if weighed else ("", 0.0)
+    label, p = next(iter(weighed.marginals.items()), ("", 0.0)) if weighed else ("", 0.0)
     if p < CLOSEST:
         return ""
     words = label_in_words(label, d.baseline.machine)
