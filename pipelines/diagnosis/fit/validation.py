@@ -43,7 +43,7 @@ def without_each(
         (O,) inverse variances of the outputs, 1/(N·m)².
     """
     found = {}
-    for label in {cause.label for cause in made.causes}:
+    for label in dict.fromkeys(cause.label for cause in made.causes):
         rest = [cause for cause in made.causes if cause.label != label]
         found[label] = Validated.of(fit(rest, train, baseline, weights), validate, baseline)
     return found
