@@ -32,8 +32,8 @@ SHORTEST_PERIOD = 4
 IGNORED_PERIOD = 10
 """Recording lengths in a period, beyond which it is ignored."""
 
-KEPT = ("transmitted", "on_limb", "link_swing", "limb_swing", "motor_temperature")
-"""What a motion knows of loads and temperatures, and keeps with other kinematics."""
+KEPT = ("transmitted", "motor_temperature")
+"""What does not depend on a motion's kinematics, and is costly to compute."""
 
 CUFFS = tuple(f"{segment}_{side}" for segment in ("thigh", "shank") for side in ("front", "back"))
 
@@ -226,7 +226,8 @@ class Motion:
         """Return the same run with other kinematics, (n, J) each, as a corrected measurement has."""
         made = replace(self, q=q, dq=dq, ddq=ddq)
         # The torques are the same, and smoothing them costs more than the correction did.
-        made.__dict__.update({name: self.__dict__[name] for name in KEPT if name in self.__dict__})
+        kept = KEPT if self.limb_load is None else (*KEPT, "on_limb")
+        made.__dict__.update({name: self.__dict__[name] for name in kept if name in self.__dict__})
         return made
 
 

@@ -19,15 +19,12 @@ def soft():
     return Screening.of(session("joint_elasticity", "knee", stiffness=SOFT))
 
 
-def test_a_load_swings_on_the_bodies_of_its_own_fit(soft):
-    """Those of the baseline are biased by what is missing, and the spring comes out wrong with them."""
-    runs = soft.prepared.runs
-    start = soft.alone.fit(Candidate(JointElasticity("knee"), ((1.5 * SOFT, 0.0),) * len(runs)))
-    biased, _ = soft.alone.refined(start)
-    settled, _ = soft.alone.refined_transmission(biased)
+def test_a_soft_spring_is_found_from_one_half_as_stiff_again(soft):
+    """On the baseline's bodies alone the search would stop at a maximum on the way."""
+    start = soft.alone.fit(Candidate(JointElasticity("knee"), ((1.5 * SOFT, 0.0),) * len(soft.prepared.runs)))
+    settled, _ = soft.alone.refined(start)
     assert settled.candidate.shapes[0][0] == pytest.approx(SOFT, rel=0.15)
-    assert abs(settled.candidate.shapes[0][0] - SOFT) < 0.8 * abs(biased.candidate.shapes[0][0] - SOFT)
-    assert settled.gain_as_is > 1.2 * biased.gain_as_is
+    assert settled.gain_as_is > 2.0 * start.gain_as_is
 
 
 def test_the_bodies_behind_a_soft_spring_come_to_rest(soft):
@@ -44,7 +41,7 @@ def test_bodies_that_explain_no_more_are_not_taken(soft):
     """Beside a cause that is not there the rigid bodies are as good as before."""
     stiff = Candidate(JointElasticity("hip"), ((8000.0, 0.0),) * len(soft.prepared.runs))
     start = soft.alone.fit(stiff)
-    settled, _ = soft.alone.refined_transmission(start)
+    settled, _ = soft.alone.refined(start)
     assert settled.gain_as_is >= start.gain_as_is
 
 

@@ -142,3 +142,22 @@ def simulated(model, seconds):
             accelerated.append(rates[DTHETA].copy())
         step(a, w, s, t, 2.5e-4, state, memory, load, drive)
     return np.array(states), np.array(accelerated)
+
+
+@pytest.mark.parametrize("before", [None, "link_swing", "limb_swing", "on_limb", "transmitted"])
+def test_a_corrected_motion_depends_on_nothing_that_was_computed_of_the_measured_one(before):
+    """The load of a body is that along the corrected motion, whoever asked for the measured one's first."""
+    t = np.arange(0.0, 5.0, 0.005)
+    q = np.column_stack([0.3 * np.sin(4.0 * t), 0.2 * np.cos(5.0 * t)])
+    dq, ddq = np.gradient(q, 0.005, axis=0), np.gradient(np.gradient(q, 0.005, axis=0), 0.005, axis=0)
+    n = len(t)
+    measured = Motion(
+        t, q, dq, ddq, np.sin(np.column_stack([t, t])), np.zeros(n, np.int64), np.ones(n, bool), body=X, limb_body=X,
+        forces=np.ones((n, 4, 3)),
+    )  # fmt: skip
+    if before:
+        getattr(measured, before)
+    moved, alone = measured.with_state(q + 0.2, dq, ddq), replace(measured, q=q + 0.2)
+    for name in ("link_swing", "limb_swing", "on_limb", "transmitted"):
+        for found, expected in zip(getattr(moved, name), getattr(alone, name), strict=True):
+            assert (found == expected).all()

@@ -83,7 +83,7 @@ class Library:
         beside = np.hstack([main.columns, main.derivative])
         alone = ShapeRefinement(self.rows, self.regression, beside)
         found = [alone.best_of(fits) for fits in self.screened if fits[0].candidate.label != main.candidate.label]
-        fits = sorted((f for f in found if f is not None), key=lambda f: -f.gain)
+        fits = sorted((f for f in found if f is not None), key=lambda f: -f.worth)
         for fitted in fits[:most]:
             none = np.zeros((len(beside), 0))
             cause = Cause.of(fitted, none, self.regression, first=True)
@@ -115,8 +115,7 @@ class Library:
                 start = alone.fit(made[n].candidate)
                 if start is None:
                     return None
-                best, slopes = alone.refined(start)
-                cause = Cause.of(best, slopes, regression, first=True)
+                cause = Cause.of(*alone.refined(start), regression, first=True)
                 if cause is None:
                     return None
                 made[n] = cause
@@ -206,5 +205,5 @@ def best_transmission(fits: Sequence[Fitted], alone: ShapeRefinement) -> tuple[F
     """
     plain = [fitted for fitted in fits if not fitted.candidate.bodies]
     refitted = [fitted for fitted in fits if fitted.candidate.bodies]
-    refined = [alone.refined_transmission(kind[0]) for kind in (plain, refitted) if kind]
-    return max(refined, key=lambda found: found[0].gain_as_is)
+    refined = [alone.refined(kind[0]) for kind in (plain, refitted) if kind]
+    return max(refined, key=lambda found: found[0].worth)

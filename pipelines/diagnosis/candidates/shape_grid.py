@@ -37,11 +37,10 @@ def screened(
     else:
         starts = [Candidate(effect, (shape,) * len(runs)) for shape in _grid(effect, runs, regression)]
     if effect.swings:
-        # An amplitude would scale the twist, which the load does not follow.
         fits = [fitted for start in starts for fitted in alone.fits_of_transmission(start)]
-        return sorted(fits, key=lambda fitted: -fitted.gain_as_is)
-    fits = [fitted for start in starts if (fitted := alone.fit(start)) is not None]
-    return sorted(fits, key=lambda fitted: -fitted.gain)
+    else:
+        fits = [fitted for start in starts if (fitted := alone.fit(start)) is not None]
+    return sorted(fits, key=lambda fitted: -fitted.worth)
 
 
 def _along(effect: Effect, directions: Sequence[tuple[float, ...]], runs: int) -> Candidate:
@@ -52,8 +51,8 @@ def _along(effect: Effect, directions: Sequence[tuple[float, ...]], runs: int) -
 def others_of(fits: Sequence[Fitted], best: Fitted, most: int) -> list[Fitted]:
     """Return the best fits of other forms, or at other maxima, than the best one's."""
     effect = best.candidate.effect
-    kept = [fits[0]]
-    for fitted in fits[1:]:
+    kept = [best]
+    for fitted in fits:
         if len(kept) > most:
             break
         if all(_differ(effect, fitted.candidate, k.candidate) for k in kept):

@@ -57,6 +57,14 @@ class Fitted:
     """The same, of a candidate that transforms the motion with its amplitude one."""
 
     @property
+    def worth(self) -> float:
+        """The gain by which shapes are compared.
+
+        Of what swings, as it is: an amplitude would scale the twist, which the load does not follow.
+        """
+        return self.gain_as_is if self.candidate.effect.swings else self.gain
+
+    @property
     def torque(self) -> NDArray:
         """What the candidate explains as it is, (N,) rows."""
         transforms = self.candidate.bends and not self.candidate.directions
@@ -92,8 +100,10 @@ class ShapeRefinement:
     def fit(self, candidate: Candidate) -> Fitted | None:
         """Fit a candidate's amplitudes; None where its rows are not finite."""
         columns = self._rows(candidate, self._beside)
-        if columns is None:
-            return None
+        return None if columns is None else self._fitted(candidate, columns)
+
+    def _fitted(self, candidate: Candidate, columns: NDArray) -> Fitted:
+        """Fit the amplitudes of a candidate's columns (N, k)."""
         plain = self._project(columns)
         amplitudes, gain = _solved(plain, self._measured)
         as_is = gain
@@ -106,12 +116,27 @@ class ShapeRefinement:
         """Return that one of an effect's fits made elsewhere which explains most here."""
         if fits[0].candidate.onset is not None:
             return self._with_onsets(fits[0].candidate)
-        gains = [_solved(self._project(f.columns), self._measured)[1] for f in fits]
-        best = int(np.argmax(gains))
-        return replace(fits[best], gain=gains[best])
+        return max((self._fitted(f.candidate, f.columns) for f in fits), key=lambda fitted: fitted.worth)
 
     def refined(self, start: Fitted) -> tuple[Fitted, NDArray]:
-        """Return the candidate at its best shape, and its derivative columns there, (N, d)."""
+        """Return the candidate at its best shape, and its derivative columns there, (N, d).
+
+        A transmission's rigid bodies and shapes are fitted in turn, the bodies first. A later refit of the bodies that
+        does not explain more is left out.
+        """
+        if not start.candidate.effect.swings:
+            return self._refined(start)
+        best, slopes = self._refined(self.fit(self._with_own_bodies(start.candidate)) or start)
+        for _ in range(BODY_REFITS):
+            ahead = self.fit(self._rows.with_refitted_bodies(best.candidate, self._beside))
+            refined = None if ahead is None else self._refined(ahead)
+            if refined is None or refined[0].gain_as_is < best.gain_as_is + ENOUGH:
+                break
+            best, slopes = refined
+        return best, slopes
+
+    def _refined(self, start: Fitted) -> tuple[Fitted, NDArray]:
+        """Return the candidate at its best shape with the rigid bodies it has, and its derivative columns, (N, d)."""
         if start.candidate.directions:
             # Linear in its shapes: the amplitudes are the shape.
             return _shaped(start), np.zeros((len(self._measured), 0))
@@ -135,20 +160,6 @@ class ShapeRefinement:
         """Fit a transmission with the baseline's rigid bodies and with refitted ones, where its rows are finite."""
         fits = [self.fit(candidate), self.fit(self._with_own_bodies(candidate))]
         return [fitted for fitted in fits if fitted is not None]
-
-    def refined_transmission(self, start: Fitted) -> tuple[Fitted, NDArray]:
-        """Return a transmission at its best shape, its bodies and shapes fitted in turn, and its slopes there, (N, d).
-
-        The bodies are refitted before the shapes are refined. A later refit that does not explain more is left out.
-        """
-        best, slopes = self.refined(self.fit(self._with_own_bodies(start.candidate)) or start)
-        for _ in range(BODY_REFITS):
-            ahead = self.fit(self._rows.with_refitted_bodies(best.candidate, self._beside))
-            refined = None if ahead is None else self.refined(ahead)
-            if refined is None or refined[0].gain_as_is < best.gain_as_is + ENOUGH:
-                break
-            best, slopes = refined
-        return best, slopes
 
     def _with_own_bodies(self, candidate: Candidate) -> Candidate:
         """Return a transmission with rigid bodies refitted at its shape."""

@@ -96,8 +96,8 @@ def _named(posterior: Posterior, best: Set, i: int) -> Named:
     for labels, p in posterior.by_labels.items():
         if not rest <= labels:
             continue
-        # A set that holds the named cause holds nothing in its place, and two causes are no single one in its place.
-        others = (labels - rest if element.label not in labels else {element.label}) & listed
+        # Two listed causes beside the rest are no single one in its place.
+        others = (labels - rest) & listed
         if len(others) == 1:
             (label,) = others
             in_place[label] = in_place.get(label, 0.0) + p
