@@ -121,12 +121,13 @@ class ShapeRefinement:
     def refined(self, start: Fitted) -> tuple[Fitted, NDArray]:
         """Return the candidate at its best shape, and its derivative columns there, (N, d).
 
-        A transmission's rigid bodies and shapes are fitted in turn, the bodies first. A later refit of the bodies that
-        does not explain more is left out.
+        A transmission's rigid bodies and shapes are fitted in turn. Either may come first, for there are several
+        maxima. A refit of the bodies that does not explain more is left out.
         """
         if not start.candidate.effect.swings:
             return self._refined(start)
-        best, slopes = self._refined(self.fit(self._with_own_bodies(start.candidate)) or start)
+        starts = [start] if start.candidate.bodies else self.fits_of_transmission(start.candidate)
+        best, slopes = max(map(self._refined, starts), key=lambda found: found[0].worth)
         for _ in range(BODY_REFITS):
             ahead = self.fit(self._rows.with_refitted_bodies(best.candidate, self._beside))
             refined = None if ahead is None else self._refined(ahead)
