@@ -53,7 +53,7 @@ def diagnose(
     from pipelines.diagnosis.detectability.detectability import as_json, detectability
     from pipelines.diagnosis.diagnose import diagnose as find
     from pipelines.diagnosis.verdict.candidate_table import candidates
-    from pipelines.diagnosis.verdict.figures import FIGURES, draw
+    from pipelines.diagnosis.verdict.figures import FIGURES
     from pipelines.diagnosis.verdict.verdict import verdict
     from pipelines.mechanics.read import geometry_from, read_motions, refuse_another_mechanism
     from pipelines.settings.diagnose import DiagnoseSettings
@@ -102,6 +102,8 @@ def diagnose(
             text = json.dumps(told | {"provenance": shared}, indent=1, ensure_ascii=False)
             write_text(made / f"{name}.json", f"{text}\n")
         if figures:
+            from pipelines.diagnosis.verdict.figures.drawing import draw
+
             draw(found, said, made)
         drawn = {path.name for path in made.iterdir()}
     for old in (f"{name}.{kind}" for name in FIGURES for kind in ("png", "pdf")):

@@ -14,26 +14,17 @@ STEP = 1e-4
 """rad and rad/s of the difference quotients: the torque bends over tenths of a radian."""
 
 
-class Load(NamedTuple):
-    """Torque of a body along a motion, and its slopes there; n samples, J joints."""
+class Along(NamedTuple):
+    """Torque of a body on one coordinate along a motion, and its slopes there, (n,) each."""
 
     torque: NDArray
-    """(n, J) N·m."""
+    """N·m."""
     inertia: NDArray
-    """(n, J, J) N·m per rad/s²: the mass matrix."""
+    """N·m per rad/s²."""
     damping: NDArray
-    """(n, J, J) N·m per rad/s: centrifugal and Coriolis torque."""
+    """N·m per rad/s: centrifugal and Coriolis torque."""
     stiffness: NDArray
-    """(n, J, J) N·m per rad: gravity, and what turns with the body."""
-
-    def along(self, direction: NDArray) -> "Load":
-        """Return the load of one coordinate that turns the joints by ``direction`` (n, J): arrays (n,)."""
-        turned = np.flatnonzero(direction.any(axis=0))
-        slopes = (
-            sum(direction[:, i] * slope[:, i, j] * direction[:, j] for i in turned for j in turned)
-            for slope in self[1:]
-        )
-        return Load(np.sum(direction * self.torque, axis=1), *slopes)
+    """N·m per rad: gravity, and what turns with the body."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +45,11 @@ class LoadColumns:
         """The torque itself, (n, J, p)."""
         return self._torque(self.q, self.dq, self.ddq)
 
+    def torque_of(self, X: NDArray) -> NDArray:
+        """Return the torque of a body with inertial parameters ``X`` (p,), (n, J)."""
+        flat = self.torque.reshape(-1, len(X))  # numpy multiplies a matrix twenty times as fast as a stack of them
+        return (flat @ X).reshape(self.q.shape)
+
     @cached_property
     def slopes(self) -> NDArray:
         """Its slopes with acceleration, velocity and angle, (3, n, J, J, p)."""
@@ -66,9 +62,36 @@ class LoadColumns:
             slopes[2, :, :, j] = (self._torque(self.q + STEP * unit, self.dq, self.ddq) - here) / STEP
         return slopes
 
-    def of(self, X: NDArray) -> Load:
-        """Return the load of a body with inertial parameters ``X`` (p,)."""
-        return Load(self.torque @ X, *(self.slopes @ X))
+    def along(self, direction: NDArray) -> NDArray:
+        """Return load and slopes, (4, n, p), of one coordinate that turns the joints by ``direction`` (n, J)."""
+        key = direction.tobytes()
+        if key not in self._along:
+            turned = np.flatnonzero(direction.any(axis=0))
+            parts = [sum(direction[:, i, np.newaxis] * self.torque[:, i] for i in turned)]
+            parts += [
+                sum((direction[:, i] * direction[:, j])[:, np.newaxis] * slope[:, i, j] for i in turned for j in turned)
+                for slope in self.slopes
+            ]
+            self._along[key] = np.array(parts)
+        return self._along[key]
+
+    @cached_property
+    def _along(self) -> dict[bytes, NDArray]:
+        """What was computed, by direction: a fit asks for few directions thousands of times."""
+        return {}
 
     def _torque(self, q: NDArray, dq: NDArray, ddq: NDArray) -> NDArray:
         return self.mechanism.regressor(q, dq, ddq, self.geometry)
+
+
+@dataclass(frozen=True)
+class Load:
+    """The load of a rigid body along a motion."""
+
+    columns: LoadColumns
+    X: NDArray
+    """(p,) inertial parameters."""
+
+    def along(self, direction: NDArray) -> Along:
+        """Return the load of one coordinate that turns the joints by ``direction`` (n, J)."""
+        return Along(*(self.columns.along(direction) @ self.X))

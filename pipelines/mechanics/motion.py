@@ -1,6 +1,6 @@
 """A measured motion: what regression, diagnosis and replay are computed from."""
 
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -181,15 +181,17 @@ class Motion:
     @cached_property
     def link_swing(self) -> Load | None:
         """What hangs behind the drive trains as a load that can swing; None where no fit has estimated it."""
-        return None if self.body is None else self._load_of(self.body)
+        return None if self.body is None else Load(self.load_columns, self.body)
 
     @cached_property
     def limb_swing(self) -> Load | None:
         """The wearer's limb as a load that can swing; None where no fit has estimated it."""
-        return None if self.limb_body is None else self._load_of(self.limb_body)
+        return None if self.limb_body is None else Load(self.load_columns, self.limb_body)
 
-    def _load_of(self, body: NDArray) -> Load:
-        return self.load_columns.of(body)
+    @cached_property
+    def columns_known(self) -> dict[Hashable, NDArray]:
+        """Torques (n, J, k) along this motion that were computed, by what makes them; none depends on the loads."""
+        return {}
 
     @cached_property
     def load_columns(self) -> LoadColumns:
@@ -217,9 +219,10 @@ class Motion:
 
         The measured torques would not do: their noise would stand on both sides of a regression.
         """
-        torque = self.load_columns.torque
-        made = replace(self, load=torque @ body, limb_load=torque @ limb, body=body, limb_body=limb)
-        made.__dict__["load_columns"] = self.load_columns  # the motion is the same
+        of = self.load_columns.torque_of
+        made = replace(self, load=of(body), limb_load=of(limb), body=body, limb_body=limb)
+        # The motion is the same.
+        made.__dict__.update(load_columns=self.load_columns, columns_known=self.columns_known)
         return made
 
     def with_state(self, q: NDArray, dq: NDArray, ddq: NDArray) -> "Motion":

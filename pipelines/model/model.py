@@ -170,7 +170,7 @@ class Model:
             measured = effect.observed(drives, motion, shape)
             if measured is not drives:
                 drives[:] = measured
-            drives[:, :, own] = columns = effect.columns(at, shape)
+            drives[:, :, own] = columns = _columns(effect, at, shape)
             in_cuffs = effect.cuff_columns(at, columns) if cuffs else None
             if in_cuffs is not None:
                 out[:, joints:, own] = in_cuffs
@@ -193,6 +193,18 @@ class Model:
     def torque(self, motion: Motion) -> NDArray:
         """Torque that the sensors should measure along a motion, (n, J) N·m."""
         return self.regressor(motion) @ self.linear_values
+
+
+def _columns(effect: Effect, motion: Motion, shape: NDArray) -> NDArray:
+    """Return an effect's columns along a motion, (n, J, k).
+
+    Friction is the same in every fit of one motion, of which a diagnosis makes a thousand: it is computed once.
+    """
+    if effect.shape or effect.reads_load:
+        return effect.columns(motion, shape)
+    if effect not in motion.columns_known:
+        motion.columns_known[effect] = effect.columns(motion, shape)
+    return motion.columns_known[effect]
 
 
 def effect_named(name: str) -> type[Effect]:

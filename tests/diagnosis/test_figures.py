@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.diagnosis.fit.fitted_model import model_of_run
-from pipelines.diagnosis.verdict import figures, worst_stretch
+from pipelines.diagnosis.verdict import worst_stretch
 from pipelines.diagnosis.verdict.error_budget import scatter_between_periods, shares_of_causes
+from pipelines.diagnosis.verdict.figures import FIGURES, drawing
 from pipelines.diagnosis.verdict.figures.against import against
 from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.dynamics.replay import replay
@@ -86,7 +87,7 @@ def test_a_hum_beside_the_harmonics_is_said_not_to_repeat(diagnosed):
     assert said["status"] == "unknown_cause"
     knee = said["error_budget"]["knee"]
     assert knee["not_repeatable"] > 3 * knee["repeatable_unexplained"]
-    assert "tone of 7.6" in figures.FIGURES["verdict"](*diagnosed("unknown")).axes[1].get_xlabel()
+    assert "tone of 7.6" in drawing.DRAWN_BY["verdict"](*diagnosed("unknown")).axes[1].get_xlabel()
 
 
 def test_without_periods_no_share_claims_to_repeat(diagnosed):
@@ -114,9 +115,9 @@ def test_two_causes_that_overlap_share_what_either_would_take():
 
 @pytest.mark.parametrize("name", MADE)
 def test_every_figure_is_drawn_whatever_the_verdict(diagnosed, name, tmp_path):
-    figures.draw(*diagnosed(name), tmp_path)
+    drawing.draw(*diagnosed(name), tmp_path)
     written = {path.name: path.read_bytes()[:4] for path in tmp_path.iterdir()}
-    assert written == {f"{stem}.png": b"\x89PNG" for stem in figures.FIGURES} | {
+    assert written == {f"{stem}.png": b"\x89PNG" for stem in FIGURES} | {
         f"{stem}.pdf": b"%PDF" for stem in ("decision", "verdict", "error-budget")
     }
 
@@ -124,7 +125,7 @@ def test_every_figure_is_drawn_whatever_the_verdict(diagnosed, name, tmp_path):
 @pytest.mark.parametrize("name", ["explained", "unknown", "nothing"])
 def test_the_verdicts_bars_are_as_long_as_their_shares(diagnosed, name):
     found, said = diagnosed(name)
-    bars = figures.FIGURES["verdict"](found, said).axes[0].patches
+    bars = drawing.DRAWN_BY["verdict"](found, said).axes[0].patches
     drawn = [bar.get_width() for bar in bars]
     wanted = [100 * s / sum(shares.values()) for shares in said["error_budget"].values() for s in shares.values()]
     np.testing.assert_allclose(drawn, wanted)
@@ -133,7 +134,7 @@ def test_the_verdicts_bars_are_as_long_as_their_shares(diagnosed, name):
 @pytest.mark.parametrize("name", ["explained", "one kind, no periods", "unknown", "nothing"])
 def test_the_decisions_bars_are_as_long_as_the_shares_of_the_residual_and_the_probabilities_of_sets(diagnosed, name):
     found, said = diagnosed(name)
-    shares, _, sets = figures.FIGURES["decision"](found, said).axes
+    shares, _, sets = drawing.DRAWN_BY["decision"](found, said).axes
     parts = [
         said["router"][joint][part] or 0.0
         for joint in found.baseline.joints
@@ -151,12 +152,12 @@ def test_the_decisions_bars_are_as_long_as_the_shares_of_the_residual_and_the_pr
 
 
 def test_no_set_is_weighed_where_acquisition_is_at_fault(diagnosed):
-    *_, sets = figures.FIGURES["decision"](*diagnosed("spoilt")).axes
+    *_, sets = drawing.DRAWN_BY["decision"](*diagnosed("spoilt")).axes
     assert [text.get_text() for text in sets.texts] == ["not asked: acquisition is at fault"]
 
 
 def test_a_spring_is_shown_against_its_joints_angle(diagnosed):
-    shape = figures.FIGURES["verdict"](*diagnosed("explained")).axes[1]
+    shape = drawing.DRAWN_BY["verdict"](*diagnosed("explained")).axes[1]
     assert shape.get_xlabel() == "knee angle, rad"
     assert shape.get_ylabel() == "knee torque error, N·m"
 
@@ -164,7 +165,7 @@ def test_a_spring_is_shown_against_its_joints_angle(diagnosed):
 def test_what_the_residual_goes_with_most_is_drawn_first(diagnosed):
     found, said = diagnosed("explained")
     ranking = said["depends_on"]["knee"]
-    drawn = figures.FIGURES["dependence"](found, said)
+    drawn = drawing.DRAWN_BY["dependence"](found, said)
     first = next(axis for axis in drawn.axes if axis.get_ylabel() == "knee residual, N·m")
     assert first.get_xlabel().startswith(f"knee {ranking[0]['variable']}, ")
     assert first.get_title() == f"{ranking[0]['share_before']:.0%} → {ranking[0]['share_after']:.0%}"
@@ -203,7 +204,7 @@ def test_a_model_that_no_leg_has_is_said_not_to_be_simulated(diagnosed, monkeypa
     found, said = diagnosed("explained")
     monkeypatch.setattr(worst_stretch, "replay", impossible)
     nowhere = dict.fromkeys(found.baseline.joints)
-    drawn = figures.FIGURES["simulation"](found, said | {"baseline_simulation_rmse_rad": nowhere})
+    drawn = drawing.DRAWN_BY["simulation"](found, said | {"baseline_simulation_rmse_rad": nowhere})
     words = [text.get_text() for text in drawn.legends[0].get_texts()]
     assert "rigid body and friction (cannot be simulated)" in words
 
@@ -215,5 +216,9 @@ def test_a_figure_that_fails_leaves_no_half_of_it(diagnosed, tmp_path, monkeypat
 
     monkeypatch.setattr(Figure, "savefig", full)
     with pytest.raises(OSError, match="No space left"):
-        figures.draw(*diagnosed("nothing"), tmp_path)
+        drawing.draw(*diagnosed("nothing"), tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_every_figure_that_is_named_is_drawn():
+    assert tuple(drawing.DRAWN_BY) == FIGURES
