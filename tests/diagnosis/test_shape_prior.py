@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.candidates.candidate import NEVER, Candidate
-from pipelines.diagnosis.candidates.shape_refinement import ONSETS, log_searched
+from pipelines.diagnosis.candidates.shape_refinement import ONSETS, log_searched, reach
 from pipelines.effects import Cogging
 from pipelines.effects.backlash import Backlash
+from pipelines.effects.encoder_offset import EncoderOffset
 from pipelines.effects.end_stop import EndStop
 from pipelines.effects.mass_off_axis import MassOffAxis
 from pipelines.effects.payload_change import PayloadChange
+from pipelines.effects.time_delay import TimeDelay
 
 
 def test_of_six_forms_each_has_a_sixth_of_the_prior():
@@ -36,3 +38,10 @@ def test_waves_and_onsets_were_sought_among_many_values_and_an_onset_that_never_
     assert log_searched(both) == pytest.approx(2.0 * np.log(ONSETS))
     assert log_searched(one) == pytest.approx(np.log(ONSETS))
     assert log_searched(Candidate(Backlash("knee"), ((0.01,),))) == 0.0
+
+
+def test_a_torque_channel_is_never_early():
+    """What is typically nought or more is refined down to nought, what may have either sign beyond its range."""
+    assert reach(TimeDelay("knee").shape[0])[0] == 0.0
+    low, high = EncoderOffset("knee").shape[0].typical
+    assert reach(EncoderOffset("knee").shape[0]) == pytest.approx((1.5 * low - 0.5 * high, 1.5 * high - 0.5 * low))

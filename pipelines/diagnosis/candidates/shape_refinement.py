@@ -336,4 +336,5 @@ def reach(parameter: Parameter) -> tuple[float, float]:
     if not _unit_of(parameter):
         return low / BEYOND, high * BEYOND
     beyond = MARGIN * (high - low)
-    return low - beyond, high + beyond
+    # What is typically nought or more, as a delay, is never less.
+    return max(low - beyond, 0.0) if low >= 0.0 else low - beyond, high + beyond

@@ -284,7 +284,7 @@ def _positive(cause: Cause) -> list[int]:
     if bends:
         # A column is the effect at its shape: turned over, it would be a spring that pushes.
         free = [p for p in effect.shape if p.default is None]
-        return [0] if all(p.typical[0] > 0 and p.unit != "1" for p in free) else []
+        return [0] if all(p.typical[0] >= 0 and p.unit != "1" for p in free) else []
     if len(effect.linear) != len(cause.amplitudes):
         return []  # each run has some amplitude for itself
     return [i for i, p in enumerate(effect.linear) if p.typical[0] >= 0]
