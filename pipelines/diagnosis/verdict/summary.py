@@ -64,7 +64,7 @@ def _worst_joint(d: Diagnosis) -> int:
 
 
 def _size(d: Diagnosis) -> str:
-    """Return the largest error under the baseline, and how many noise floors that is."""
+    """Return the baseline's error where it is most noise floors, and how many that is."""
     worst = _worst_joint(d)
     joint, error = d.baseline.joints[worst], d.before.errors.rms[worst]
     ratio = error / d.floor_rms[worst]
@@ -82,8 +82,8 @@ def _nothing(d: Diagnosis) -> str:
     effort = d.baseline.machine.joint(joint).effort
     said = (
         "Nothing is missing that these data could show "
-        f"(probability {d.selected.answer.nothing:.2f}). The largest {effort} error, at "
-        f"{the(joint)}, is {_size(d)}"
+        f"(probability {d.selected.answer.nothing:.2f}). Compared with the noise, the {effort} error is largest at "
+        f"{the(joint)}: {_size(d)}"
     )
     if hiding := floor_that_hides(d).get(joint):
         said += f", but the floor itself is {hiding:.0%} of the {effort}: little could show"
