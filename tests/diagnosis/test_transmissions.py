@@ -7,6 +7,7 @@ import pytest
 
 from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.candidates.library import best_transmission
+from pipelines.diagnosis.fit.joint_refinement import Refinement
 from pipelines.effects import Backlash, JointElasticity
 from tests.diagnosis.screening import Screening
 from tests.diagnosis.sessions import session
@@ -78,3 +79,14 @@ def test_bodies_are_the_candidates_own(soft):
     assert (soft.rows(plain) == before).all()
     assert (soft.rows(replace(settled)) == with_bodies).all()
     assert not (with_bodies == before).all()
+
+
+def test_a_load_swings_under_the_rigid_bodies_that_its_own_fit_finds(soft):
+    """Under others a fit explains the training runs and foretells no run."""
+    baseline, runs = soft.prepared.baseline, soft.prepared.runs
+    spring = Candidate(JointElasticity("knee"), ((SOFT, 0.0),) * len(runs))
+    made = Refinement(runs, baseline, soft.prepared.weights)([spring])
+    for run in runs:
+        columns = baseline.layout.bodies_in(run.motion.run)
+        swung, found = made.loads[columns].sum(axis=0), made.values[columns].sum(axis=0)
+        assert np.linalg.norm(found - swung) < 0.05 * np.linalg.norm(found)

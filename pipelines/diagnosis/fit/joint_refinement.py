@@ -19,6 +19,8 @@ from pipelines.diagnosis.fit.joint_fit import Fit, fit, onsets_of, slope, stacke
 
 ROUNDS = 3
 """Rounds in which loads follow the rigid bodies that they are of."""
+SETTLING = 6
+"""Steps in which rigid bodies come to rest at given shapes: each leaves half of what they are away."""
 STEPS = 3
 """Steps of a round."""
 HALVINGS = 3
@@ -37,10 +39,29 @@ class Refinement:
         self._runs, self._baseline, self._weights = runs, baseline, weights
 
     def __call__(self, causes: Sequence[Candidate]) -> Fit:
-        """Return the fit with every shape at its best."""
-        best = self._start(causes)
+        """Return the fit with every shape at its best.
+
+        What swings does so under the bodies that the fit itself finds. Only where these come to no rest it swings under
+        those that the library had: such a fit is no model of one machine, and may foretell other runs badly.
+        """
+        start = self._start(causes)
+        if any(cause.effect.swings for cause in causes):
+            settled = self._refined(self._at_rest(start))
+            if settled.cost < self._fit((), self._runs, None).cost:
+                return settled
+        return self._refined(start)
+
+    def _at_rest(self, best: Fit) -> Fit:
+        """Return the fit at the same shapes under its own rigid bodies."""
+        for _ in range(SETTLING):
+            loads = self._loads_after(best)
+            best = self._fit(best.causes, self._laden(loads), loads)
+        return best
+
+    def _refined(self, best: Fit) -> Fit:
+        """Return the best fit of some rounds from a start."""
         made = [best]
-        for _ in range(ROUNDS if causes else 0):
+        for _ in range(ROUNDS if best.causes else 0):
             # The bodies of the fit before were biased by what was missing, and so were the loads.
             loads = self._loads_after(best)
             runs = self._laden(loads)

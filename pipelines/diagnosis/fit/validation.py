@@ -11,7 +11,7 @@ from pipelines.diagnosis.evidence.decision_band import LENGTH_S, DecisionBand
 from pipelines.diagnosis.evidence.noise_model import NoiseModel
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit.held_out import evaluate
-from pipelines.diagnosis.fit.joint_fit import Fit, fit
+from pipelines.diagnosis.fit.joint_fit import Fit, fit, laden
 from pipelines.diagnosis.fit.validation_error import Errors, Gain, errors_of, gain
 
 
@@ -35,17 +35,17 @@ class Validated:
 def without_each(
     made: Fit, train: Sequence[Run], validate: Sequence[Run], baseline: Baseline, weights: NDArray
 ) -> dict[str, Validated]:
-    """Return the model without each of its causes, the others kept and fitted anew, by label.
+    """Return the model without each of its causes, the others kept and fitted anew under the same loads, by label.
 
     Parameters
     ----------
     weights : NDArray
         (O,) inverse variances of the outputs, 1/(N·m)².
     """
-    found = {}
+    found, runs = {}, laden(train, made, baseline)
     for label in dict.fromkeys(cause.label for cause in made.causes):
         rest = [cause for cause in made.causes if cause.label != label]
-        found[label] = Validated.of(fit(rest, train, baseline, weights), validate, baseline)
+        found[label] = Validated.of(fit(rest, runs, baseline, weights, made.loads), validate, baseline)
     return found
 
 
