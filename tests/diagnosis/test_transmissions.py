@@ -81,12 +81,13 @@ def test_bodies_are_the_candidates_own(soft):
     assert not (with_bodies == before).all()
 
 
-def test_a_load_swings_under_the_rigid_bodies_that_its_own_fit_finds(soft):
-    """Under others a fit explains the training runs and foretells no run."""
-    baseline, runs = soft.prepared.baseline, soft.prepared.runs
-    spring = Candidate(JointElasticity("knee"), ((SOFT, 0.0),) * len(runs))
-    made = Refinement(runs, baseline, soft.prepared.weights)([spring])
+def test_a_load_swings_under_the_rigid_bodies_that_its_own_fit_finds():
+    """Under the baseline's, a quarter away, the fit explains more of the training runs and foretells no run."""
+    prepared = Screening.of(session("joint_elasticity", "hip", stiffness=150.0, hardening=HARDENING)).prepared
+    baseline, runs = prepared.baseline, prepared.runs
+    spring = Candidate(JointElasticity("hip"), ((150.0, HARDENING),) * len(runs))
+    made = Refinement(runs, baseline, prepared.weights)([spring])
     for run in runs:
         columns = baseline.layout.bodies_in(run.motion.run)
         swung, found = made.loads[columns].sum(axis=0), made.values[columns].sum(axis=0)
-        assert np.linalg.norm(found - swung) < 0.05 * np.linalg.norm(found)
+        assert np.linalg.norm(found - swung) < 0.15 * np.linalg.norm(found)
