@@ -37,7 +37,8 @@ class Score:
     named: tuple[Named, ...]
     right: bool
     unseen: bool = False
-    """Silence about what was too small to be seen."""
+    """Was all that is not named too small to be seen? Of a single effect silence is then right,
+    of a pair it is counted beside."""
     probabilities: tuple[tuple[float, bool], ...] = ()
     """Of each named cause, and whether it was there (or tied with what was)."""
     rmse_over_floor: Mapping[str, float] = field(default_factory=dict)
@@ -90,7 +91,8 @@ def score(
     causes = verdict["causes"]
     kin = {(effect, h["joint"]) for h in truth["hidden"] for effect in h["kin"]}
     faults = [f for f in verdict["data_faults"] if not _is_a_declared_gap(f, truth)]
-    unseen = _unseen(truth, smallest) and verdict["status"] == SILENT
+    unseen = _unseen(truth, causes, smallest)
+    silence_is_right = category == "single" and unseen and verdict["status"] == SILENT
     right = {
         "single": lambda: bool(causes) and hidden[0] in names_of(causes[0]),
         "pair": lambda: all(any(h in names_of(c) for c in causes) for h in hidden),
@@ -113,8 +115,8 @@ def score(
         kinds=tuple(truth["case"]["kinds"]),
         status=verdict["status"],
         named=tuple((c["effect"], c["joint"]) for c in causes),
-        right=right or unseen,
-        unseen=unseen,
+        right=right or silence_is_right,
+        unseen=unseen if category == "pair" else silence_is_right,
         probabilities=tuple(
             (float(c["probability"]), any(h in names_of(c) for h in (*hidden, *kin)))
             for c in causes
@@ -216,11 +218,19 @@ def _without_verdict(exit_code: int) -> str:
     return "refused" if exit_code == 2 else "crashed"
 
 
-def _unseen(truth: Mapping[str, Any], smallest: Mapping[Named, float] | None) -> bool:
-    if smallest is None or truth["case"]["category"] != "single":
+def _unseen(
+    truth: Mapping[str, Any],
+    causes: Iterable[Mapping[str, Any]],
+    smallest: Mapping[Named, float] | None,
+) -> bool:
+    """Tell whether all that is hidden and not named is too small to be seen; False where all is
+    named."""
+    if smallest is None or truth["case"]["category"] not in ("single", "pair"):
         return False
-    hidden = truth["hidden"][0]
-    return hidden["rms_nm"] < smallest.get((hidden["effect"], hidden["joint"]), 0.0)
+    told = {name for cause in causes for name in names_of(cause)}
+    missed = [h for h in truth["hidden"] if (h["effect"], h["joint"]) not in told]
+    small = [h["rms_nm"] < smallest.get((h["effect"], h["joint"]), 0.0) for h in missed]
+    return bool(missed) and all(small)
 
 
 def _ratio(

@@ -63,6 +63,10 @@ def measures(scores: Sequence[Score]) -> list[Measure]:
         ),
         _rate("silent about what was too small to be seen", (s.unseen for s in singles)),
         _rate("pair: both named", right(of(scores, "pair")), low=0.85),
+        _rate(
+            "pair: each named or too small to be seen",
+            (s.right or s.unseen for s in of(scores, "pair")),
+        ),
         _rate("false alarms, nothing hidden", (not s.right for s in of(scores, "none")), high=0.01),
         _rate(
             "false alarms, small imperfections",

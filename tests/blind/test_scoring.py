@@ -124,6 +124,14 @@ def test_of_a_pair_both_have_to_be_named():
     assert not score(truth, answer_of(cause("cogging", "hip"))).right
 
 
+def test_what_is_too_small_of_a_pair_is_told_apart_and_not_right():
+    truth, named = truth_of("pair", PLAY, ("cogging", "hip")), answer_of(cause("cogging", "hip"))
+    missed = score(truth, named, {PLAY: 1.5})
+    assert missed.unseen and not missed.right
+    assert not score(truth, named, {PLAY: 0.5}).unseen
+    assert not score(truth, answer_of(status="nothing_missing"), {PLAY: 1.5}).unseen
+
+
 @pytest.mark.parametrize("category", ["none", "imperfect"])
 def test_anything_but_silence_is_a_false_alarm(category):
     truth = truth_of(category)
