@@ -99,7 +99,7 @@ def measures(scores: Sequence[Score]) -> list[Measure]:
             low=0.92,
             high=0.98,
         ),
-        _middle("seconds a diagnosis, median", [s.seconds for s in scores], high=8.0),
+        _middle("processor seconds a diagnosis, median", [s.seconds for s in scores], high=8.0),
     ]
 
 
