@@ -229,7 +229,10 @@ class Effect(ABC):
     swings: ClassVar[bool] = False
     """True where ``corrected`` lets the load swing on the spring: what it does then depends on its frequency."""
     reads_load: ClassVar[bool] = False
-    """True where ``reaction`` depends on the transmitted torque, which along a measured motion has to be smoothed."""
+    """True where ``reaction`` depends on the transmitted torque, which along a measured motion has to be smoothed.
+
+    Of others, columns are computed once for motions that differ in their loads alone.
+    """
     reading_states: ClassVar[int] = 0
     reaction: ClassVar[Callable[..., Any] | None] = None
     derivative: ClassVar[Callable[..., Any] | None] = None

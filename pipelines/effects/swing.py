@@ -62,7 +62,7 @@ def behind_spring(
     with_motor : float, optional
         Inertia in the load that turns with the motor instead, kg·m².
     """
-    torque, inertia, *slopes = load.along(direction)
+    torque, inertia, *slopes = load.on_coordinate(direction)
     torque = torque - with_motor * np.sum(direction * motion.ddq, axis=1)
     along = [np.ascontiguousarray(part) for part in (torque, inertia - with_motor, *slopes)]
     least = LEAST_INERTIA * effect.scale.of("kg·m²")

@@ -14,7 +14,7 @@ STEP = 1e-4
 """rad and rad/s of the difference quotients: the torque bends over tenths of a radian."""
 
 
-class Along(NamedTuple):
+class CoordinateLoad(NamedTuple):
     """Torque of a body on one coordinate along a motion, and its slopes there, (n,) each."""
 
     torque: NDArray
@@ -29,10 +29,7 @@ class Along(NamedTuple):
 
 @dataclass(frozen=True)
 class LoadColumns:
-    """A body's load along a motion (n, J), per unit of each of its p inertial parameters.
-
-    Each is computed once. The slopes are many times as large as the motion, so only where something swings.
-    """
+    """A body's load along a motion (n, J), per unit of each of its p inertial parameters; each is computed once."""
 
     mechanism: Mechanism
     q: NDArray
@@ -50,34 +47,23 @@ class LoadColumns:
         flat = self.torque.reshape(-1, len(X))  # numpy multiplies a matrix twenty times as fast as a stack of them
         return (flat @ X).reshape(self.q.shape)
 
-    @cached_property
-    def slopes(self) -> NDArray:
-        """Its slopes with acceleration, velocity and angle, (3, n, J, J, p)."""
-        here = self.torque
-        n, J, p = here.shape
-        slopes = np.empty((3, n, J, J, p))
-        for j, unit in enumerate(np.eye(J)):
-            slopes[0, :, :, j] = self._torque(self.q, self.dq, self.ddq + unit) - here
-            slopes[1, :, :, j] = (self._torque(self.q, self.dq + STEP * unit, self.ddq) - here) / STEP
-            slopes[2, :, :, j] = (self._torque(self.q + STEP * unit, self.dq, self.ddq) - here) / STEP
-        return slopes
-
-    def along(self, direction: NDArray) -> NDArray:
-        """Return load and slopes, (4, n, p), of one coordinate that turns the joints by ``direction`` (n, J)."""
+    def projected(self, direction: NDArray) -> NDArray:
+        """Return torque and slopes, (4, n, p), of one coordinate that turns the joints by ``direction`` (n, J)."""
         key = direction.tobytes()
-        if key not in self._along:
-            turned = np.flatnonzero(direction.any(axis=0))
-            parts = [sum(direction[:, i, np.newaxis] * self.torque[:, i] for i in turned)]
-            parts += [
-                sum((direction[:, i] * direction[:, j])[:, np.newaxis] * slope[:, i, j] for i in turned for j in turned)
-                for slope in self.slopes
-            ]
-            self._along[key] = np.array(parts)
-        return self._along[key]
+        if key not in self._projected:
+            step = STEP * direction
+            torques = (
+                self.torque,
+                self._torque(self.q, self.dq, self.ddq + direction) - self.torque,
+                (self._torque(self.q, self.dq + step, self.ddq) - self.torque) / STEP,
+                (self._torque(self.q + step, self.dq, self.ddq) - self.torque) / STEP,
+            )
+            self._projected[key] = np.array([np.einsum("nj,njp->np", direction, torque) for torque in torques])
+        return self._projected[key]
 
     @cached_property
-    def _along(self) -> dict[bytes, NDArray]:
-        """What was computed, by direction: a fit asks for few directions thousands of times."""
+    def _projected(self) -> dict[bytes, NDArray]:
+        """What was computed, by direction: thousands of fits ask for few directions."""
         return {}
 
     def _torque(self, q: NDArray, dq: NDArray, ddq: NDArray) -> NDArray:
@@ -92,6 +78,6 @@ class Load:
     X: NDArray
     """(p,) inertial parameters."""
 
-    def along(self, direction: NDArray) -> Along:
-        """Return the load of one coordinate that turns the joints by ``direction`` (n, J)."""
-        return Along(*(self.columns.along(direction) @ self.X))
+    def on_coordinate(self, direction: NDArray) -> CoordinateLoad:
+        """Return the load on one coordinate that turns the joints by ``direction`` (n, J)."""
+        return CoordinateLoad(*(self.columns.projected(direction) @ self.X))

@@ -32,7 +32,7 @@ SHORTEST_PERIOD = 4
 IGNORED_PERIOD = 10
 """Recording lengths in a period, beyond which it is ignored."""
 
-KEPT = ("transmitted", "motor_temperature")
+KEPT = ("transmitted", "motor_temperature", "felt")
 """What does not depend on a motion's kinematics, and is costly to compute."""
 
 CUFFS = tuple(f"{segment}_{side}" for segment in ("thigh", "shank") for side in ("front", "back"))

@@ -170,7 +170,7 @@ class Model:
             measured = effect.observed(drives, motion, shape)
             if measured is not drives:
                 drives[:] = measured
-            drives[:, :, own] = columns = _columns(effect, at, shape)
+            drives[:, :, own] = columns = _known_columns(effect, at, shape)
             in_cuffs = effect.cuff_columns(at, columns) if cuffs else None
             if in_cuffs is not None:
                 out[:, joints:, own] = in_cuffs
@@ -195,15 +195,17 @@ class Model:
         return self.regressor(motion) @ self.linear_values
 
 
-def _columns(effect: Effect, motion: Motion, shape: NDArray) -> NDArray:
+def _known_columns(effect: Effect, motion: Motion, shape: NDArray) -> NDArray:
     """Return an effect's columns along a motion, (n, J, k).
 
-    Friction is the same in every fit of one motion, of which a diagnosis makes a thousand: it is computed once.
+    Friction, and what else depends on the motion alone, is the same in each of the thousand fits of one motion, so it
+    is computed once. Rigid bodies mostly move otherwise than the motors, in each fit anew.
     """
-    if effect.shape or effect.reads_load:
+    if effect.shape or effect.reads_load or effect.inertial:
         return effect.columns(motion, shape)
     if effect not in motion.columns_known:
-        motion.columns_known[effect] = effect.columns(motion, shape)
+        motion.columns_known[effect] = columns = effect.columns(motion, shape)
+        columns.flags.writeable = False
     return motion.columns_known[effect]
 
 

@@ -59,7 +59,7 @@ def _one_pass(x: NDArray, sections: NDArray, steady: NDArray) -> NDArray:
 
 @lru_cache
 def _sections(order: int, cutoff_hz: float, rate_hz: float) -> tuple[NDArray, NDArray]:
-    """Return the filter's second-order sections, and their steady state under a constant one.
+    """Return the filter's second-order sections, and their state under a constant input of one.
 
     Their design takes longer than a short stretch's filtering.
     """

@@ -151,4 +151,10 @@ def test_two_causes_that_stand_for_one_are_no_ties_of_it():
 def test_equals_that_a_third_cause_may_join_stay_equals():
     """What a set says of the named cause beside a third one, it says of the rival beside the third one."""
     (named,) = answer_of(weighed(_2=0.3, _02=0.15, _3=0.25, _03=0.2, _=0.1)).named
-    assert dict(named.ties) == pytest.approx({"stribeck_friction@hip": 0.25})
+    assert dict(named.ties) == pytest.approx({"stribeck_friction@hip": 0.45})
+
+
+def test_a_rival_is_held_against_all_that_speaks_for_the_named_cause():
+    (named,) = answer_of(weighed(_2=0.3, _02=0.25, _12=0.25, _3=0.04, _=0.16)).named
+    assert named.ties == ()
+    assert named.probability == pytest.approx(0.8)

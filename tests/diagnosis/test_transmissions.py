@@ -37,12 +37,10 @@ def test_the_bodies_behind_a_soft_spring_come_to_rest(soft):
     assert np.ptp(gains[-3:]) < 0.02 * max(gains)
 
 
-def test_bodies_that_explain_no_more_are_not_taken(soft):
-    """Beside a cause that is not there the rigid bodies are as good as before."""
-    stiff = Candidate(JointElasticity("hip"), ((8000.0, 0.0),) * len(soft.prepared.runs))
-    start = soft.alone.fit(stiff)
+def test_a_spring_at_the_other_joint_explains_nothing_with_any_bodies(soft):
+    start = soft.alone.fit(Candidate(JointElasticity("hip"), ((8000.0, 0.0),) * len(soft.prepared.runs)))
     settled, _ = soft.alone.refined(start)
-    assert settled.gain_as_is >= start.gain_as_is
+    assert settled.gain_as_is < 0.0
 
 
 @pytest.fixture(scope="module")
@@ -82,10 +80,10 @@ def test_bodies_are_the_candidates_own(soft):
 
 
 def test_a_load_swings_under_the_rigid_bodies_that_its_own_fit_finds():
-    """Under the baseline's, a quarter away, the fit explains more of the training runs and foretells no run."""
+    """With the baseline's, a quarter away, the fit explains more of the training runs and predicts others badly."""
     prepared = Screening.of(session("joint_elasticity", "hip", stiffness=150.0, hardening=HARDENING)).prepared
     baseline, runs = prepared.baseline, prepared.runs
-    spring = Candidate(JointElasticity("hip"), ((150.0, HARDENING),) * len(runs))
+    spring = Candidate(JointElasticity("hip"), ((180.0, 0.0),) * len(runs))
     made = Refinement(runs, baseline, prepared.weights)([spring])
     for run in runs:
         columns = baseline.layout.bodies_in(run.motion.run)

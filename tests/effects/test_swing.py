@@ -144,8 +144,9 @@ def simulated(model, seconds):
     return np.array(states), np.array(accelerated)
 
 
+@pytest.mark.parametrize("with_load", [False, True])
 @pytest.mark.parametrize("before", [None, "link_swing", "limb_swing", "on_limb", "transmitted"])
-def test_a_corrected_motion_depends_on_nothing_that_was_computed_of_the_measured_one(before):
+def test_a_corrected_motion_depends_on_nothing_that_was_computed_of_the_measured_one(before, with_load):
     """The load of a body is that along the corrected motion, whoever asked for the measured one's first."""
     t = np.arange(0.0, 5.0, 0.005)
     q = np.column_stack([0.3 * np.sin(4.0 * t), 0.2 * np.cos(5.0 * t)])
@@ -153,14 +154,16 @@ def test_a_corrected_motion_depends_on_nothing_that_was_computed_of_the_measured
     n = len(t)
     measured = Motion(
         t, q, dq, ddq, np.sin(np.column_stack([t, t])), np.zeros(n, np.int64), np.ones(n, bool), body=X, limb_body=X,
-        forces=np.ones((n, 4, 3)),
+        forces=np.ones((n, 4, 3)), geometry=Geometry(thigh_cuff_distance_m=0.2, shank_cuff_distance_m=0.2),
+        limb_load=np.cos(np.column_stack([t, t])) if with_load else None,
     )  # fmt: skip
     if before:
         getattr(measured, before)
     moved, alone = measured.with_state(q + 0.2, dq, ddq), replace(measured, q=q + 0.2)
     direction = np.tile([1.0, 0.5], (n, 1))
     for of in (
-        lambda motion: motion.link_swing.along(direction), lambda motion: motion.limb_swing.along(direction),
+        lambda motion: motion.link_swing.on_coordinate(direction),
+        lambda motion: motion.limb_swing.on_coordinate(direction),
         lambda motion: motion.on_limb, lambda motion: motion.transmitted,
     ):  # fmt: skip
         assert all((found == expected).all() for found, expected in zip(of(moved), of(alone), strict=True))

@@ -189,7 +189,8 @@ def _shapes(fits: Sequence[Fitted], alone: ShapeRefinement, regression: Decision
         return []
     swings = fits[0].candidate.effect.swings
     best, slopes = best_transmission(fits, alone) if swings else alone.refined(fits[0])
-    others = others_of(fits, best, ALTERNATIVES)
+    # A refinement may go far from its start; of a transmission it is not known which start was the best.
+    others = others_of(fits, best if swings else fits[0], ALTERNATIVES)
     slopes = np.hstack([slopes, towards(best, others)])
     shaped = [Cause.of(best, slopes, regression, first=True)]
     none = np.zeros((len(slopes), 0))

@@ -48,10 +48,10 @@ def _along(effect: Effect, directions: Sequence[tuple[float, ...]], runs: int) -
     return Candidate(effect, (directions[0],) * runs, tuple(directions))
 
 
-def others_of(fits: Sequence[Fitted], best: Fitted, most: int) -> list[Fitted]:
-    """Return the best fits of other forms, or at other maxima, than the best one's."""
-    effect = best.candidate.effect
-    kept = [best]
+def others_of(fits: Sequence[Fitted], chosen: Fitted, most: int) -> list[Fitted]:
+    """Return the best fits of other forms, or at other maxima, than the chosen one's."""
+    effect = chosen.candidate.effect
+    kept = [chosen]
     for fitted in fits:
         if len(kept) > most:
             break

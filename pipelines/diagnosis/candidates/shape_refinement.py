@@ -126,12 +126,13 @@ class ShapeRefinement:
         """
         if not start.candidate.effect.swings:
             return self._refined(start)
-        starts = [start] if start.candidate.bodies else self.fits_of_transmission(start.candidate)
+        own = None if start.candidate.bodies else self.fit(self._with_own_bodies(start.candidate))
+        starts = [start] if own is None else [start, own]
         best, slopes = max(map(self._refined, starts), key=lambda found: found[0].worth)
         for _ in range(BODY_REFITS):
             ahead = self.fit(self._rows.with_refitted_bodies(best.candidate, self._beside))
             refined = None if ahead is None else self._refined(ahead)
-            if refined is None or refined[0].gain_as_is < best.gain_as_is + ENOUGH:
+            if refined is None or refined[0].worth < best.worth + ENOUGH:
                 break
             best, slopes = refined
         return best, slopes
@@ -336,5 +337,6 @@ def reach(parameter: Parameter) -> tuple[float, float]:
     if not _unit_of(parameter):
         return low / BEYOND, high * BEYOND
     beyond = MARGIN * (high - low)
-    # What is typically nought or more, as a delay, is never less.
-    return max(low - beyond, 0.0) if low >= 0.0 else low - beyond, high + beyond
+    if low >= 0.0:
+        return max(low - beyond, 0.0), high + beyond  # a delay is never negative
+    return low - beyond, high + beyond

@@ -19,8 +19,8 @@ from pipelines.diagnosis.fit.joint_fit import Fit, fit, onsets_of, slope, stacke
 
 ROUNDS = 3
 """Rounds in which loads follow the rigid bodies that they are of."""
-SETTLING = 6
-"""Steps in which rigid bodies come to rest at given shapes: each leaves half of what they are away."""
+SETTLING = 5
+"""Steps in which rigid bodies come to rest at given shapes, each half way to the refitted ones."""
 STEPS = 3
 """Steps of a round."""
 HALVINGS = 3
@@ -41,18 +41,20 @@ class Refinement:
     def __call__(self, causes: Sequence[Candidate]) -> Fit:
         """Return the fit with every shape at its best.
 
-        What swings does so under the bodies that the fit itself finds. Only where these come to no rest it swings under
-        those that the library had: such a fit is no model of one machine, and may foretell other runs badly.
+        A load that swings is simulated with the rigid bodies that the fit itself finds. Where these come to no rest,
+        and the cause would do harm, it is simulated with those that the library had: the fit may then predict other
+        runs badly.
         """
         start = self._start(causes)
-        if any(cause.effect.swings for cause in causes):
-            settled = self._refined(self._at_rest(start))
-            if settled.cost < self._fit((), self._runs, None).cost:
+        still = [cause for cause in causes if not cause.effect.swings]
+        if len(still) < len(causes):
+            settled = self._at_rest(self._refined(self._at_rest(start)))
+            if settled.cost < self._fit(still, self._runs, None).cost:
                 return settled
         return self._refined(start)
 
     def _at_rest(self, best: Fit) -> Fit:
-        """Return the fit at the same shapes under its own rigid bodies."""
+        """Return the fit at the same shapes with loads of its own rigid bodies."""
         for _ in range(SETTLING):
             loads = self._loads_after(best)
             best = self._fit(best.causes, self._laden(loads), loads)

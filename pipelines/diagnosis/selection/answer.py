@@ -88,24 +88,20 @@ def _best(posterior: Posterior) -> Set:
 
 
 def _named(posterior: Posterior, best: Set, i: int) -> Named:
-    """Return a cause of the best set with what could stand in its place beside the others."""
+    """Return a cause of the best set with what could stand in its place beside the others.
+
+    Each set with the cause is compared with the sets that have another listed cause instead, all else alike.
+    """
     element = posterior.elements[i]
     rest = frozenset(posterior.elements[k].label for k in best) - {element.label}
     listed = {e.label for e in posterior.elements if not e.is_law}
-    in_place: dict[str, float] = {}
+    own, in_place = 0.0, dict.fromkeys(sorted(listed - rest - {element.label}), 0.0)
     for labels, p in posterior.by_labels.items():
-        if not rest <= labels:
-            continue
-        # Two listed causes beside the rest are no single one in its place.
-        others = (labels - rest) & listed
-        if len(others) == 1:
-            (label,) = others
-            in_place[label] = in_place.get(label, 0.0) + p
-    least = TIED * in_place[element.label]
-    ties = sorted(
-        ((label, p) for label, p in in_place.items() if label != element.label and p >= least),
-        key=lambda item: -item[1],
-    )
+        if element.label in labels and rest <= labels:
+            own += p
+            for other in in_place.keys() - labels:
+                in_place[other] += posterior.by_labels.get(labels - {element.label} | {other}, 0.0)
+    ties = sorted(((label, p) for label, p in in_place.items() if p >= TIED * own), key=lambda item: -item[1])
     members = {element.label, *(label for label, _ in ties)}
     together = sum(p for labels, p in posterior.by_labels.items() if labels & members)
     alone = posterior.marginals[element.label]

@@ -282,7 +282,7 @@ def _positive(cause: Cause) -> list[int]:
     if cause.candidate.directions:
         return []
     if bends:
-        # A column is the effect at its shape: turned over, it would be a spring that pushes.
+        # A column is the effect at its shape: turned over, it would be a spring that pushes, a delay that comes early.
         free = [p for p in effect.shape if p.default is None]
         return [0] if all(p.typical[0] >= 0 and p.unit != "1" for p in free) else []
     if len(effect.linear) != len(cause.amplitudes):

@@ -64,7 +64,7 @@ def _worst_joint(d: Diagnosis) -> int:
 
 
 def _size(d: Diagnosis) -> str:
-    """Return the baseline's error where it is most noise floors, and how many that is."""
+    """Return the error of the joint where it is largest compared with the noise floor, and that ratio."""
     worst = _worst_joint(d)
     joint, error = d.baseline.joints[worst], d.before.errors.rms[worst]
     ratio = error / d.floor_rms[worst]
