@@ -127,7 +127,6 @@ def _extension(
 def _write(found: "Identified", output: Path, shared: "dict[str, Any]", *, figures: bool) -> list[str]:
     """Write parameters, residuals and, if asked, figures into a folder; return the figures' names."""
     from pipelines.contracts import PARAMETERS, RESIDUALS
-    from pipelines.identification.figures import draw
     from pipelines.identification.validation import residuals
 
     run = found.runs[0]
@@ -151,6 +150,8 @@ def _write(found: "Identified", output: Path, shared: "dict[str, Any]", *, figur
         RESIDUALS.write_pieces(left, residuals(found.runs, found.model_of, model, found.training.cutoff_hz), shared)
     if not figures:
         return []
+    from pipelines.identification.figures import draw
+
     with console.working("drawing"):
         draw(RESIDUALS.scan(left), output)
     return sorted(path.name for path in output.glob("*.png"))

@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
-from scipy.signal import butter, savgol_coeffs, sosfilt, sosfilt_zi
+from scipy.signal import butter, savgol_coeffs, sosfiltfilt
 
 ORDER = 4
 """Order of one pass; forwards and backwards the filter falls with twice this."""
@@ -43,28 +43,15 @@ def low_pass(x: NDArray, rate_hz: float, cutoff_hz: float, order: int = ORDER) -
     rate_hz, cutoff_hz : float
         Sample rate; frequency at which one pass has fallen by 3 dB, below half the sample rate.
     """
+    sections = _sections(order, cutoff_hz, rate_hz)
     padding = min(len(x) - 1, _padding(rate_hz, cutoff_hz))
-    # As scipy.signal.sosfiltfilt, which solves for the steady state anew in every call.
-    wide = np.concatenate([2.0 * x[0] - x[padding:0:-1], x, 2.0 * x[-1] - x[-2 : -padding - 2 : -1]])
-    for _ in range(2):
-        wide = _one_pass(wide, *_sections(order, cutoff_hz, rate_hz))[::-1]
-    return np.ascontiguousarray(wide[padding : padding + len(x)])
-
-
-def _one_pass(x: NDArray, sections: NDArray, steady: NDArray) -> NDArray:
-    """Filter along the first axis, from the steady state of the first sample."""
-    begin = np.multiply.outer(steady, x[0])
-    return np.asarray(sosfilt(sections, x, axis=0, zi=begin)[0])
+    return np.ascontiguousarray(sosfiltfilt(sections, x, axis=0, padlen=padding))
 
 
 @lru_cache
-def _sections(order: int, cutoff_hz: float, rate_hz: float) -> tuple[NDArray, NDArray]:
-    """Return the filter's second-order sections, and their state under a constant input of one.
-
-    Their design takes longer than a short stretch's filtering.
-    """
-    sections = np.asarray(butter(order, cutoff_hz, fs=rate_hz, output="sos"))
-    return sections, sosfilt_zi(sections)
+def _sections(order: int, cutoff_hz: float, rate_hz: float) -> NDArray:
+    """Return the filter's second-order sections: their design takes longer than a short stretch's filtering."""
+    return np.asarray(butter(order, cutoff_hz, fs=rate_hz, output="sos"))
 
 
 @lru_cache

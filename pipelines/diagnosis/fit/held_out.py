@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.candidates.candidate import ALWAYS, NEVER, Candidate
+from pipelines.diagnosis.candidates.shape_refinement import reach
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.baseline_columns import columns_under
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit.change_point import Onset
 from pipelines.diagnosis.fit.joint_fit import Fit, laden, step_of
-from pipelines.effects import Parameter
 from pipelines.model import Model, Term
 
 STRETCH_S = 1.0
@@ -112,7 +112,7 @@ def _bent(
         wide = np.concatenate([columns[:, :, own], *slopes], axis=2)
         steps = _solved(wide, measured - columns @ shared, learnt, fit.weights)[int(own.sum()) :]
         for (number, i), step in zip(places, steps, strict=True):
-            value = _within_reach(terms[number].shape[i] + step, fit.causes[number].effect.shape[i])
+            value = float(np.clip(terms[number].shape[i] + step, *reach(fit.causes[number].effect.shape[i])))
             terms = _with_shape(terms, number, i, value)
         plain = columns_under(terms, run, baseline)
     return terms, plain
@@ -140,15 +140,3 @@ def _slope(
 def _with_shape(terms: list[Term], number: int, i: int, value: float) -> list[Term]:
     """Return the terms with another shape of one of them."""
     return [term.with_shape(i, value) if k == number else term for k, term in enumerate(terms)]
-
-
-def _within_reach(value: float, parameter: Parameter) -> float:
-    """Return the value that a fit may give to a shape parameter of either sign, as near as it may come to ``value``."""
-    return float(np.clip(value, *_farthest(parameter)))
-
-
-def _farthest(parameter: Parameter) -> tuple[float, float]:
-    """Return the least and the largest value that a fit may give to a shape parameter of either sign."""
-    low, high = parameter.typical
-    beyond = 0.5 * (high - low)
-    return low - beyond, high + beyond

@@ -88,7 +88,7 @@ def _best(posterior: Posterior) -> Set:
 
 
 def _named(posterior: Posterior, best: Set, i: int) -> Named:
-    """Return a cause of the best set with what could stand in its place beside the others.
+    """Return a cause of the best set with its ties: listed causes that could replace it.
 
     Each set with the cause is compared with the sets that have another listed cause instead, all else alike.
     """
