@@ -4,6 +4,8 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numba.core import types
+from numba.core.types import boolean, float64, int64
 from numpy.typing import NDArray
 
 from pipelines.effects import Effect, Side
@@ -75,6 +77,13 @@ class Assembly(NamedTuple):
     geometry: np.ndarray
     temperature: np.ndarray
     """(J,) °C of the motors; who simulates a machine that warms sets it before each sample."""
+
+
+_indices, _reals = int64[::1], float64[::1]
+ASSEMBLY = types.NamedTuple(
+    [int64, *(_indices,) * 7, _reals, *(_indices,) * 4, _reals, boolean, _reals, _reals], Assembly
+)
+"""The assembly's type in compiled code."""
 
 
 def _addresses(kernels: Sequence, blank) -> NDArray:

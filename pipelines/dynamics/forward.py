@@ -17,11 +17,14 @@ complementarity problem; Stewart and Trinkle, 1996), so joints stick without cha
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, typeof
+from numba.core.types import float64, void
 from numpy.typing import NDArray
 
-from pipelines.dynamics.assembly import Assembly
+from pipelines.dynamics.assembly import ASSEMBLY, Assembly
+from pipelines.dynamics.compiled_once import compiled_once
 from pipelines.effects.kernel import Instant, derivative_at, reaction_at, spring_at
+from pipelines.mechanics.instant import vector
 
 STICTION_SWEEPS = 20
 STICTION_TOLERANCE = 1e-9
@@ -29,6 +32,8 @@ STICTION_TOLERANCE = 1e-9
 HOT: dict[str, Any] = {"cache": True, "_nrt": False}
 """How the innermost functions are compiled. They allocate nothing, and numba's counting of references
 to arrays would take more than half of their time; ``_nrt`` is its switch for that."""
+INNER: dict[str, Any] = {**HOT, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""How those are that Python never calls: what hands over an assembly takes long to compile."""
 
 Q, DQ, THETA, DTHETA = range(4)
 """Rows of a state: link angle and speed, motor angle and speed, (4, J)."""
@@ -59,13 +64,16 @@ class Workspace(NamedTuple):
     both: np.ndarray
 
 
-@njit(cache=True)
-def workspace(joints):
+def workspace(joints: int) -> Workspace:
     """Make the scratch arrays for a number of joints."""
     v = np.zeros((10, joints))
     m = np.zeros((2, joints, joints))
     both = np.zeros((2 * joints, 2 * joints))
     return Workspace(v[0], v[1], m[0], m[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8], v[9], both, np.zeros(2 * joints))
+
+
+states = float64[:, ::1]
+WORKSPACE = typeof(workspace(1))
 
 
 # Inlined: a call hands over the whole assembly, which costs as much as the equations do.
@@ -139,7 +147,7 @@ def _prepare(a, w, t, state, memory, load):
             )
 
 
-@njit(**HOT)
+@njit(**INNER)
 def _accelerate_both(a, w, state, drive, rates):
     """Write d(state)/dt of machine and limb, whose masses are coupled across the joints that are rigid.
 
@@ -166,7 +174,7 @@ def _accelerate_both(a, w, state, drive, rates):
         rates[THETA, j], rates[DTHETA, j] = state[DTHETA, j], w.both[joints + j]
 
 
-@njit(**HOT)
+@njit(**INNER)
 def _eliminate(A, b):
     """Solve A x = b in place by Gaussian elimination with partial pivoting; ``b`` (n,) is left holding x.
 
@@ -216,8 +224,10 @@ def _finish(a, w, t, state, memory, direction, load, drive, rates):
             rates[DTHETA, j] = rates[DQ, j]
 
 
-# Not inlined: each of its callers would compile it anew, ten seconds in all.
-@njit(**HOT)
+RATES = void(ASSEMBLY, WORKSPACE, float64, states, vector, vector, vector, vector, states)
+
+
+@compiled_once(RATES)
 def accelerations(a, w, t, state, memory, direction, load, drive, rates):
     """Write d(state)/dt into ``rates`` (4, J).
 
@@ -242,7 +252,7 @@ def accelerations(a, w, t, state, memory, direction, load, drive, rates):
     _finish(a, w, t, state, memory, direction, load, drive, rates)
 
 
-@njit(**HOT)
+@compiled_once(void(ASSEMBLY, WORKSPACE, float64, states, vector, vector, vector, vector))
 def memory_rates(a, w, t, state, memory, direction, load, rates):
     """Write the rates of all memories into ``rates`` (m,)."""
     if rates.shape[0] > 0:
@@ -258,7 +268,26 @@ def memory_rates(a, w, t, state, memory, direction, load, rates):
                 )
 
 
-@njit(**HOT)
+@compiled_once(RATES)
+def _rates_under(a, w, t, state, memory, direction, load, drive, rates):
+    """As ``_finish``, but not inlined: for what happens seldom."""
+    _finish(a, w, t, state, memory, direction, load, drive, rates)
+
+
+@njit(**INNER)
+def _grip(a, w, t, state, memory, load, drive, rates, j):
+    """How much a motor's acceleration changes per unit of its direction, rad/s²: negative where friction is dry."""
+    now = w.direction[j]
+    w.direction[j] = -1.0
+    _rates_under(a, w, t, state, memory, w.direction, load, drive, rates)
+    backward = rates[DTHETA, j]
+    w.direction[j] = 1.0
+    _rates_under(a, w, t, state, memory, w.direction, load, drive, rates)
+    w.direction[j] = now
+    return 0.5 * (rates[DTHETA, j] - backward)
+
+
+@compiled_once(void(ASSEMBLY, WORKSPACE, float64, float64, states, vector, vector, vector, states))
 def find_direction(a, w, t, h, state, memory, load, drive, rates):
     """Write into ``w.direction`` (J,) the sign of each motor's speed over the next ``h`` seconds.
 
@@ -278,7 +307,7 @@ def find_direction(a, w, t, h, state, memory, load, drive, rates):
     for _ in range(STICTION_SWEEPS):
         change = 0.0
         for j in range(a.joints):
-            _finish(a, w, t, state, memory, w.direction, load, drive, rates)
+            _rates_under(a, w, t, state, memory, w.direction, load, drive, rates)
             ahead = state[DTHETA, j] + h * rates[DTHETA, j]
             before = w.direction[j]
             if w.slope[j] < 0.0:
@@ -289,20 +318,7 @@ def find_direction(a, w, t, h, state, memory, load, drive, rates):
             change = max(change, abs(w.direction[j] - before))
         if change < STICTION_TOLERANCE:
             break
-    _finish(a, w, t, state, memory, w.direction, load, drive, rates)
-
-
-@njit(**HOT)
-def _grip(a, w, t, state, memory, load, drive, rates, j):
-    """How much a motor's acceleration changes per unit of its direction, rad/s²: negative where friction is dry."""
-    now = w.direction[j]
-    w.direction[j] = -1.0
-    _finish(a, w, t, state, memory, w.direction, load, drive, rates)
-    backward = rates[DTHETA, j]
-    w.direction[j] = 1.0
-    _finish(a, w, t, state, memory, w.direction, load, drive, rates)
-    w.direction[j] = now
-    return 0.5 * (rates[DTHETA, j] - backward)
+    _rates_under(a, w, t, state, memory, w.direction, load, drive, rates)
 
 
 class Stages(NamedTuple):
@@ -314,10 +330,12 @@ class Stages(NamedTuple):
     memory: np.ndarray
 
 
-@njit(cache=True)
-def stages(joints, memories):
+def stages(joints: int, memories: int) -> Stages:
     """Make the scratch of the Runge-Kutta step."""
     return Stages(np.zeros((4, 4, joints)), np.zeros((4, memories)), np.zeros((4, joints)), np.zeros(memories))
+
+
+STAGES = typeof(stages(1, 1))
 
 
 @njit(cache=True, inline="always")
@@ -340,6 +358,12 @@ def reach_stage(s, i, reach, state, memory):
 
 
 @njit(cache=True, inline="always")
+def weighted(k):
+    """Return the four stages' sum with the classical Runge-Kutta weights."""
+    return k[0] + 2.0 * k[1] + 2.0 * k[2] + k[3]
+
+
+@njit(cache=True, inline="always")
 def end_stages(s, h, state, memory):
     """Advance state and memory by the weighted mean of the four stages."""
     for row in range(4):
@@ -349,7 +373,7 @@ def end_stages(s, h, state, memory):
         memory[m] += h / 6.0 * weighted(s.memory_rates[:, m])
 
 
-@njit(**HOT)
+@compiled_once(void(ASSEMBLY, WORKSPACE, STAGES, float64, float64, states, vector, vector, vector))
 def step(a, w, s, t, h, state, memory, load, drive):
     """Advance ``state`` (4, J), ``memory`` (m,) and ``load`` (J,) by ``h`` seconds under constant drive torque.
 
@@ -363,12 +387,6 @@ def step(a, w, s, t, h, state, memory, load, drive):
         accelerations(a, w, t + reach, s.state, s.memory, w.direction, load, drive, s.rates[i])
         memory_rates(a, w, t + reach, s.state, s.memory, w.direction, load, s.memory_rates[i])
     end_stages(s, h, state, memory)
-
-
-@njit(cache=True, inline="always")
-def weighted(k):
-    """Return the four stages' sum with the classical Runge-Kutta weights."""
-    return k[0] + 2.0 * k[1] + 2.0 * k[2] + k[3]
 
 
 def memory_size(a: Assembly) -> int:

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from pipelines.dynamics.assembly import Assembly
-from pipelines.dynamics.forward import DTHETA, Q, accelerations, memory_size, resting_state, workspace
+from pipelines.dynamics.forward import DTHETA, HOT, Q, accelerations, memory_size, resting_state, workspace
 from pipelines.errors import InputError
 
 KNEE_ANGLES = np.linspace(0.0, np.pi, 61)
@@ -22,24 +22,24 @@ MOST_STEPS = 200
 """Integration steps a sample: at the default gain and rate the motors then feel 1e-3 kg·m², less than rotors have."""
 
 
-@njit(cache=True)
-def _masses(a, poses, memory, state):
-    w, rates, still = workspace(a.joints), np.zeros((4, a.joints)), np.zeros(a.joints)
-    mass = np.empty((len(poses), a.joints, a.joints))
-    mobility = np.empty((len(poses), a.joints, a.joints))
-    drive = np.zeros(a.joints)
+@njit(**HOT)
+def _masses(a, w, poses, memory, state, still, drive, rates, mass, mobility):
+    """Write mass matrices and mobilities at poses (k, J) into ``mass`` and ``mobility`` (k, J, J)."""
+    joints = a.joints
     for k in range(len(poses)):
-        state[Q] = poses[k]
-        for j in range(a.joints):
-            drive[j] = 1.0
-            accelerations(a, w, 0.0, state, memory, w.direction, still, drive, rates)
-            mobility[k, :, j] = rates[DTHETA]
-            drive[j] = 0.0
-        accelerations(a, w, 0.0, state, memory, w.direction, still, drive, rates)
-        for j in range(a.joints):
-            mobility[k, :, j] -= rates[DTHETA]
-        mass[k] = w.mass
-    return mass, mobility
+        for j in range(joints):
+            state[Q, j] = poses[k, j]
+        # With no torque first, then with one newton metre at each drive in turn.
+        for pushed in range(-1, joints):
+            for j in range(joints):
+                drive[j] = 1.0 if j == pushed else 0.0
+            accelerations(a, w, 0.0, state, memory, still, still, drive, rates)
+            for i in range(joints):
+                for j in range(joints):
+                    if pushed < 0:
+                        mass[k, i, j], mobility[k, i, j] = w.mass[i, j], -rates[DTHETA, i]
+                    elif pushed == j:
+                        mobility[k, i, j] += rates[DTHETA, i]
 
 
 def _poses(joints: int) -> NDArray:
@@ -54,7 +54,14 @@ def _poses(joints: int) -> NDArray:
 
 def masses(a: Assembly) -> tuple[NDArray, NDArray]:
     """Return the links' mass matrix (kg·m²) and the motors' acceleration per drive torque, (k, J, J) each: k poses."""
-    return _masses(a, _poses(a.joints), np.zeros(memory_size(a)), resting_state(np.zeros(a.joints)))
+    poses, joints = _poses(a.joints), a.joints
+    mass, mobility = np.empty((2, len(poses), joints, joints))
+    state, still = resting_state(np.zeros(joints)), np.zeros(joints)
+    _masses(
+        a, workspace(joints), poses, np.zeros(memory_size(a)), state, still, still.copy(), np.zeros((4, joints)),
+        mass, mobility,
+    )  # fmt: skip
+    return mass, mobility
 
 
 def substeps_for(a: Assembly, feedback_gain: float, period: float) -> int:

@@ -171,21 +171,27 @@ def advance(a, d, w, s, loop, t, reference, enabled, angle, speed, torque, truth
     loop.reference[:] = reference
 
 
-@njit(cache=True)
-def follow(a, d, loop, reference, start_s, temperature=None):
+def follow(
+    a: Assembly, d: Drives, loop: LoopState, reference: NDArray, start_s: float, temperature: NDArray | None = None
+) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """Run the loop along set-points (n, J): measured angle, speed, torque (n, J) and truth (n, 4, J) of each sample.
 
     ``temperature`` (n, J) is the motors', °C, where they warm.
     """
     n, joints = reference.shape
-    w, s = workspace(joints), stages(joints, loop.memory.shape[0])
     angle, speed, torque = np.empty((n, joints)), np.empty((n, joints)), np.empty((n, joints))
     truth = np.empty((n, 4, joints))
-    enabled = np.ones(joints, dtype=np.bool_)
+    warmth = np.tile(a.temperature, (n, 1)) if temperature is None else temperature
+    scratch = workspace(joints), stages(joints, len(loop.memory))
+    enabled = np.ones(joints, dtype=bool)
+    _follow(a, d, *scratch, loop, reference, start_s, warmth, enabled, angle, speed, torque, truth)
+    return angle, speed, torque, truth
+
+
+@njit(cache=True)
+def _follow(a, d, w, s, loop, reference, start_s, temperature, enabled, angle, speed, torque, truth):
     period = d.step_s * SUBSTEPS * d.periods
-    for k in range(n):
-        if temperature is not None:
-            a.temperature[:] = temperature[k]
+    for k in range(len(reference)):
+        a.temperature[:] = temperature[k]
         t = start_s + k * period
         advance(a, d, w, s, loop, t, reference[k], enabled, angle[k], speed[k], torque[k], truth[k])
-    return angle, speed, torque, truth

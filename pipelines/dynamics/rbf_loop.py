@@ -11,17 +11,22 @@ dry friction is held over a step, as everywhere in the forward dynamics. A step 
 a torque reaches or leaves its limit, is halved until the switch is found: its time is what limits the accuracy.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, typeof
+from numba.core.types import boolean, float64
 from numpy.typing import NDArray
 
-from pipelines.dynamics.assembly import Assembly
+from pipelines.dynamics.assembly import ASSEMBLY, Assembly
+from pipelines.dynamics.compiled_once import compiled_once
 from pipelines.dynamics.forward import (
     DTHETA,
     HOT,
+    INNER,
+    STAGES,
     THETA,
+    WORKSPACE,
     accelerations,
     begin_stages,
     end_stages,
@@ -31,10 +36,12 @@ from pipelines.dynamics.forward import (
     reach_stage,
     resting_state,
     stages,
+    states,
     weighted,
     workspace,
 )
 from pipelines.dynamics.pd_loop import read_encoders
+from pipelines.mechanics.instant import vector
 
 PARTS = 256
 """How finely a step is cut where something switches in it, a power of two."""
@@ -106,7 +113,12 @@ class _Seen(NamedTuple):
     reading: np.ndarray
 
 
-@njit(**HOT)
+CONTROLLER = typeof(RbfController(1.0, 1.0, 1.0, 1.0, 1.0, np.zeros(1), 1.0))
+NETWORK = typeof(_Network(np.zeros((1, 1)), np.zeros((4, 1, 1)), np.zeros((1, 1)), np.zeros(1)))
+SEEN = typeof(_Seen(*np.zeros((5, 1))))
+
+
+@njit(**INNER)
 def _control(c, seen, state, wanted, weights, activation, torque, network, weight_rates):
     """Write torque and network output (J,) and the weights' rates (J, m) for a reference ``wanted`` (3, J)."""
     sharpness = 1.0 / (c.width * c.width)
@@ -129,7 +141,22 @@ def _control(c, seen, state, wanted, weights, activation, torque, network, weigh
             weight_rates[j, i] = rate * activation[i]
 
 
-@njit(**HOT)
+@njit(cache=True, inline="always")
+def _keeps_going(direction, state):
+    """Tell whether every motor moves in the direction of its friction, or stands where friction holds it."""
+    agrees = True
+    for j in range(direction.shape[0]):
+        v = state[DTHETA, j]
+        agrees &= v * direction[j] >= -ROUNDING if abs(direction[j]) == 1.0 else abs(v) < CREEP
+    return agrees
+
+
+@compiled_once(
+    boolean(
+        ASSEMBLY, CONTROLLER, WORKSPACE, STAGES, NETWORK, SEEN, float64, float64, states, vector, vector,
+        float64[:, :, ::1], states, vector, vector, states,
+    )
+)  # fmt: skip
 def _step(a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturbance, torque, network, drive):
     """Advance leg and weights by ``h``; ``wanted`` (3, 3, J) and ``disturbance`` (3, J) at begin, middle and end.
 
@@ -163,16 +190,6 @@ def _step(a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturbance,
 
 
 @njit(cache=True, inline="always")
-def _keeps_going(direction, state):
-    """Tell whether every motor moves in the direction of its friction, or stands where friction holds it."""
-    agrees = True
-    for j in range(direction.shape[0]):
-        v = state[DTHETA, j]
-        agrees &= v * direction[j] >= -ROUNDING if abs(direction[j]) == 1.0 else abs(v) < CREEP
-    return agrees
-
-
-@njit(cache=True, inline="always")
 def _copy(state, memory, load, weights, into_state, into_memory, into_load, into_weights):
     for j in range(load.shape[0]):
         into_load[j] = load[j]
@@ -196,22 +213,20 @@ def _within(wanted, disturbance, begin, length, kept):
                 kept.wanted[i, k, j] = first * wanted[0, k, j] + middle * wanted[1, k, j] + last * wanted[2, k, j]
 
 
-@njit(**HOT)
+@njit(**INNER)
 def _advance(a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturbance, torque, network, drive, kept):
     """As ``_step``, but a part in which something switches is taken again as two halves, down to a ``PARTS``-th."""
     done, size = 0, PARTS
     while done < PARTS:
         _copy(state, memory, load, net.weights, kept.state, kept.memory, kept.load, kept.weights)
-        if size == PARTS:
-            smooth = _step(
-                a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturbance, torque, network, drive
-            )
-        else:
+        whole = size == PARTS
+        if not whole:
             _within(wanted, disturbance, done / PARTS, size / PARTS, kept)
-            smooth = _step(
-                a, c, w, s, net, seen, t + done * h / PARTS, size * h / PARTS, state, memory, load,
-                kept.wanted, kept.disturbance, drive[1], drive[2], drive,
-            )  # fmt: skip
+        smooth = _step(
+            a, c, w, s, net, seen, t + done * h / PARTS, size * h / PARTS, state, memory, load,
+            wanted if whole else kept.wanted, disturbance if whole else kept.disturbance,
+            torque if whole else drive[1], network if whole else drive[2], drive,
+        )  # fmt: skip
         if smooth or size == 1:
             done += size
             while size < PARTS and done % (2 * size) == 0:
@@ -221,7 +236,7 @@ def _advance(a, c, w, s, net, seen, t, h, state, memory, load, wanted, disturban
             size //= 2
 
 
-@njit(**HOT)
+@njit(**INNER)
 def _look(a, encoder, seen, state, k, period):
     """Read the encoders at sample ``k``: how far angle and speed are off what they are."""
     for j in range(a.joints):
@@ -241,7 +256,7 @@ def _look(a, encoder, seen, state, k, period):
 
 
 @njit(**HOT)
-def _carry_on(
+def _run(
     a, c, encoder, w, s, net, seen, state, memory, load, reference, disturbance, period, substeps, drive, kept, out
 ):
     """Run sample after sample into ``out`` (n, 4, J); return how many: a joint that runs away ends it."""
@@ -270,20 +285,10 @@ def _carry_on(
     return k + 1
 
 
-@njit(cache=True)
-def _run(a, c, encoder, state, memory, reference, disturbance, period, substeps, out):
-    joints, m = a.joints, c.nodes.shape[0]
-    w, s = workspace(joints), stages(joints, memory.shape[0])
-    net = _Network(np.zeros((joints, m)), np.zeros((4, joints, m)), np.zeros((joints, m)), np.zeros(m))
-    v = np.zeros((6, joints))
-    seen, load, drive = _Seen(v[0], v[1], v[2], v[3], v[4]), v[5], np.zeros((4, joints))
-    kept = _Kept(
-        np.zeros((4, joints)), np.zeros(memory.shape[0]), np.zeros(joints), np.zeros((joints, m)),
-        np.zeros((3, 3, joints)), np.zeros((3, joints)),
-    )  # fmt: skip
-    return _carry_on(
-        a, c, encoder, w, s, net, seen, state, memory, load, reference, disturbance, period, substeps, drive, kept, out
-    )
+def _of_floats(controller: RbfController) -> RbfController:
+    """Return a controller as it was compiled for."""
+    values: list[Any] = [value if np.ndim(value) else float(value) for value in controller]
+    return RbfController(*values)
 
 
 class RbfRun(NamedTuple):
@@ -331,9 +336,19 @@ def follow_with_rbf(
     RbfRun
         n samples; fewer, where a joint has left ± one turn on the way: then in the last sample.
     """
-    n = (len(reference) - 1) // (2 * substeps) + 1
-    out = np.empty((n, 4, a.joints))
+    n, joints, m = (len(reference) - 1) // (2 * substeps) + 1, a.joints, len(controller.nodes)
+    out = np.empty((n, 4, joints))
     state, memory = resting_state(start), np.zeros(memory_size(a))
+    w, s = workspace(joints), stages(joints, len(memory))
+    network = _Network(np.zeros((joints, m)), np.zeros((4, joints, m)), np.zeros((joints, m)), np.zeros(m))
+    kept = _Kept(
+        np.zeros((4, joints)), np.zeros(len(memory)), np.zeros(joints), np.zeros((joints, m)),
+        np.zeros((3, 3, joints)), np.zeros((3, joints)),
+    )  # fmt: skip
+    seen, load, drive = _Seen(*np.zeros((5, joints))), np.zeros(joints), np.zeros((4, joints))
     reference, disturbance = np.ascontiguousarray(reference), np.ascontiguousarray(disturbance)
-    reached = _run(a, controller, encoder, state, memory, reference, disturbance, period, substeps, out)
+    reached = _run(
+        a, _of_floats(controller), encoder, w, s, network, seen, state, memory, load, reference, disturbance,
+        period, substeps, drive, kept, out,
+    )  # fmt: skip
     return RbfRun(*(out[:reached, i] for i in range(4)))

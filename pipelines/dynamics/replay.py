@@ -12,7 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from pipelines.dynamics.assembly import assemble
-from pipelines.dynamics.forward import DTHETA, HOT, THETA, memory_rates, memory_size, stages, step, workspace
+from pipelines.dynamics.forward import DTHETA, HOT, INNER, THETA, memory_rates, memory_size, stages, step, workspace
 from pipelines.errors import InputError
 from pipelines.mechanics.instant import REFERENCE_C
 from pipelines.mechanics.motion import Motion
@@ -80,13 +80,15 @@ def replay(model: Model, motion: Motion, window_s: float = WINDOW_S, every_s: fl
     load = np.ascontiguousarray(motor.transmitted[0])
     temperature = known_temperature(motion)
     memory = np.zeros((len(motion), memory_size(a)))
+    w, s = workspace(a.joints), stages(a.joints, memory.shape[1])
     for stretch in motion.segments():
-        _remember(
-            a, motion.time[stretch], states[stretch], load[stretch], temperature[stretch], memory[stretch]
-        )  # fmt: skip
+        _remember(a, w, s, motion.time[stretch], states[stretch], load[stretch], temperature[stretch], memory[stretch])
     torque = np.ascontiguousarray(model.delivered(motor))
     parts = int(np.ceil(0.5 / (motion.sample_rate_hz * LONGEST_STEP_S)))
-    out = _windows(a, motion.time, states, load, temperature, memory, torque, first, length, parts)
+    out = np.empty((len(first), length + 1, 2, a.joints))
+    for k, window in zip(first, out, strict=True):
+        a.temperature[:] = temperature[k]
+        _window(a, w, s, motion.time[k:], torque[k:], parts, states[k].copy(), memory[k].copy(), load[k].copy(), window)
     samples = first[:, np.newaxis] + np.arange(length + 1)
     return ReplayResult(first, out[:, :, 0], out[:, :, 1], motor.q[samples] - out[:, :, 0])
 
@@ -105,43 +107,35 @@ def _stretches(motion: Motion) -> Iterator[slice]:
             yield slice(int(start), int(stop))
 
 
-@njit(cache=True)
-def _remember(a, time, states, load, temperature, memory):
+@njit(**INNER)
+def _recall(a, w, s, time, states, load, k, share, memory):
+    """Write the memories' rates a share of the way from sample ``k`` to the next into the first of ``s``."""
+    for j in range(a.joints):
+        w.passed[j] = load[k, j] + share * (load[k + 1, j] - load[k, j])
+        for row in range(4):
+            s.state[row, j] = states[k, row, j] + share * (states[k + 1, row, j] - states[k, row, j])
+        w.direction[j] = np.sign(s.state[DTHETA, j])
+    t = time[k] + share * (time[k + 1] - time[k])
+    memory_rates(a, w, t, s.state, memory, w.direction, w.passed, s.memory_rates[0])
+
+
+@njit(**HOT)
+def _remember(a, w, s, time, states, load, temperature, memory):
     """Write the memories along a recorded stretch (n, 4, J), from rest at its first sample, into ``memory`` (n, m)."""
-    w = workspace(a.joints)
-    rate, middle = np.zeros(memory.shape[1]), np.zeros(memory.shape[1])
-    state, passed = states[0].copy(), load[0].copy()
     for k in range(len(time) - 1 if memory.shape[1] > 0 else 0):
-        memory[k + 1] = memory[k]
-        a.temperature[:] = temperature[k]
+        for j in range(a.joints):
+            a.temperature[j] = temperature[k, j]
+        for m in range(memory.shape[1]):
+            memory[k + 1, m] = memory[k, m]
         h = (time[k + 1] - time[k]) / MEMORY_SUBSTEPS
-        for i in range(2 * MEMORY_SUBSTEPS):
-            share = 0.5 * i / MEMORY_SUBSTEPS
-            state[:] = states[k] + share * (states[k + 1] - states[k])
-            passed[:] = load[k] + share * (load[k + 1] - load[k])
-            t = time[k] + share * (time[k + 1] - time[k])
-            w.direction[:] = np.sign(state[DTHETA])
+        for i in range(MEMORY_SUBSTEPS):
             # The midpoint rule: half a step for the rate in the middle, a whole one with it.
-            if i % 2 == 0:
-                memory_rates(a, w, t, state, memory[k + 1], w.direction, passed, rate)
-                middle[:] = memory[k + 1] + 0.5 * h * rate
-            else:
-                memory_rates(a, w, t, state, middle, w.direction, passed, rate)
-                memory[k + 1] += h * rate
-
-
-@njit(cache=True)
-def _windows(a, time, states, load, temperature, memory, torque, first, length, parts):
-    """Simulate every window: motor angle and speed, (windows, length + 1, 2, J)."""
-    out = np.empty((len(first), length + 1, 2, a.joints))
-    w, s = workspace(a.joints), stages(a.joints, memory.shape[1])
-    state, remembered, passed = np.empty((4, a.joints)), np.empty(memory.shape[1]), np.empty(a.joints)
-    for window in range(len(first)):
-        k = first[window]
-        state[:], remembered[:], passed[:] = states[k], memory[k], load[k]
-        a.temperature[:] = temperature[k]
-        _window(a, w, s, time[k:], torque[k:], parts, state, remembered, passed, out[window])
-    return out
+            _recall(a, w, s, time, states, load, k, i / MEMORY_SUBSTEPS, memory[k + 1])
+            for m in range(memory.shape[1]):
+                s.memory[m] = memory[k + 1, m] + 0.5 * h * s.memory_rates[0, m]
+            _recall(a, w, s, time, states, load, k, (i + 0.5) / MEMORY_SUBSTEPS, s.memory)
+            for m in range(memory.shape[1]):
+                memory[k + 1, m] += h * s.memory_rates[0, m]
 
 
 @njit(**HOT)

@@ -1,0 +1,55 @@
+"""Functions that are compiled once: their callers call the machine code that is there.
+
+numba otherwise optimises the code of a function anew within each of its callers, and theirs: of the dynamics' five
+levels each would take as long as the first. An optimiser that cannot see into a call cannot make it part of its
+caller either, which for functions as large as these gains nothing.
+"""
+
+from functools import wraps
+
+from llvmlite import binding, ir
+from numba import njit
+from numba.core import cgutils
+from numba.extending import lower_builtin, type_callable
+
+from pipelines.effects.kernel import ALLOCATING_NOTHING, address
+
+
+def compiled_once(signature):
+    """Return a decorator that compiles a function of one signature, which allocates nothing.
+
+    It may be called from Python and from compiled code.
+    """
+
+    def decorate(function):
+        compiled = njit(signature, **ALLOCATING_NOTHING)(function)
+        # The signature is part of the name, so that compiled code of another version finds nothing here.
+        symbol = f"{function.__module__}.{function.__qualname__}{signature}"
+        binding.add_symbol(symbol, address(compiled))
+
+        @wraps(function)
+        def call(*arguments):
+            return compiled(*arguments)
+
+        @type_callable(call)
+        def typed(context):
+            @wraps(function)
+            def typer(*arguments):
+                return signature
+
+            return typer
+
+        @lower_builtin(call, *signature.args)
+        def lower(context, builder, signature, arguments):
+            kind = context.call_conv.get_function_type(signature.return_type, signature.args)
+            there = builder.module.globals.get(symbol) or ir.Function(builder.module, kind, symbol)
+            status, value = context.call_conv.call_function(
+                builder, there, signature.return_type, signature.args, arguments
+            )
+            with cgutils.if_unlikely(builder, status.is_error):
+                context.call_conv.return_status_propagate(builder, status)
+            return value
+
+        return call
+
+    return decorate
