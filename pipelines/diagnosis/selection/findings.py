@@ -110,25 +110,27 @@ def _likely(posterior: Posterior, rest: Inside, node: Mapping[str, Any]) -> Iter
 
     Whether it repeats is left out where neither is likely.
     """
-    repeating = [_finding(posterior, rest, {"repeats": r, **node}) for r in (True, False)]
-    likely = [one for one in repeating if one[0].probability >= LIKELY]
-    if not likely:
-        either = _finding(posterior, rest, node)
-        likely = [either] if either[0].probability >= LIKELY else []
-    yield from likely
+    for nodes in ([{"repeats": r, **node} for r in (True, False)], [node]):
+        likely = []
+        for one in nodes:
+            inside = _within(posterior, one) & rest
+            probability = _chance(posterior, inside)
+            if probability >= LIKELY:
+                likely.append((_finding(posterior, one, inside, probability), inside))
+        if likely:
+            yield from likely
+            return
 
 
-def _finding(posterior: Posterior, rest: Inside, node: Mapping[str, Any]) -> tuple[Finding, Inside]:
-    """Return the finding that something of the rest lies within a node, and which elements do."""
-    inside = _within(posterior, node) & rest
+def _finding(posterior: Posterior, node: Mapping[str, Any], inside: Inside, probability: float) -> Finding:
+    """Return the finding that something of these elements, which lie within a node, is missing."""
     deepest = [level for level in LEVELS if level in node] or ["repeats"]
-    finding = Finding(
+    return Finding(
         "repeatability" if deepest[-1] == "repeats" else deepest[-1],
-        node.get("repeats"), node.get("joint"), node.get("family"), _chance(posterior, inside),
+        node.get("repeats"), node.get("joint"), node.get("family"), probability,
         tuple(_ranked(posterior, inside, are_laws=False))[:CLOSEST],
         tuple(_ranked(posterior, inside, are_laws=True)), _path(posterior, node),
     )  # fmt: skip
-    return finding, inside
 
 
 def _path(posterior: Posterior, node: Mapping[str, Any]) -> tuple[tuple[str, Any, float], ...]:
