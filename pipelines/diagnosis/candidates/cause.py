@@ -31,6 +31,8 @@ class Cause:
     """(k,) prior variance of each coefficient over their sum: larger where typical amplitudes make more of it."""
     derivative: NDArray
     """(N, d) what a change of its shape does: along each shape, and towards another form."""
+    imitation: NDArray
+    """(b, k + d): values of the baseline that imitate columns and derivatives best, before it is projected out."""
     first: bool
     """Whether it is the best shape of its effect."""
     context: int = -1
@@ -60,11 +62,12 @@ class Cause:
         if not kept.any():
             return None
         amplitudes = typical[:, np.newaxis] * turned[kept].T / size[kept]
-        columns = regression.project(fitted.columns @ amplitudes)
+        rows = fitted.columns @ amplitudes
+        imitation = regression.baseline_values(np.hstack([rows, slopes]))
         # Typical amplitudes are known roughly: were they exact, variances would be as the squares of sizes.
         variance = size[kept] / size[kept].sum()
-        derivative = regression.project(slopes)
-        return cls(fitted.candidate, columns, amplitudes, variance, derivative, first, context)
+        columns, derivative = regression.project(rows), regression.project(slopes)
+        return cls(fitted.candidate, columns, amplitudes, variance, derivative, imitation, first, context)
 
 
 def towards(best: Fitted, others: Sequence[Fitted]) -> NDArray:

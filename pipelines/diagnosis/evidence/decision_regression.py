@@ -125,6 +125,22 @@ class DecisionRegression:
         """Return columns (N, k) less what the baseline imitates."""
         return columns - self.basis @ (self.basis.T @ columns)
 
+    @cached_property
+    def _inverse(self) -> NDArray:
+        """Takes rows to the baseline's values that come nearest to them, (b, N)."""
+        size = np.linalg.norm(self.baseline, axis=0)
+        size = np.where(size > 0.0, size, 1.0)[:, np.newaxis]
+        return np.asarray(np.linalg.pinv(self.baseline / size.T, rcond=RANK) / size)
+
+    def baseline_values(self, rows: NDArray) -> NDArray:
+        """Return the values of the baseline (b, k) that come nearest to rows (N, k)."""
+        return np.asarray(self._inverse @ rows)
+
+    @cached_property
+    def baseline_variance(self) -> NDArray:
+        """The variance that noise gives each value of the baseline, (b,)."""
+        return np.sum(self._inverse**2, axis=1)
+
     def series(self, output: int) -> Iterator[tuple[NDArray, NDArray]]:
         """Yield for each run the times (m,) s of an output's rows, and what the baseline leaves there, (m,).
 

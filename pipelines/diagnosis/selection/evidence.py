@@ -18,9 +18,11 @@ from pipelines.diagnosis.candidates.library import Library, orders_of
 from pipelines.diagnosis.candidates.shape_refinement import log_searched
 from pipelines.diagnosis.candidates.smooth_laws import FAMILIES, HUM, TIME, LawColumn, law_label
 from pipelines.diagnosis.criteria import CRITERIA
+from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
 from pipelines.effects import Cogging, Effect, Family
+from pipelines.effects.rigid_body import RigidBody
 
 Shown = tuple[float, float, int]
 """A line's log likelihood ratio, its share of the torque, and the phases that it has."""
@@ -48,6 +50,9 @@ class Element:
     resembles_variance: list[float] = field(default_factory=list)
     amplitudes: list[list[float]] = field(default_factory=list)
     """Rows: those amplitudes of the effect that are never negative, per coefficient."""
+    imitation: list[list[float]] = field(default_factory=list)
+    """Rows: values of the baseline that are never negative, per coefficient of a column or a derivative that they
+    imitate."""
     repeats: bool = True
     """Whether it does the same in every period of the motion."""
     first: bool = True
@@ -68,6 +73,11 @@ class Element:
     """Of a ripple or a tone: its lines at the full sampling rate."""
     context: int = -1
     """Of a cause: the set beside whose others it was refined; -1 where it was refined alone."""
+
+    @property
+    def width(self) -> int:
+        """Number of its columns and derivatives."""
+        return len(self.columns) + len(self.derivative)
 
     @property
     def variant(self) -> str:
@@ -93,6 +103,9 @@ class Evidence:
     """Log likelihood of causes besides what they do to the mean torque, by label."""
     explained: NDArray
     """(O,) what all columns together explain of each output's rows, squared and in units of the noise."""
+    nonnegative: tuple[tuple[float, float, int], ...] = ()
+    """Values of the baseline that are never negative, as friction, fitted with no cause: value, the variance of noise,
+    and the output that tells most of it."""
     contexts: tuple[tuple[int, ...], ...] = ()
     """Sets of elements whose causes were refined beside one another."""
     about: Mapping[str, Any] = field(default_factory=dict)
@@ -109,7 +122,7 @@ class Evidence:
         return cls(
             gram, right, (elements := tuple(_elements(library, at))), tuple(_background(library, at)),
             dict(auxiliary), np.array([explained(g, r) for g, r in zip(gram, right, strict=True)]),
-            tuple(_contexts(library, elements)), _about(library),
+            tuple(_nonnegative(library)), tuple(_contexts(library, elements)), _about(library),
         )  # fmt: skip
 
     def packed(self) -> dict[str, Any]:
@@ -122,7 +135,7 @@ class Evidence:
                 {
                     "elements": [asdict(element) for element in self.elements],
                     "background": self.background, "auxiliary": self.auxiliary,
-                    "explained": self.explained.tolist(),
+                    "explained": self.explained.tolist(), "nonnegative": self.nonnegative,
                     "contexts": self.contexts, "about": self.about,
                 }
             ),
@@ -138,7 +151,8 @@ class Evidence:
             _symmetric(row["gram"], right.shape), right,
             tuple(Element(**one) for one in text["elements"]),
             tuple((kind, place, v, noise) for kind, place, v, noise in text["background"]),
-            text["auxiliary"], explained, tuple(map(tuple, text["contexts"])), text["about"],
+            text["auxiliary"], explained, tuple((v, variance, o) for v, variance, o in text["nonnegative"]),
+            tuple(map(tuple, text["contexts"])), text["about"],
         )  # fmt: skip
 
 
@@ -217,7 +231,7 @@ def _in_any_form(elements: Sequence[Element], any_form: Mapping[str, str]) -> li
     return [
         replace(
             of_laws[e.name, e.joint], columns=e.columns, variance=e.variance,
-            derivative=[], resembles=[], resembles_variance=[], amplitudes=[], first=False,
+            derivative=[], resembles=[], resembles_variance=[], amplitudes=[], imitation=[], first=False,
         )
         if e.is_law and e.wearer == "all" and (e.name, e.joint) in of_laws else e
         for e in elements
@@ -264,6 +278,7 @@ def _of_cause(number: int, cause: Cause, at: _Places, laws: Laws, prepared: Prep
         resembles=[p for p, _ in resembles],
         resembles_variance=_normalised([v for _, v in resembles]),
         amplitudes=cause.amplitudes[_positive(cause)].tolist(),
+        imitation=cause.imitation[_friction(prepared.baseline)].tolist(),
         repeats=not effect.goes_with_time and effect.family != Family.TIME,
         first=cause.first,
         each_run=effect.each_run,
@@ -308,6 +323,22 @@ def _background(library: Library, at: _Places):
         alone = cause.first and cause.context < 0
         if alone and not effect.each_run and effect.run is None:
             yield from (("cause", int(p), float(v), 0.0) for p, v in zip(places, cause.variance, strict=True))
+
+
+def _friction(baseline: Baseline) -> list[int]:
+    """Return the columns of the baseline whose values are never negative: of friction, and of what is known."""
+    columns = enumerate(baseline.layout.columns)
+    return [k for k, c in columns if not isinstance(c.effect, RigidBody) and c.parameter.typical[0] >= 0.0]
+
+
+def _nonnegative(library: Library):
+    """Yield the values of the baseline that are never negative, their variance, and their joint's output."""
+    regression, baseline = library.regression, library.prepared.baseline
+    values = regression.baseline_values(regression.torque_rows[:, np.newaxis])[:, 0]
+    for k in _friction(baseline):
+        joint = baseline.layout.columns[k].effect.joint
+        output = baseline.joints.index(joint) if joint else 0
+        yield float(values[k]), float(regression.baseline_variance[k]), output
 
 
 def _contexts(library: Library, elements: Sequence[Element]):

@@ -37,9 +37,9 @@ class MarginalLikelihood:
     def __init__(self, evidence: Evidence, criteria: Criteria) -> None:
         """Weight rows, and marginalise the background."""
         self.evidence, self.criteria = evidence, criteria
-        power = _power(evidence.explained, criteria)
-        gram = np.einsum("o,oij->ij", power, evidence.gram)
-        self.gram, self.right = _without(gram, power @ evidence.right, *self._background())
+        self.power = _power(evidence.explained, criteria)
+        gram = np.einsum("o,oij->ij", self.power, evidence.gram)
+        self.gram, self.right = _without(gram, self.power @ evidence.right, *self._background())
         self.parts = [np.array([*e.columns, *e.derivative], dtype=int) for e in evidence.elements]
         own = [features(e, evidence.auxiliary) for e in evidence.elements]
         self.features = np.array(own).reshape(-1, len(FEATURES))
@@ -125,6 +125,23 @@ class MarginalLikelihood:
             if element.amplitudes:
                 value += _log_sign(np.array(element.amplitudes), lower, u, sd, at)
             at += k + len(element.derivative)
+        return value + self._log_nonnegative(elements, lower, u, sd)
+
+    def _log_nonnegative(self, elements: Sequence[Element], lower: NDArray, u: NDArray, sd: NDArray) -> float:
+        """Return what knowing that the baseline's friction is not negative adds to the log Bayes factor.
+
+        Its prior is flat but for the sign. What causes take over from it is subtracted: y = B (b - P a) + A a.
+        """
+        value = 0.0
+        for f, (alone, variance, output) in enumerate(self.evidence.nonnegative):
+            parts = [e.imitation[f] if e.imitation else np.zeros(e.width) for e in elements]
+            taken = np.zeros(len(sd))
+            own = np.concatenate(parts)
+            taken[: len(own)] = own
+            half = _forward(lower, sd * taken)
+            variance /= self.power[output]
+            left, spread = alone - float(half @ u), np.sqrt(variance + float(half @ half))
+            value += float(log_ndtr(left / spread) - log_ndtr(alone / np.sqrt(variance)))
         return value
 
     def pairs(self, chosen: Sequence[int]) -> tuple[NDArray, NDArray]:
