@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
+from scipy.stats import multivariate_normal, norm
 
 from pipelines.diagnosis.criteria import Criteria
 from pipelines.diagnosis.selection.evidence import Element, Evidence, explained
@@ -84,6 +84,31 @@ def test_a_forbidden_sign_counts_as_half_of_the_prior_that_is_not_there(strength
         assert difference == pytest.approx(np.log(2.0 * share), abs=0.02)
     else:
         assert difference < -5.0
+
+
+@pytest.mark.parametrize("friction", [0.02, 0.1, 1.0])
+def test_a_cause_that_leaves_friction_negative_is_as_improbable_as_that_friction(friction):
+    """Friction and a cause that resembles it, in one Gaussian model: the probability that friction is not negative."""
+    rng = np.random.default_rng(3)
+    B = 10.0 * rng.normal(size=ROWS)
+    A = 0.8 * B + 6.0 * rng.normal(size=ROWS)
+    y = friction * B + 0.05 * (A - 0.8 * B) + rng.normal(size=ROWS)
+    imitated = B @ A / (B @ B)
+    columns = (A - imitated * B)[:, np.newaxis]
+    gram, right = np.zeros((2, 1, 1)), np.zeros((2, 1))
+    gram[0], right[0] = columns.T @ columns, columns.T @ y
+    cause = Element("spring@hip", "spring", "hip", "angle", False, [0], [1.0], imitation=[[imitated]])
+    alone, variance = B @ y / (B @ B), 1.0 / (B @ B)
+    known = Evidence(gram, right, (cause,), (), {}, np.zeros(2), nonnegative=((alone, variance, 0),))
+    weigh, free = (MarginalLikelihood(e, CRITERIA) for e in (known, replace(known, nonnegative=())))
+    (size,) = weigh.sizes((0,))
+    amplitude = min(CRITERIA.amplitudes, key=lambda a: abs(np.log(a / size)))
+    both = np.column_stack([B, A])
+    covariance = np.linalg.inv(both.T @ both + np.diag([0.0, amplitude**-2]))
+    with_cause = norm.logcdf((covariance @ both.T @ y)[0] / np.sqrt(covariance[0, 0]))
+    without = norm.logcdf(alone / np.sqrt(variance))
+    assert weigh((0,)) - free((0,)) == pytest.approx(with_cause - without, abs=1e-8)
+    assert weigh(()) == free(()) == 0.0
 
 
 def test_screening_ranks_pairs_as_the_exact_weighing_does_without_misfit():

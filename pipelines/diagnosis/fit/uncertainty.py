@@ -13,6 +13,7 @@ from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.evidence.slow_error import slow_error
 from pipelines.diagnosis.fit.change_point import ALIKE_S
 from pipelines.diagnosis.fit.joint_fit import Fit, laden, onsets_of, slope, stacked_columns
+from pipelines.effects import Parameter
 from pipelines.estimation.long_run import long_run_covariance
 
 
@@ -23,7 +24,8 @@ class Uncertainty:
     covariance: NDArray
     critical: float
     shapes: tuple[tuple[int, int, int], ...]
-    """(cause, shape parameter, run) behind each shape's place after the linear values; run -1 where shared."""
+    """(cause, shape parameter, run) behind each shape's place after the linear values; run -1 where shared. First
+    those that are fitted, then those that were chosen among forms."""
     normal: NDArray
     """Weighted normal matrix of the same parameters in the same order: what collinearity is read from."""
     onsets: Mapping[tuple[int, int, int], tuple[float, float]] = field(default_factory=dict)
@@ -36,14 +38,17 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
     Beside the noise stands what the model gets wrong with the motion: what it leaves of slow error, and at the least
     what no model of a good rig gets right, ``imperfect`` (O,) N·m rms. It is small against the noise, but much alike
     from sample to sample, and so the larger part of what hours of data leave in doubt. Shapes that are not fitted but
-    taken at a usual value may be anywhere in their typical range. When something begins is known so much better than
+    taken at a usual value may be anywhere in their typical range. Of a shape that was chosen among a few forms, as an
+    exponent, what is between them is as likely: data and typical range tell how far from the form it may be. When
+    something begins is known so much better than
     how large it is that neither makes the other less sure.
     """
     runs = laden(runs, fit, baseline)
     plain = stacked_columns(fit.causes, runs, baseline)
     columns = [c for c, _ in plain]
     left = [y - c @ fit.values for c, y in plain]
-    places = _shapes(fit.causes, len(runs), fitted=True)
+    forms = _forms(fit.causes)
+    places = [*_shapes(fit.causes, len(runs), fitted=True), *forms]
     slopes = [slope(fit, place, runs, baseline, plain) for place in places]
     wide = [np.concatenate([c, *(s[r][:, :, np.newaxis] for s in slopes)], axis=2) for r, c in enumerate(columns)]
     weights = fit.weights
@@ -65,6 +70,10 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
             for run, a, s in zip(runs, wide, assumed, strict=True)
         )
         filling = filling + np.outer(pull, pull) * (high - low) ** 2 / 12.0
+    for at, (number, i, _) in enumerate(forms, start=len(gram) - len(forms)):
+        low, high = fit.causes[number].effect.shape[i].typical
+        gram[at, at] += 12.0 / (high - low) ** 2
+        filling[at, at] += 12.0 / (high - low) ** 2
     inverse = np.linalg.pinv(gram, rcond=1e-13, hermitian=True)
     covariance = inverse @ filling @ inverse
     for at, (number, i, r) in enumerate(places, start=len(fit.values)):
@@ -88,6 +97,25 @@ def _onsets(
             onsets = onsets_of(fit, number, i, runs, baseline)
             ends |= {(number, i, r): onsets[r].interval(runs[r], misfit) for r in fit.columns_of(number).runs}
     return ends
+
+
+def _forms(causes: Sequence[Candidate]) -> list[tuple[int, int, int]]:
+    """Return shapes that were chosen among forms and could lie between them: (cause, shape parameter, -1).
+
+    A sign or a switch cannot, and nought stands for a form without the parameter.
+    """
+    return [
+        (number, i, -1)
+        for number, cause in enumerate(causes)
+        for i, parameter in enumerate(cause.effect.shape)
+        if parameter.forms and _between_forms(parameter) and cause.shapes[0][i] > 0.0
+    ]
+
+
+def _between_forms(parameter: Parameter) -> bool:
+    """Tell whether a parameter may have values between its forms."""
+    switch = parameter.unit == "1" and 0.0 in parameter.forms
+    return parameter.typical[0] >= 0.0 and not switch
 
 
 def _shapes(causes: Sequence[Candidate], runs: int, fitted: bool) -> list[tuple[int, int, int]]:
