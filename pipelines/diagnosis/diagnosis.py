@@ -20,7 +20,7 @@ from pipelines.diagnosis.fit.presliding_test import BuildUp
 from pipelines.diagnosis.fit.uncertainty import Uncertainty
 from pipelines.diagnosis.fit.validation import Validated, gains_of
 from pipelines.diagnosis.fit.validation_error import Gain, errors_of
-from pipelines.diagnosis.selection.answer import LIKELY, Answer, Named
+from pipelines.diagnosis.selection.answer import LIKELY, Answer, Named, answer_of
 from pipelines.diagnosis.selection.evidence import Evidence
 from pipelines.diagnosis.selection.findings import Finding, findings
 from pipelines.diagnosis.selection.posterior import Posterior
@@ -49,6 +49,8 @@ class Selected:
     findings: tuple[Finding, ...]
     router: tuple[ResidualShares, ...]
     """Of each joint: how its residual repeats."""
+    dropped: frozenset[str] = frozenset()
+    """Labels that the training runs would name, and the validation runs speak against."""
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
@@ -61,8 +63,13 @@ class Selected:
         """Return the same after the validation runs, log likelihood ratios of causes by label."""
         if self.posterior is None or not ratios:
             return self
-        answer = self.answer.judged(ratios)
-        return replace(self, answer=answer, findings=tuple(findings(self.posterior, answer)))
+        judged = self.posterior.judged(ratios)
+        # What takes its place was not fitted: it is a finding, and not named.
+        answer = answer_of(judged).among(self.answer.named)
+        gone = {one.element.label for one in self.answer.named} - {one.element.label for one in answer.named}
+        return replace(
+            self, posterior=judged, answer=answer, findings=tuple(findings(judged, answer)), dropped=self.dropped | gone
+        )
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """A diagnosis as if the posterior had named given causes: for tests of what comes after the decision."""
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
@@ -22,10 +23,13 @@ def naming(d: Diagnosis, *labels: str, ties: tuple[tuple[str, float], ...] = ())
         Named(element, PROBABILITY, PROBABILITY, ties if number == 0 else ()) for number, element in enumerate(elements)
     )
     chosen = tuple(sorted(selected.posterior.elements.index(element) for element in elements))
-    weighed = Posterior(selected.posterior.elements, (chosen, ()), np.array([PROBABILITY, 1.0 - PROBABILITY]))
+    # Each is as likely with the others as without them.
+    sets = [some for size in range(len(chosen), -1, -1) for some in combinations(chosen, size)]
+    log_odds = [len(some) * (np.log(PROBABILITY) - np.log1p(-PROBABILITY)) for some in sets]
+    weighed = Posterior(selected.posterior.elements, tuple(sets), np.array(log_odds))
     answer = Answer(named, 1.0 - PROBABILITY, 0.0)
     found = tuple(findings(weighed, answer))
-    given = replace(selected, posterior=weighed, answer=answer, findings=found)
+    given = replace(selected, posterior=weighed, answer=answer, findings=found, dropped=frozenset())
     return _validated(d.data, selected.library.prepared, given)
 
 

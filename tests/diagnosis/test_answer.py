@@ -32,7 +32,7 @@ def weighed(**sets: float) -> Posterior:
     chosen = {tuple(int(c) for c in name[1:]): p for name, p in sets.items()}
     order = sorted(chosen, key=lambda s: -chosen[s])
     p = np.array([chosen[s] for s in order])
-    return Posterior(ELEMENTS, tuple(order), p / p.sum())
+    return Posterior(ELEMENTS, tuple(order), np.log(p))
 
 
 def test_a_likely_cause_is_named_and_a_rival_that_is_not_far_behind_is_tied():
@@ -132,14 +132,33 @@ def test_nothing_missing_has_no_findings():
 
 
 def test_validation_lowers_a_cause_that_harms_and_raises_none():
-    answer = answer_of(weighed(_02=0.95, _0=0.05))
-    helped = answer.judged({"parallel_spring@knee": 40.0, "quadratic_drag@hip": 9.0})
-    assert [one.probability for one in helped.named] == [one.probability for one in answer.named]
-    harmed = answer.judged({"parallel_spring@knee": 40.0, "quadratic_drag@hip": -6.0})
+    posterior = weighed(_02=0.95, _0=0.05)
+    helped = posterior.judged({"parallel_spring@knee": 40.0, "quadratic_drag@hip": 9.0})
+    assert helped.probabilities == pytest.approx(posterior.probabilities)
+    harmed = answer_of(posterior.judged({"parallel_spring@knee": 40.0, "quadratic_drag@hip": -6.0}))
     assert [one.element.label for one in harmed.named] == ["parallel_spring@knee"]
-    doubted = answer.judged({"quadratic_drag@hip": -1.0})
-    (drag,) = [one for one in doubted.named if one.element.label == "quadratic_drag@hip"]
-    assert 0.5 < drag.probability < 0.95
+    (drag,) = [
+        one
+        for one in answer_of(posterior.judged({"quadratic_drag@hip": -1.0})).named
+        if one.element.label == "quadratic_drag@hip"
+    ]
+    odds = np.exp(-1.0) * 0.95 / 0.05
+    assert drag.probability == pytest.approx(odds / (1.0 + odds))
+
+
+def test_sets_stay_in_the_order_of_their_probability():
+    judged = weighed(_2=0.7, _3=0.25, _=0.05).judged({"quadratic_drag@hip": -10.0})
+    assert judged.sets == ((3,), (), (2,))
+    assert judged.probabilities.sum() == pytest.approx(1.0)
+
+
+def test_what_becomes_likely_only_by_validation_is_not_named():
+    """It was not fitted, and nobody knows what it does on the validation runs."""
+    posterior = weighed(_2=0.7, _3=0.25, _=0.05)
+    before = answer_of(weighed(_2=0.95, _=0.05)).named
+    judged = answer_of(posterior.judged({"quadratic_drag@hip": -10.0}))
+    assert [one.element.label for one in judged.named] == ["stribeck_friction@hip"]
+    assert judged.among(before).named == ()
 
 
 def test_two_causes_that_stand_for_one_are_no_ties_of_it():

@@ -11,7 +11,7 @@ from pipelines.diagnosis.selection.answer import answer_of
 from pipelines.diagnosis.selection.evidence import Element
 from pipelines.diagnosis.selection.findings import findings as read_off
 from pipelines.diagnosis.selection.posterior import Posterior
-from pipelines.diagnosis.verdict.findings_in_words import dropped, findings
+from pipelines.diagnosis.verdict.findings_in_words import findings
 from pipelines.label import effect_labelled
 
 
@@ -41,11 +41,15 @@ def diagnosed(sets, ratios=(), joints=HIP_AND_KNEE):
     """Return what is read of a diagnosis, of sets with their probabilities."""
     order = sorted(sets, key=lambda chosen: -sets[chosen])
     p = np.array([sets[chosen] for chosen in order])
-    weighed = Posterior(ELEMENTS, tuple(order), p / p.sum())
-    answer = answer_of(weighed).judged(dict(ratios))
+    trained = Posterior(ELEMENTS, tuple(order), np.log(p))
+    named, weighed = answer_of(trained).named, trained.judged(dict(ratios))
+    answer = answer_of(weighed).among(named)
     labels = tuple(one.element.label for one in answer.named)
+    dropped = frozenset(one.element.label for one in named) - set(labels)
     return SimpleNamespace(
-        selected=SimpleNamespace(posterior=weighed, answer=answer, findings=tuple(read_off(weighed, answer))),
+        selected=SimpleNamespace(
+            posterior=weighed, answer=answer, findings=tuple(read_off(weighed, answer)), dropped=dropped
+        ),
         baseline=SimpleNamespace(machine=SimpleNamespace(joint={joint.name: joint for joint in joints}.get)),
         effects={label: effect_labelled(label) for label in labels},
         effect_of=effect_labelled,
@@ -104,12 +108,18 @@ def test_a_joint_that_slides_has_a_law_of_its_position_and_a_force():
     assert found["laws"][0]["words"] == "a law of the knee's position"
 
 
-def test_a_cause_that_does_harm_on_the_validation_runs_is_said_to_be_dropped():
+def test_a_cause_that_does_harm_on_the_validation_runs_is_dropped_and_with_it_what_it_explained():
     d = diagnosed({(COGGING,): 0.97, (): 0.03}, {"cogging@knee": -8.0})
     assert d.causes == ()
-    assert dropped(d) == {"cogging@knee"}
+    assert d.selected.dropped == {"cogging@knee"}
+    assert findings(d) == []
+
+
+def test_what_takes_the_place_of_a_dropped_cause_is_a_finding_and_not_named():
+    d = diagnosed({(COGGING,): 0.94, (ANGLE,): 0.05, (): 0.01}, {"cogging@knee": -4.0})
+    assert d.causes == ()
     (found,) = findings(d)
-    assert found["level"] == "family"
+    assert (found["level"], found["words"]) == ("family", "a law of the knee's angle")
     assert found["causes"][0]["dropped"]
 
 

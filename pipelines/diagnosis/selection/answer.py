@@ -1,9 +1,7 @@
 """Which causes are named, and what could stand in their place: read off the posterior."""
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from pipelines.diagnosis.selection.evidence import Element
 from pipelines.diagnosis.selection.posterior import Posterior, Set
@@ -39,21 +37,11 @@ class Answer:
     unlisted: float
     """Probability that an unlisted law is missing."""
 
-    def judged(self, ratios: Mapping[str, float]) -> "Answer":
-        """Return the answer after validation: a cause that harms there is less probable.
-
-        ``ratios`` are log likelihoods of the validation runs with a cause over those without it.
-        A cause that helps there gains nothing: the posterior has counted what it explains.
-        """
-        lowered = [
-            replace(
-                one, probability=_lowered(one.probability, ratios.get(one.element.label, 0.0)),
-                alone=_lowered(one.alone, ratios.get(one.element.label, 0.0)),
-            )
-            for one in self.named
-        ]  # fmt: skip
-        kept = [one for one in lowered if one.probability >= LIKELY]
-        return replace(self, named=tuple(sorted(kept, key=lambda one: -one.probability)))
+    def among(self, named: Sequence[Named]) -> "Answer":
+        """Return the answer with those causes alone that were named before, at the shapes at which they were fitted."""
+        fitted = {one.element.label: one.element for one in named}
+        kept = (one for one in self.named if one.element.label in fitted)
+        return replace(self, named=tuple(replace(one, element=fitted[one.element.label]) for one in kept))
 
 
 def answer_of(posterior: Posterior) -> Answer:
@@ -67,12 +55,6 @@ def answer_of(posterior: Posterior) -> Answer:
         if any(posterior.elements[i].is_law for i in chosen)
     )
     return Answer(tuple(sorted(named, key=lambda one: -one.probability)), posterior.nothing, unlisted)
-
-
-def _lowered(probability: float, ratio: float) -> float:
-    """Return a probability whose odds fall with a negative log likelihood ratio."""
-    odds = float(np.exp(min(ratio, 0.0))) * probability
-    return odds / (odds + 1.0 - probability) if odds > 0.0 else 0.0
 
 
 def _best(posterior: Posterior) -> Set:

@@ -5,7 +5,7 @@ full; triples extend the best pairs. What is reported are marginals: of nothing 
 cause, of something unlisted, of each family at each joint.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -44,9 +44,30 @@ class Posterior:
 
     elements: tuple[Element, ...]
     sets: tuple[Set, ...]
-    """By falling probability."""
-    probabilities: NDArray
-    """(sets,); they add up to one."""
+    log_odds: NDArray
+    """(sets,) against the empty set."""
+
+    @cached_property
+    def probabilities(self) -> NDArray:
+        """Probability of each set, (sets,); they add up to one."""
+        p = np.exp(self.log_odds - self.log_odds.max())  # the empty set is always finite
+        return np.asarray(p / p.sum())
+
+    def judged(self, ratios: Mapping[str, float]) -> "Posterior":
+        """Return the posterior after validation: a cause that harms there is less probable.
+
+        A cause that helps there gains nothing: the training runs have counted what it explains.
+
+        Parameters
+        ----------
+        ratios : mapping of str to float
+            Log likelihoods of the validation runs with a cause over those without it, by label.
+        """
+        labels = [{self.elements[i].label for i in chosen} for chosen in self.sets]
+        harm = [sum(min(ratio, 0.0) for label, ratio in ratios.items() if label in own) for own in labels]
+        log_odds = self.log_odds + np.array(harm)
+        order = np.argsort(-log_odds, kind="stable")
+        return Posterior(self.elements, tuple(self.sets[k] for k in order), log_odds[order])
 
     @cached_property
     def by_labels(self) -> dict[frozenset[str], float]:
@@ -83,9 +104,7 @@ def posterior(evidence: Evidence, criteria: Criteria = CRITERIA) -> Posterior:
     for chosen in _triples(weigh, odds):
         odds[chosen] = weigh(chosen)
     sets = sorted(odds, key=lambda chosen: -odds[chosen])
-    values = np.array([odds[chosen] for chosen in sets])
-    p = np.exp(values - values.max())  # the empty set is always finite
-    return Posterior(evidence.elements, tuple(sets), p / p.sum())
+    return Posterior(evidence.elements, tuple(sets), np.array([odds[chosen] for chosen in sets]))
 
 
 def _ordered(chosen: Sequence[int]) -> Set:

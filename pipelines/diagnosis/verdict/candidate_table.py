@@ -9,7 +9,7 @@ import pandas as pd
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fit.validation import Validated
 from pipelines.diagnosis.fit.validation_error import gain
-from pipelines.diagnosis.verdict.findings_in_words import LAW, dropped
+from pipelines.diagnosis.verdict.findings_in_words import LAW
 from pipelines.effects import EFFECTS, Effect
 from pipelines.mechanics.machine import Machine
 
@@ -107,7 +107,7 @@ def _against(d: Diagnosis, labels: frozenset[str], probability: float) -> Iterat
     yield f"its probability is {probability:.2g}"
     if any(label.startswith(LAW) for label in labels):
         yield "it holds a law that is no listed cause"
-    if harmful := sorted(labels & dropped(d)):
+    if harmful := sorted(labels & d.selected.dropped):
         yield f"the validation runs speak against {' and '.join(harmful)}"
 
 

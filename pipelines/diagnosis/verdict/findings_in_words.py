@@ -6,7 +6,6 @@ from typing import Any
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.candidates.smooth_laws import IN_WORDS
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.selection.answer import answer_of
 from pipelines.diagnosis.selection.findings import Finding
 from pipelines.diagnosis.selection.posterior import Posterior
 from pipelines.label import effect_labelled, in_words
@@ -35,14 +34,6 @@ def findings(d: Diagnosis) -> list[dict[str, Any]]:
     return [] if weighed is None else [_as_json(d, one, weighed) for one in d.selected.findings]
 
 
-def dropped(d: Diagnosis) -> frozenset[str]:
-    """Return labels that the training runs would name, and the validation runs speak against."""
-    weighed = d.selected.posterior
-    if weighed is None:
-        return frozenset()
-    return frozenset(one.element.label for one in answer_of(weighed).named) - set(d.causes)
-
-
 def label_in_words(label: str, machine: Machine) -> str:
     """Return a cause, or an unlisted law by its label, as a sentence says it."""
     if not label.startswith(LAW):
@@ -64,7 +55,7 @@ def family_of(label: str, weighed: Posterior) -> str:
 
 def _as_json(d: Diagnosis, finding: Finding, weighed: Posterior) -> dict[str, Any]:
     told, machine = finding.as_json(), d.baseline.machine
-    against = dropped(d)
+    against = d.selected.dropped
     for cause, (label, _) in zip(told["causes"], finding.causes, strict=True):
         effect = d.effects.get(label) or d.effect_of(label)
         cause |= {

@@ -7,7 +7,7 @@ from pipelines.diagnosis.data_faults import Fault
 from pipelines.diagnosis.diagnosis import AT_FLOOR, EXPLAINED, Diagnosis
 from pipelines.diagnosis.verdict.cause_evidence import doubt_of_gain
 from pipelines.diagnosis.verdict.caveats import floor_that_hides
-from pipelines.diagnosis.verdict.findings_in_words import dropped, findings, label_in_words
+from pipelines.diagnosis.verdict.findings_in_words import findings, label_in_words
 from pipelines.diagnosis.verdict.unexplained import Unexplained
 from pipelines.label import amount, cause_label, effect_told, in_words
 
@@ -107,10 +107,9 @@ def _unlisted(d: Diagnosis) -> str:
         return "Something is missing, and no listed cause is likely."
     first, *more = found
     also = "".join(f"; and {one['words']} ({one['probability']:.2f})" for one in more)
-    said = (
-        f"Something is missing that no listed cause explains: {first['words']} "
-        f"(probability {first['probability']:.2f}){also}."
-    )
+    unlisted = d.selected.answer.unlisted >= LIKELY
+    which = "that no listed cause explains" if unlisted else "and these data do not tell which listed cause it is"
+    said = f"Something is missing {which}: {first['words']} (probability {first['probability']:.2f}){also}."
     laws = [law for law in first["laws"] if law["probability"] >= LIKELY]
     if laws and laws[0]["words"] != first["words"]:
         said += f" Most likely it is {laws[0]['words']} ({laws[0]['probability']:.2f})."
@@ -128,7 +127,7 @@ def _closest(finding: dict[str, Any]) -> str:
 
 def _dropped(d: Diagnosis) -> str:
     """Say which causes are not named since they do harm on the validation runs."""
-    labels = sorted(dropped(d))
+    labels = sorted(d.selected.dropped)
     if not labels:
         return ""
     words = " and ".join(label_in_words(label, d.baseline.machine) for label in labels)

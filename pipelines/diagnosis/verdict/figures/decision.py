@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.verdict.findings_in_words import LAW, dropped, family_of, label_in_words
+from pipelines.diagnosis.verdict.findings_in_words import LAW, family_of, label_in_words
 from pipelines.findings import PARTS, VARIABLES
 from pipelines.plots import BLUE, GREY, NOISE, WANDERS
 
@@ -176,7 +176,7 @@ def _elements(d: Diagnosis, labels: frozenset[str]) -> Iterator[tuple[str, str |
     if not labels or weighed is None:
         yield NOTHING, None, False, d.status == "nothing_missing"
     answers = {label for one in d.named for label in (one.element.label, *dict(one.ties))}
-    against = dropped(d)
+    against = d.selected.dropped
     for label in sorted(labels, key=lambda one: (one.startswith(LAW), one)):
         assert weighed is not None
         words = label_in_words(label, d.baseline.machine) + AGAINST * (label in against)
