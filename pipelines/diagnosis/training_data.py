@@ -83,9 +83,10 @@ def _refuse_missing_purpose(motions: Sequence[Motion]) -> None:
     trained = {m.run for m in motions if m.purpose == "train"}
     strangers = [m.file for m in motions if m.purpose == "validate" and m.run not in trained]
     if strangers:
+        kind = next(m.run for m in motions if m.file == strangers[0])
         raise InputError(
-            f"{strangers[0]} is the only kind of run without one to train on: {listed}; "
-            "record a train run of that kind, or leave it out"
+            f"{strangers[0]}: found a {kind} run to validate on and none to train on, among: {listed}; "
+            "record a training run of that kind, or leave this one out"
         )
 
 

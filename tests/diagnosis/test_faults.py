@@ -288,6 +288,17 @@ def test_one_run_at_four_times_the_scale_of_its_like_is_named_without_any_other_
     assert all("unit" in fault.what and "another run" in fault.what for fault in found)
 
 
+def test_cuffs_that_all_say_the_same_all_along_are_named_and_left_out(session):
+    frame, _ = session[SPOILED]
+    forces = [f"{cuff}_force_{axis}_n" for cuff in CUFFS for axis in "xyz"]
+    frame[forces] = 0.0
+    fault = only_fault(session)
+    assert "all twelve cuff forces" in fault.what and not fault.spoils
+    motions = [motion(*recorded, f"run_{k}") for k, recorded in enumerate(session)]
+    alone, with_human = excluding(motions, [fault])
+    assert with_human.forces is None and alone.forces is motions[0].forces
+
+
 def test_a_dead_force_channel_is_named(session):
     session[SPOILED][0]["shank_front_force_y_n"] = 0.0
     fault = only_fault(session)

@@ -103,13 +103,22 @@ def test_a_floor_that_no_repetition_shows_is_said_to_be_an_estimate(stuck):
     assert "estimated" not in verdict(stuck)["summary"]
     short = replace(stuck, floor=replace(stuck.floor, from_periods=False))
     estimate = ", so the noise floor is estimated from the band above the motion."
-    assert f"No run holds two periods{estimate}" in verdict(short)["summary"]
-    library = stuck.selected.library
+    assert f"No validation run holds two periods{estimate}" in verdict(short)["summary"]
+    prepared = stuck.selected.library.prepared
+    untold = replace(prepared, noise=replace(prepared.noise, from_periods=False))
+    weighed = replace(stuck, selected=with_prepared(stuck, untold))
+    assert "No training run holds two periods" in verdict(weighed)["summary"]
+    neither = replace(short, selected=with_prepared(stuck, untold))
+    assert f"No run holds two periods{estimate}" in verdict(neither)["summary"]
     runs = tuple(without_a_period(run) for run in stuck.train)
-    selected = replace(stuck.selected, library=replace(library, prepared=replace(library.prepared, runs=runs)))
+    selected = with_prepared(stuck, replace(untold, runs=runs))
     before = replace(stuck.before, runs=[without_a_period(run) for run in stuck.validate])
     told = verdict(replace(short, selected=selected, before=before))["summary"]
     assert f"No recording names a period{estimate}" in told
+
+
+def with_prepared(d, prepared):
+    return replace(d.selected, library=replace(d.selected.library, prepared=prepared))
 
 
 def without_a_period(run):
@@ -173,7 +182,7 @@ def odds_in_words(d, rival):
 )
 def test_odds_are_those_among_listed_causes_and_beyond_a_thousand_not_told_by_a_figure(stuck, rival, said):
     told = odds_in_words(stuck, rival)
-    wanted = f"the next listed cause, torque offset at the knee, is {said} less likely"
+    wanted = f"the next listed cause in its place, torque offset at the knee, is {said} less likely"
     assert told == ([wanted] if said else [])
 
 

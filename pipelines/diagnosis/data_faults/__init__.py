@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipelines.diagnosis.data_faults.channels import channel_faults
+from pipelines.diagnosis.data_faults.channels import channel_faults, has_silent_cuffs
 from pipelines.diagnosis.data_faults.fault import Fault
 from pipelines.diagnosis.data_faults.nonnegative_leg import averages
 from pipelines.diagnosis.data_faults.sampling_instants import sampling_faults
@@ -85,9 +85,10 @@ def _others_suffice(run: Motion, motions: Sequence[Motion], hopeless: Container[
 
 
 def excluding(motions: Sequence[Motion], faults: Iterable[Fault]) -> list[Motion]:
-    """Return the motions with the faults' samples marked as not valid."""
+    """Return the motions with the faults' samples marked as not valid, and without cuffs that never say anything."""
     bad: dict[str, np.ndarray] = {}
     for fault in faults:
         if fault.samples is not None:
             bad[fault.file] = bad.get(fault.file, False) | fault.samples
-    return [replace(m, valid=m.valid & ~bad[m.file]) if m.file in bad else m for m in motions]
+    valid = [replace(m, valid=m.valid & ~bad[m.file]) if m.file in bad else m for m in motions]
+    return [replace(m, forces=None) if has_silent_cuffs(m) else m for m in valid]

@@ -164,13 +164,26 @@ def _torque(motion: Motion, joint: int) -> Iterator[Fault]:
         )
 
 
+def has_silent_cuffs(motion: Motion) -> bool:
+    """Tell whether the cuff forces of a person's run were recorded, and none ever changes."""
+    if motion.felt is None or motion.run != "with_human":
+        return False
+    channels = motion.felt.reshape(len(motion.felt), -1).T
+    return not any(np.ptp(known) > 0.0 for x in channels if len(known := x[np.isfinite(x)]))
+
+
 def _forces(motion: Motion, forces: NDArray) -> Iterator[Fault]:
     """Report cuff force channels that are dead all along, or stand still for a second while others go on."""
-    least = round(STUCK_FORCE_S * motion.sample_rate_hz)
-    alive = [np.ptp(forces[np.isfinite(x), c, i]) > 0 if np.isfinite(x := forces[:, c, i]).any() else False
-             for c in range(len(CUFFS)) for i in range(3)]  # fmt: skip
-    if not any(alive):
+    if has_silent_cuffs(motion):
+        yield Fault(
+            motion.file,
+            f"{CUFFS[0]}_force_x_n",
+            "all twelve cuff forces are constant all along with the person inside: no sensor answers. They are left "
+            "out; check the sensors' supply and bus, or leave their columns out",
+            np.zeros(len(motion), dtype=bool),
+        )
         return
+    least = round(STUCK_FORCE_S * motion.sample_rate_hz)
     for c, cuff in enumerate(CUFFS):
         for i, axis in enumerate("xyz"):
             still = constant_stretches(forces[:, c, i], least)

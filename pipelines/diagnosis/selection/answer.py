@@ -69,21 +69,27 @@ def _best(posterior: Posterior) -> Set:
     return next(chosen for chosen in posterior.sets if frozenset(posterior.elements[i].label for i in chosen) == labels)
 
 
-def _named(posterior: Posterior, best: Set, i: int) -> Named:
-    """Return a cause of the best set with its ties: listed causes that could replace it.
+def in_place(posterior: Posterior, label: str, others: frozenset[str]) -> tuple[float, dict[str, float]]:
+    """Return how probable a cause is beside others, and each other listed cause in its place, the most probable first.
 
     Each set with the cause is compared with the sets that have another listed cause instead, all else alike.
     """
+    listed = {e.label for e in posterior.elements if not e.is_law}
+    own, rivals = 0.0, dict.fromkeys(sorted(listed - others - {label}), 0.0)
+    for labels, p in posterior.by_labels.items():
+        if label in labels and others <= labels:
+            own += p
+            for rival in rivals.keys() - labels:
+                rivals[rival] += posterior.by_labels.get(labels - {label} | {rival}, 0.0)
+    return own, dict(sorted(rivals.items(), key=lambda item: -item[1]))
+
+
+def _named(posterior: Posterior, best: Set, i: int) -> Named:
+    """Return a cause of the best set with its ties: listed causes that could replace it."""
     element = posterior.elements[i]
     rest = frozenset(posterior.elements[k].label for k in best) - {element.label}
-    listed = {e.label for e in posterior.elements if not e.is_law}
-    own, in_place = 0.0, dict.fromkeys(sorted(listed - rest - {element.label}), 0.0)
-    for labels, p in posterior.by_labels.items():
-        if element.label in labels and rest <= labels:
-            own += p
-            for other in in_place.keys() - labels:
-                in_place[other] += posterior.by_labels.get(labels - {element.label} | {other}, 0.0)
-    ties = sorted(((label, p) for label, p in in_place.items() if p >= TIED * own), key=lambda item: -item[1])
+    own, rivals = in_place(posterior, element.label, rest)
+    ties = [(label, p) for label, p in rivals.items() if p >= TIED * own]
     members = {element.label, *(label for label, _ in ties)}
     together = sum(p for labels, p in posterior.by_labels.items() if labels & members)
     alone = posterior.marginals[element.label]

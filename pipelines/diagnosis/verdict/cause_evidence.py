@@ -2,7 +2,7 @@
 
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.selection.answer import Named
+from pipelines.diagnosis.selection.answer import Named, in_place
 from pipelines.effects import Effect, VoluntaryTorque
 from pipelines.label import amount, effect_labelled, in_words, number
 
@@ -65,16 +65,14 @@ def doubt_of_gain(d: Diagnosis, label: str) -> tuple[str, str] | None:
 
 
 def _next(d: Diagnosis, named: Named) -> str | None:
-    """Say how much less likely the next listed cause is that is not tied with a named one."""
+    """Say how much less likely the next listed cause is in its place, beside the other named ones."""
     assert d.selected.posterior is not None
-    named_or_tied = {label for one in d.named for label in (one.element.label, *dict(one.ties))}
-    listed = {e.label for e in d.selected.posterior.elements if not e.is_law}
-    others = [
-        (label, p) for label, p in d.selected.posterior.marginals.items() if label in listed - named_or_tied and p > 0.0
-    ]
+    label, ties = named.element.label, dict(named.ties)
+    own, rivals = in_place(d.selected.posterior, label, frozenset(d.causes) - {label})
+    others = [(rival, p) for rival, p in rivals.items() if rival not in ties and p > 0.0]
     if not others:
         return None
     rival, p = others[0]
-    odds = named.probability / p
+    odds = (own + sum(rivals[tied] for tied in ties)) / p
     times = "no" if odds <= 1.0 else f"{odds:.3g} times" if odds < CERTAIN else f"over {CERTAIN:g} times"
-    return f"the next listed cause, {in_words(effect_labelled(rival))}, is {times} less likely"
+    return f"the next listed cause in its place, {in_words(effect_labelled(rival))}, is {times} less likely"

@@ -5,6 +5,7 @@ from typing import Any
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.data_faults import Fault
 from pipelines.diagnosis.diagnosis import AT_FLOOR, EXPLAINED, Diagnosis
+from pipelines.diagnosis.selection.answer import LIKELY
 from pipelines.diagnosis.verdict.cause_evidence import doubt_of_gain
 from pipelines.diagnosis.verdict.caveats import floor_that_hides
 from pipelines.diagnosis.verdict.findings_in_words import findings, label_in_words
@@ -15,8 +16,6 @@ MENTIONED = 3
 """Tied causes in the summary; ``indistinguishable_from`` has all."""
 CLOSEST = 0.05
 """Probability from which a cause is said to come closest."""
-LIKELY = 0.5
-"""Probability from which an unlisted law is said to be it."""
 
 
 def summary(d: Diagnosis, causes: list[dict[str, Any]], left: Unexplained | None) -> str:
@@ -24,13 +23,24 @@ def summary(d: Diagnosis, causes: list[dict[str, Any]], left: Unexplained | None
     if d.data.spoilt:
         return f"Acquisition, not physics: {_in_short(d.data.spoilt[0], d)}."
     said = finding_in_words(d, causes, left)
-    if not d.floor.from_periods:
-        told = any(run.motion.period_s for run in (*d.train, *d.validate))
-        why = "No run holds two periods" if told else "No recording names a period"
-        said += f" {why}, so the noise floor is estimated from {floor_from(d)}."
+    said += _noise_without_periods(d)
     if d.data.faults:
         said += f" Faults of acquisition were found as well: {_in_short(d.data.faults[0], d)}."
     return said
+
+
+def _noise_without_periods(d: Diagnosis) -> str:
+    """Say which noise is estimated otherwise than from the differences of periods."""
+    assert d.selected.library is not None
+    weighed, floor = d.selected.library.prepared.noise.from_periods, d.floor.from_periods
+    if weighed and floor:
+        return ""
+    if floor:
+        return " No training run holds two periods, so causes are weighed by the noise of the band above the motion."
+    told = any(run.motion.period_s for run in (*d.train, *d.validate))
+    which = "validation run" if weighed else "run"
+    why = f"No {which} holds two periods" if told else "No recording names a period"
+    return f" {why}, so the noise floor is estimated from {floor_from(d)}."
 
 
 def floor_from(d: Diagnosis) -> str:
