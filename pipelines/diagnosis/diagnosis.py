@@ -1,7 +1,6 @@
 """The result of a diagnosis: everything that a verdict is written from."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -9,21 +8,16 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.candidates.candidate import Candidate
-from pipelines.diagnosis.candidates.library import Library
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.noise_floor import Floor
 from pipelines.diagnosis.evidence.observed_run import Run
-from pipelines.diagnosis.evidence.residual_shares import ResidualShares
 from pipelines.diagnosis.fit.fitted_model import values_of_each_run
 from pipelines.diagnosis.fit.presliding_test import BuildUp
 from pipelines.diagnosis.fit.uncertainty import Uncertainty
 from pipelines.diagnosis.fit.validation import Validated, gains_of
 from pipelines.diagnosis.fit.validation_error import Gain, errors_of
-from pipelines.diagnosis.selection.answer import LIKELY, Answer, Named, answer_of
-from pipelines.diagnosis.selection.evidence import Evidence
-from pipelines.diagnosis.selection.findings import Finding, findings
-from pipelines.diagnosis.selection.posterior import Posterior
+from pipelines.diagnosis.selection.answer import LIKELY, Named
+from pipelines.diagnosis.selection.selected import Selected
 from pipelines.diagnosis.training_data import TrainingData
 from pipelines.effects import Effect
 from pipelines.effects.force_sensor_zero import ForceSensorZero
@@ -35,41 +29,6 @@ AT_FLOOR = 1.03
 """RMSE over noise floor up to which a joint has no systematic error (docs/contracts.md)."""
 EXPLAINED = 0.2
 """Share of the systematic power that may be left of an explained joint (docs/contracts.md)."""
-
-
-@dataclass(frozen=True)
-class Selected:
-    """What the evidence says, before anything is fitted."""
-
-    library: Library | None
-    """None where faults of acquisition keep physics from being looked at."""
-    evidence: Evidence | None
-    posterior: Posterior | None
-    answer: Answer
-    findings: tuple[Finding, ...]
-    router: tuple[ResidualShares, ...]
-    """Of each joint: how its residual repeats."""
-    dropped: frozenset[str] = frozenset()
-    """Labels that the training runs would name, and the validation runs speak against."""
-
-    @property
-    def candidates(self) -> tuple[Candidate, ...]:
-        """The named causes at their most probable shapes."""
-        if self.library is None:
-            return ()
-        return tuple(self.library.causes[one.element.place].candidate for one in self.answer.named)
-
-    def judged(self, ratios: Mapping[str, float]) -> "Selected":
-        """Return the same after the validation runs, log likelihood ratios of causes by label."""
-        if self.posterior is None or not ratios:
-            return self
-        judged = self.posterior.judged(ratios)
-        # What takes its place was not fitted: it is a finding, and not named.
-        answer = answer_of(judged).among(self.answer.named)
-        gone = {one.element.label for one in self.answer.named} - {one.element.label for one in answer.named}
-        return replace(
-            self, posterior=judged, answer=answer, findings=tuple(findings(judged, answer)), dropped=self.dropped | gone
-        )
 
 
 @dataclass(frozen=True)

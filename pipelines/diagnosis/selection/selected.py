@@ -1,0 +1,100 @@
+"""What the evidence of the training runs says: the library, the posterior, and the answer read off it."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from pipelines.diagnosis.candidates.auxiliary_evidence import auxiliary_evidence
+from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.candidates.library import Library, build_library, silent
+from pipelines.diagnosis.evidence.prepared_runs import Prepared, prepare
+from pipelines.diagnosis.evidence.residual_shares import ResidualShares, residual_shares
+from pipelines.diagnosis.selection.answer import Answer, answer_of
+from pipelines.diagnosis.selection.evidence import Evidence
+from pipelines.diagnosis.selection.findings import Finding, findings
+from pipelines.diagnosis.selection.posterior import Posterior, likely_contexts, posterior, strongest
+from pipelines.diagnosis.training_data import training_data
+from pipelines.mechanics.motion import Motion
+
+LIBRARY_SHARE = 0.6
+"""Of the progress bar, where the library is done."""
+PARTNERS = 5
+"""Causes that are refined beside a strong one."""
+Report = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class Selected:
+    """What the evidence says, before anything is fitted."""
+
+    library: Library | None
+    """None where faults of acquisition keep physics from being looked at."""
+    evidence: Evidence | None
+    posterior: Posterior | None
+    answer: Answer
+    findings: tuple[Finding, ...]
+    router: tuple[ResidualShares, ...]
+    """Of each joint: how its residual repeats."""
+    dropped: frozenset[str] = frozenset()
+    """Labels that the training runs would name, and the validation runs speak against."""
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """The named causes at their most probable shapes."""
+        if self.library is None:
+            return ()
+        return tuple(self.library.causes[one.element.place].candidate for one in self.answer.named)
+
+    def judged(self, ratios: Mapping[str, float]) -> "Selected":
+        """Return the same after the validation runs, log likelihood ratios of causes by label."""
+        if self.posterior is None or not ratios:
+            return self
+        judged = self.posterior.judged(ratios)
+        # What takes its place was not fitted: it is a finding, and not named.
+        answer = answer_of(judged).among(self.answer.named)
+        gone = {one.element.label for one in self.answer.named} - {one.element.label for one in answer.named}
+        return replace(
+            self, posterior=judged, answer=answer, findings=tuple(findings(judged, answer)), dropped=self.dropped | gone
+        )
+
+
+def select(prepared: Prepared, report: Report = silent) -> Selected:
+    """Weigh all sets of causes and laws, and read the answer off the posterior."""
+    library, evidence, found = weighed(prepared, report)
+    answer = answer_of(found)
+    return Selected(library, evidence, found, answer, tuple(findings(found, answer)), _router(prepared))
+
+
+def evidence_of(motions: Sequence[Motion], known: Sequence[str] = ()) -> Evidence:
+    """Return what the decision needs of a session."""
+    data = training_data(motions, known)
+    prepared = prepare(data.train, data.baseline)
+    return weighed(prepared)[1]
+
+
+def nothing_selected(prepared: Prepared) -> Selected:
+    """Return the answer where faults of acquisition keep physics from being looked at."""
+    return Selected(None, None, None, Answer((), 0.0, 0.0), (), _router(prepared))
+
+
+def weighed(prepared: Prepared, report: Report = silent) -> tuple[Library, Evidence, Posterior]:
+    """Return the library, its evidence, and how probable each set is.
+
+    Causes are refined alone first, then beside the others of likely sets.
+    """
+    library = build_library(prepared, lambda share, what: report(LIBRARY_SHARE * share, what))
+    report(LIBRARY_SHARE, "posterior")
+    auxiliary = auxiliary_evidence(prepared)
+    evidence = Evidence.of(library, auxiliary)
+    found = posterior(evidence)
+    refined = library
+    for number in strongest(found):
+        refined = refined.with_partners(number, PARTNERS)
+    refined = refined.refined_together(likely_contexts(found))
+    if refined is library:
+        return library, evidence, found
+    evidence = Evidence.of(refined, auxiliary)
+    return refined, evidence, posterior(evidence)
+
+
+def _router(prepared: Prepared) -> tuple[ResidualShares, ...]:
+    return tuple(residual_shares(prepared.runs, prepared.residuals, prepared.noise))
