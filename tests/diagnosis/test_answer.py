@@ -131,19 +131,33 @@ def test_nothing_missing_has_no_findings():
     assert findings(posterior, answer_of(posterior)) == []
 
 
+def after(posterior, ratios):
+    """Return the answer after validation."""
+    return answer_of(posterior).judged(ratios, posterior)
+
+
 def test_validation_lowers_a_cause_that_harms_and_raises_none():
     posterior = weighed(_02=0.95, _0=0.05)
-    helped = posterior.judged({"parallel_spring@knee": 40.0, "quadratic_drag@hip": 9.0})
-    assert helped.probabilities == pytest.approx(posterior.probabilities)
-    harmed = answer_of(posterior.judged({"parallel_spring@knee": 40.0, "quadratic_drag@hip": -6.0}))
+    answer = answer_of(posterior)
+    helped = after(posterior, {"parallel_spring@knee": 40.0, "quadratic_drag@hip": 9.0})
+    assert [one.probability for one in helped.named] == [one.probability for one in answer.named]
+    harmed = after(posterior, {"parallel_spring@knee": 40.0, "quadratic_drag@hip": -6.0})
     assert [one.element.label for one in harmed.named] == ["parallel_spring@knee"]
-    (drag,) = [
-        one
-        for one in answer_of(posterior.judged({"quadratic_drag@hip": -1.0})).named
-        if one.element.label == "quadratic_drag@hip"
-    ]
+    doubted = after(posterior, {"quadratic_drag@hip": -1.0})
+    (drag,) = [one for one in doubted.named if one.element.label == "quadratic_drag@hip"]
     odds = np.exp(-1.0) * 0.95 / 0.05
     assert drag.probability == pytest.approx(odds / (1.0 + odds))
+
+
+def test_a_cause_stays_named_though_the_sets_that_held_it_held_one_that_harms():
+    """It was fitted without that one, too, and does no harm."""
+    answer = after(weighed(_02=0.9, _=0.1), {"quadratic_drag@hip": -20.0})
+    assert [one.element.label for one in answer.named] == ["parallel_spring@knee"]
+
+
+def test_where_all_that_was_named_harms_nothing_may_be_missing():
+    answer = after(weighed(_2=0.97, _=0.03), {"quadratic_drag@hip": -9.0})
+    assert answer.named == () and answer.nothing > 0.99
 
 
 def test_sets_stay_in_the_order_of_their_probability():
@@ -154,11 +168,9 @@ def test_sets_stay_in_the_order_of_their_probability():
 
 def test_what_becomes_likely_only_by_validation_is_not_named():
     """It was not fitted, and nobody knows what it does on the validation runs."""
-    posterior = weighed(_2=0.7, _3=0.25, _=0.05)
-    before = answer_of(weighed(_2=0.95, _=0.05)).named
-    judged = answer_of(posterior.judged({"quadratic_drag@hip": -10.0}))
-    assert [one.element.label for one in judged.named] == ["stribeck_friction@hip"]
-    assert judged.among(before).named == ()
+    answer = after(weighed(_2=0.7, _3=0.05, _4=0.2, _=0.05), {"quadratic_drag@hip": -10.0})
+    assert answer.named == ()
+    assert answer.unlisted == pytest.approx(0.2 / 0.3, abs=1e-3)
 
 
 def test_two_causes_that_stand_for_one_are_no_ties_of_it():

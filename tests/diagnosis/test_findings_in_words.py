@@ -43,7 +43,7 @@ def diagnosed(sets, ratios=(), joints=HIP_AND_KNEE):
     p = np.array([sets[chosen] for chosen in order])
     trained = Posterior(ELEMENTS, tuple(order), np.log(p))
     named, weighed = answer_of(trained).named, trained.judged(dict(ratios))
-    answer = answer_of(weighed).among(named)
+    answer = answer_of(trained).judged(dict(ratios), trained)
     labels = tuple(one.element.label for one in answer.named)
     dropped = frozenset(one.element.label for one in named) - set(labels)
     return SimpleNamespace(

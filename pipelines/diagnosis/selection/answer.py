@@ -1,6 +1,6 @@
 """Which causes are named, and what could stand in their place: read off the posterior."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from pipelines.diagnosis.selection.evidence import Element
@@ -37,11 +37,16 @@ class Answer:
     unlisted: float
     """Probability that an unlisted law is missing."""
 
-    def among(self, named: Sequence[Named]) -> "Answer":
-        """Return the answer with those causes alone that were named before, at the shapes at which they were fitted."""
-        fitted = {one.element.label: one.element for one in named}
-        kept = (one for one in self.named if one.element.label in fitted)
-        return replace(self, named=tuple(replace(one, element=fitted[one.element.label]) for one in kept))
+    def judged(self, ratios: Mapping[str, float], trained: Posterior) -> "Answer":
+        """Return the answer after validation: a cause that harms there is less probable.
+
+        Each named cause is judged by what it does itself beside the others. ``ratios`` are log likelihoods of the
+        validation runs with a cause over those without it, ``trained`` is the posterior of the training runs.
+        """
+        lowered = [_lowered(one, min(ratios.get(one.element.label, 0.0), 0.0), trained) for one in self.named]
+        kept = [one for one in lowered if one.probability >= LIKELY]
+        weighed = trained.judged(ratios)
+        return Answer(tuple(sorted(kept, key=lambda one: -one.probability)), weighed.nothing, _unlisted(weighed))
 
 
 def answer_of(posterior: Posterior) -> Answer:
@@ -49,12 +54,22 @@ def answer_of(posterior: Posterior) -> Answer:
     best = _best(posterior)
     found = [_named(posterior, best, i) for i in best if not posterior.elements[i].is_law]
     named = [one for one in found if one.probability >= LIKELY]
-    unlisted = sum(
-        float(p)
-        for chosen, p in zip(posterior.sets, posterior.probabilities, strict=True)
-        if any(posterior.elements[i].is_law for i in chosen)
-    )
-    return Answer(tuple(sorted(named, key=lambda one: -one.probability)), posterior.nothing, unlisted)
+    return Answer(tuple(sorted(named, key=lambda one: -one.probability)), posterior.nothing, _unlisted(posterior))
+
+
+def _unlisted(posterior: Posterior) -> float:
+    pairs = zip(posterior.sets, posterior.probabilities, strict=True)
+    return sum(float(p) for chosen, p in pairs if any(posterior.elements[i].is_law for i in chosen))
+
+
+def _lowered(one: Named, ratio: float, trained: Posterior) -> Named:
+    """Return a named cause whose odds, and those of its ties, change by a log likelihood ratio."""
+    if ratio == 0.0:
+        return one
+    members = {one.element.label, *(label for label, _ in one.ties)}
+    judged = trained.judged(dict.fromkeys(members, ratio))
+    together = sum(p for labels, p in judged.by_labels.items() if labels & members)
+    return replace(one, probability=min(together, 1.0), alone=judged.marginals[one.element.label])
 
 
 def _best(posterior: Posterior) -> Set:

@@ -1,7 +1,8 @@
 """What the evidence of the training runs says: the library, the posterior, and the answer read off it."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from pipelines.diagnosis.candidates.auxiliary_evidence import auxiliary_evidence
 from pipelines.diagnosis.candidates.candidate import Candidate
@@ -29,13 +30,16 @@ class Selected:
     library: Library | None
     """None where faults of acquisition keep physics from being looked at."""
     evidence: Evidence | None
-    posterior: Posterior | None
+    trained: Posterior | None
+    """How probable each set is by the training runs."""
     answer: Answer
     findings: tuple[Finding, ...]
     router: tuple[ResidualShares, ...]
     """Of each joint: how its residual repeats."""
     dropped: frozenset[str] = frozenset()
     """Labels that the training runs would name, and the validation runs speak against."""
+    ratios: Mapping[str, float] = field(default_factory=dict)
+    """Log likelihoods of the validation runs with a cause over those without it, by label."""
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
@@ -44,17 +48,22 @@ class Selected:
             return ()
         return tuple(self.library.causes[one.element.place].candidate for one in self.answer.named)
 
+    @cached_property
+    def posterior(self) -> Posterior | None:
+        """How probable each set is after validation."""
+        return None if self.trained is None else self.trained.judged(self.ratios)
+
     def judged(self, ratios: Mapping[str, float]) -> "Selected":
         """Return the same after the validation runs, log likelihood ratios of causes by label."""
-        if self.posterior is None or not ratios:
+        if self.trained is None or not ratios:
             return self
-        judged = self.posterior.judged(ratios)
-        # What takes its place was not fitted: it is a finding, and not named.
-        answer = answer_of(judged).among(self.answer.named)
+        judged = replace(self, ratios={**self.ratios, **ratios})
+        answer = self.answer.judged(judged.ratios, self.trained)
         gone = {one.element.label for one in self.answer.named} - {one.element.label for one in answer.named}
-        return replace(
-            self, posterior=judged, answer=answer, findings=tuple(findings(judged, answer)), dropped=self.dropped | gone
-        )
+        assert judged.posterior is not None
+        # What takes the place of a cause that harms was not fitted: it is a finding, and not named.
+        found = tuple(findings(judged.posterior, answer))
+        return replace(judged, answer=answer, findings=found, dropped=self.dropped | gone)
 
 
 def select(prepared: Prepared, report: Report = silent) -> Selected:
