@@ -84,13 +84,17 @@ a level slide and a lift, each with one run of 60 to 80 s to train on and one to
 """
 
 
-def page(examinations: Sequence[Examination], picture: str = "") -> str:
-    """Return the page as Markdown; ``picture`` is where its figure lies beside it."""
+def page(examinations: Sequence[Examination], picture: str = "", revision: str = "") -> str:
+    """Return the page as Markdown.
+
+    ``picture`` is where its figure lies beside it, ``revision`` that of the exoid that answered.
+    """
     richest = max(examinations, key=lambda e: len(of(e.scores, "single")))
     legs = any(s.machine == "leg" for e in examinations for s in e.scores)
     parts = [
         INTRODUCTION,
         "" if legs else OF_ONE_JOINT,
+        f"The answers are those of revision `{revision}`.\n" if revision else "",
         _what_was_run(examinations),
         _targets(examinations),
     ]
@@ -165,13 +169,16 @@ def main(
         list[Path], typer.Argument(exists=True, help="report.json of one or more, and the page.")
     ],
     out: Annotated[Path, typer.Argument(help="The page to be written.")],
+    revision: Annotated[
+        str, typer.Option(help="Which revision of exoid gave the answers, where it is not this.")
+    ] = "",
 ) -> None:
     """Write the page and its picture."""
     examinations = [read(path) for path in records]
     picture = Path("images") / f"{out.stem}-reliability.png"
     (out.parent / picture).parent.mkdir(parents=True, exist_ok=True)
     reliability_figure.draw(examinations[0].scores, out.parent / picture)
-    out.write_text(page(examinations, str(picture)))
+    out.write_text(page(examinations, str(picture), revision))
 
 
 if __name__ == "__main__":
