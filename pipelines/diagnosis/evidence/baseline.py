@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.effects import Effect
+from pipelines.effects.rigid_body import RigidBody
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.run import kinds_of
 from pipelines.model import Model, ParameterLayout, Term, baseline
@@ -50,6 +51,12 @@ class Baseline:
     def layout(self) -> ParameterLayout:
         """Its columns, which all runs share: the first of every fit."""
         return ParameterLayout.of(self.effects)
+
+    @cached_property
+    def nonnegative(self) -> list[int]:
+        """Columns whose values are never negative: of friction, and of what the machine is known to have."""
+        columns = enumerate(self.layout.columns)
+        return [k for k, c in columns if not isinstance(c.effect, RigidBody) and c.parameter.typical[0] >= 0.0]
 
     @property
     def size(self) -> int:

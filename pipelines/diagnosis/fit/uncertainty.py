@@ -102,7 +102,7 @@ def _onsets(
 def _forms(causes: Sequence[Candidate]) -> list[tuple[int, int, int]]:
     """Return shapes that were chosen among forms and could lie between them: (cause, shape parameter, -1).
 
-    A sign or a switch cannot, and nought stands for a form without the parameter.
+    A sign or a switch cannot, and zero stands for a form without the parameter.
     """
     return [
         (number, i, -1)

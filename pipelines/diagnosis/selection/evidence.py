@@ -18,11 +18,9 @@ from pipelines.diagnosis.candidates.library import Library, orders_of
 from pipelines.diagnosis.candidates.shape_refinement import log_searched
 from pipelines.diagnosis.candidates.smooth_laws import FAMILIES, HUM, TIME, LawColumn, law_label
 from pipelines.diagnosis.criteria import CRITERIA
-from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
 from pipelines.effects import Cogging, Effect, Family
-from pipelines.effects.rigid_body import RigidBody
 
 Shown = tuple[float, float, int]
 """A line's log likelihood ratio, its share of the torque, and the phases that it has."""
@@ -73,11 +71,6 @@ class Element:
     """Of a ripple or a tone: its lines at the full sampling rate."""
     context: int = -1
     """Of a cause: the set beside whose others it was refined; -1 where it was refined alone."""
-
-    @property
-    def width(self) -> int:
-        """Number of its columns and derivatives."""
-        return len(self.columns) + len(self.derivative)
 
     @property
     def variant(self) -> str:
@@ -278,7 +271,7 @@ def _of_cause(number: int, cause: Cause, at: _Places, laws: Laws, prepared: Prep
         resembles=[p for p, _ in resembles],
         resembles_variance=_normalised([v for _, v in resembles]),
         amplitudes=cause.amplitudes[_positive(cause)].tolist(),
-        imitation=cause.imitation[_friction(prepared.baseline)].tolist(),
+        imitation=cause.imitation[prepared.baseline.nonnegative].tolist(),
         repeats=not effect.goes_with_time and effect.family != Family.TIME,
         first=cause.first,
         each_run=effect.each_run,
@@ -325,17 +318,11 @@ def _background(library: Library, at: _Places):
             yield from (("cause", int(p), float(v), 0.0) for p, v in zip(places, cause.variance, strict=True))
 
 
-def _friction(baseline: Baseline) -> list[int]:
-    """Return the columns of the baseline whose values are never negative: of friction, and of what is known."""
-    columns = enumerate(baseline.layout.columns)
-    return [k for k, c in columns if not isinstance(c.effect, RigidBody) and c.parameter.typical[0] >= 0.0]
-
-
 def _nonnegative(library: Library):
     """Yield the values of the baseline that are never negative, their variance, and their joint's output."""
     regression, baseline = library.regression, library.prepared.baseline
     values = regression.baseline_values(regression.torque_rows[:, np.newaxis])[:, 0]
-    for k in _friction(baseline):
+    for k in baseline.nonnegative:
         joint = baseline.layout.columns[k].effect.joint
         output = baseline.joints.index(joint) if joint else 0
         yield float(values[k]), float(regression.baseline_variance[k]), output

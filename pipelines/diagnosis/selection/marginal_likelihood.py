@@ -132,17 +132,24 @@ class MarginalLikelihood:
 
         Its prior is flat but for the sign. What causes take over from it is subtracted: y = B (b - P a) + A a.
         """
-        value = 0.0
-        for f, (alone, variance, output) in enumerate(self.evidence.nonnegative):
-            parts = [e.imitation[f] if e.imitation else np.zeros(e.width) for e in elements]
-            taken = np.zeros(len(sd))
-            own = np.concatenate(parts)
-            taken[: len(own)] = own
-            half = _forward(lower, sd * taken)
-            variance /= self.power[output]
-            left, spread = alone - float(half @ u), np.sqrt(variance + float(half @ half))
-            value += float(log_ndtr(left / spread) - log_ndtr(alone / np.sqrt(variance)))
-        return value
+        if not self.evidence.nonnegative:
+            return 0.0
+        alone, variance = self._friction
+        taken, at = np.zeros((len(sd), len(alone))), 0
+        for element in elements:
+            width = len(element.columns) + len(element.derivative)
+            if element.imitation:  # no law has any
+                taken[at : at + width] = np.transpose(element.imitation)
+            at += width
+        half = _forward(lower, sd[:, np.newaxis] * taken)
+        left, spread = alone - half.T @ u, np.sqrt(variance + np.sum(half**2, axis=0))
+        return float(np.sum(log_ndtr(left / spread) - log_ndtr(alone / np.sqrt(variance))))
+
+    @cached_property
+    def _friction(self) -> tuple[NDArray, NDArray]:
+        """The baseline's friction as fitted with no cause, and its variance, (f,) each."""
+        values, variance, outputs = map(np.array, zip(*self.evidence.nonnegative, strict=True))
+        return values, variance / self.power[outputs]
 
     def pairs(self, chosen: Sequence[int]) -> tuple[NDArray, NDArray]:
         """Return all pairs of different labels among elements, (p, 2), and rough log odds, (p,)."""

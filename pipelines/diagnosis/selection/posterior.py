@@ -44,6 +44,7 @@ class Posterior:
 
     elements: tuple[Element, ...]
     sets: tuple[Set, ...]
+    """By falling probability."""
     log_odds: NDArray
     """(sets,) against the empty set."""
 
@@ -63,6 +64,8 @@ class Posterior:
         ratios : mapping of str to float
             Log likelihoods of the validation runs with a cause over those without it, by label.
         """
+        if not ratios:
+            return self
         labels = [{self.elements[i].label for i in chosen} for chosen in self.sets]
         harm = [sum(min(ratio, 0.0) for label, ratio in ratios.items() if label in own) for own in labels]
         log_odds = self.log_odds + np.array(harm)

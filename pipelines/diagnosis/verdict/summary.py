@@ -36,17 +36,20 @@ def _noise_without_periods(d: Diagnosis) -> str:
     if weighed and floor:
         return ""
     if floor:
-        return " No training run holds two periods, so causes are weighed by the noise of the band above the motion."
+        return f" No training run holds two periods, so the noise that weighs causes is estimated from {_otherwise(d)}."
     told = any(run.motion.period_s for run in (*d.train, *d.validate))
     which = "validation run" if weighed else "run"
     why = f"No {which} holds two periods" if told else "No recording names a period"
-    return f" {why}, so the noise floor is estimated from {floor_from(d)}."
+    return f" {why}, so the noise floor is estimated from {_otherwise(d)}."
 
 
 def floor_from(d: Diagnosis) -> str:
     """Say what the noise floor was estimated from."""
-    if d.floor.from_periods:
-        return "periods"
+    return "periods" if d.floor.from_periods else _otherwise(d)
+
+
+def _otherwise(d: Diagnosis) -> str:
+    """Say what noise is estimated from without periods."""
     if d.data.noisy_angles:
         return "what the model leaves of the motion's own band"
     return "the band above the motion"
