@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import multivariate_normal, norm
 
 from pipelines.diagnosis.criteria import Criteria
-from pipelines.diagnosis.selection.evidence import Element, Evidence, explained
+from pipelines.diagnosis.selection.evidence import Element, Evidence, Nonnegative, explained
 from pipelines.diagnosis.selection.marginal_likelihood import MarginalLikelihood
 from pipelines.diagnosis.selection.posterior import posterior
 
@@ -86,26 +86,32 @@ def test_a_forbidden_sign_counts_as_half_of_the_prior_that_is_not_there(strength
         assert difference < -5.0
 
 
+@pytest.mark.parametrize("misfit", [0.0, 0.5])
 @pytest.mark.parametrize("friction", [0.02, 0.1, 1.0])
-def test_a_cause_that_leaves_friction_negative_is_as_improbable_as_that_friction(friction):
-    """Friction and a cause that resembles it, in one Gaussian model: the probability that friction is not negative."""
+def test_a_cause_that_leaves_friction_negative_is_as_improbable_as_that_friction(friction, misfit):
+    """Friction, a cause and a law that its form may differ by, both like friction, in one Gaussian model."""
     rng = np.random.default_rng(3)
-    B = 10.0 * rng.normal(size=ROWS)
-    A = 0.8 * B + 6.0 * rng.normal(size=ROWS)
+    B, A, D = 10.0 * rng.normal(size=(3, ROWS))
+    A, D = 0.8 * B + 0.6 * A, 0.5 * B + D
     y = friction * B + 0.05 * (A - 0.8 * B) + rng.normal(size=ROWS)
-    imitated = B @ A / (B @ B)
-    columns = (A - imitated * B)[:, np.newaxis]
-    gram, right = np.zeros((2, 1, 1)), np.zeros((2, 1))
+    imitated = B @ np.column_stack([A, D]) / (B @ B)
+    columns = np.column_stack([A, D]) - np.outer(B, imitated)
+    gram, right = np.zeros((2, 2, 2)), np.zeros((2, 2))
     gram[0], right[0] = columns.T @ columns, columns.T @ y
-    cause = Element("spring@hip", "spring", "hip", "angle", False, [0], [1.0], imitation=[[imitated]])
+    cause = Element(
+        "spring@hip", "spring", "hip", "angle", False, [0], [1.0], resembles=[1], resembles_variance=[1.0]
+    )  # fmt: skip
     alone, variance = B @ y / (B @ B), 1.0 / (B @ B)
-    known = Evidence(gram, right, (cause,), (), {}, np.zeros(2), nonnegative=((alone, variance, 0),))
-    weigh, free = (MarginalLikelihood(e, CRITERIA) for e in (known, replace(known, nonnegative=())))
+    never = Nonnegative(np.array([alone]), np.array([[variance, 0.0]]), imitated[np.newaxis])
+    known = Evidence(gram, right, (cause,), (), {}, np.zeros(2), never)
+    criteria = replace(CRITERIA, misfits=(misfit,))
+    weigh, free = (MarginalLikelihood(e, criteria) for e in (known, replace(known, nonnegative=None)))
     (size,) = weigh.sizes((0,))
-    amplitude = min(CRITERIA.amplitudes, key=lambda a: abs(np.log(a / size)))
-    both = np.column_stack([B, A])
-    covariance = np.linalg.inv(both.T @ both + np.diag([0.0, amplitude**-2]))
-    with_cause = norm.logcdf((covariance @ both.T @ y)[0] / np.sqrt(covariance[0, 0]))
+    amplitude = min(criteria.amplitudes, key=lambda a: abs(np.log(a / size)))
+    together = np.column_stack([B, A, D])
+    precision = [0.0, amplitude**-2, (max(misfit, 1e-9) * size) ** -2]
+    covariance = np.linalg.inv(together.T @ together + np.diag(precision))
+    with_cause = norm.logcdf((covariance @ together.T @ y)[0] / np.sqrt(covariance[0, 0]))
     without = norm.logcdf(alone / np.sqrt(variance))
     assert weigh((0,)) - free((0,)) == pytest.approx(with_cause - without, abs=1e-8)
     assert weigh(()) == free(()) == 0.0

@@ -2,6 +2,7 @@
 
 import json
 import os
+import subprocess
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -15,35 +16,61 @@ import pyarrow.parquet as pq
 from tests.blind.cases import Case
 from tests.blind.examine import Folders, neutral_name, prepare
 
+SOURCES = (
+    "pipelines", "tests/blind",
+    ":!pipelines/diagnosis/criteria.py", ":!pipelines/diagnosis/criteria_measured.json",
+)  # fmt: skip
+"""What evidence depends on, as git names it. Of the criteria it depends on two that are held."""
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 def write_evidence(cases: Sequence[Case], root: Path, workers: int, keep: bool = False) -> Iterator[str]:
     """Simulate cases and keep their evidence; yield names as they are done.
 
-    What is there already is left as it is, so that a campaign goes on where it was stopped.
+    What is there already, of the same revision, is left as it is, so that a campaign goes on where it was stopped.
     Recordings are removed afterwards unless ``keep``.
     """
     for name in ONE_THREAD:
         os.environ[name] = "1"
-    missing = [case for case in cases if not _place(root, case).exists()]
+    made_by = revision()
+    missing = [case for case in cases if _made_by(_place(root, case)) != made_by]
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
-        pending = [pool.submit(_one, case, root, keep) for case in missing]
+        pending = [pool.submit(_one, case, root, made_by, keep) for case in missing]
         for done in as_completed(pending):
             yield done.result()
+
+
+def revision() -> str:
+    """Return the last commit that changed what evidence depends on, and whether it was changed since."""
+
+    def git(*arguments: str) -> str:
+        command = ["git", *arguments, "--", *SOURCES]
+        folder = Path(__file__).parents[2]
+        return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout.strip()
+
+    return git("log", "-1", "--format=%h") + (", changed" if git("status", "--porcelain") else "")
+
+
+def _made_by(place: Path) -> str | None:
+    """Return the revision that made a row; None where there is none, or it does not tell."""
+    if not place.exists() or "revision" not in pq.read_schema(place).names:
+        return None
+    return str(pq.read_table(place, columns=["revision"])["revision"][0].as_py())
 
 
 def _place(root: Path, case: Case) -> Path:
     return root / "evidence" / case.world / f"{neutral_name(case)}.parquet"
 
 
-def _one(case: Case, root: Path, keep: bool) -> str:
+def _one(case: Case, root: Path, made_by: str, keep: bool) -> str:
     """Write one case's evidence, or why there is none."""
     folders, name = Folders(root), neutral_name(case)
     prepare(case, folders)
     truth = json.loads(folders.truth(name).read_text())
     row = evidence_row(folders.recordings(name))
-    row |= {"name": name, "world": case.world, "seed": case.seed, "truth": json.dumps(truth)}
+    row |= {
+        "name": name, "world": case.world, "seed": case.seed, "revision": made_by, "truth": json.dumps(truth),
+    }  # fmt: skip
     place = _place(root, case)
     place.parent.mkdir(parents=True, exist_ok=True)
     part = place.with_suffix(".part")

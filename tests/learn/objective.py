@@ -89,10 +89,11 @@ def _compact(
                 resembles=moved(e.resembles))
         for e in (evidence.elements[i] for i in elements)
     )  # fmt: skip
-    square = np.ix_(kept, kept)
+    square, known = np.ix_(kept, kept), evidence.nonnegative
     small = replace(
         evidence, gram=evidence.gram[:, *square].astype(np.float32), right=evidence.right[:, kept],
         elements=own, background=tuple((k, new[p], v, n) for k, p, v, n in evidence.background),
+        nonnegative=known and replace(known, imitation=known.imitation[:, kept]),
     )  # fmt: skip
     number = {i: n for n, i in enumerate(elements)}
     chosen = tuple(tuple(number[i] for i in s) for s in sets)

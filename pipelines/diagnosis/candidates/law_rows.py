@@ -22,7 +22,7 @@ from pipelines.diagnosis.evidence.prepared_runs import Prepared
 
 
 def law_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list[LawColumn], NDArray]:
-    """Return every smooth law and its rows (N, l)."""
+    """Return every smooth law and its rows (N, l), the baseline still in them."""
     joints = regression.joints
     spans = Spans.of(prepared.runs, prepared.torque[:joints])
     drives: list[NDArray] = []
@@ -42,7 +42,7 @@ def law_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list[L
         own = [replace(laws[i], wearer="cuffs") for i in chosen]
         parts.append((own, [x[:, :, chosen] for x in _both(zero, worn)]))
     parts += _hums(prepared, joints)
-    rows = [regression.project(regression.rows(columns)) for _, columns in parts]
+    rows = [regression.rows(columns) for _, columns in parts]
     return [law for some, _ in parts for law in some], np.hstack(rows)
 
 
@@ -67,7 +67,7 @@ def _both(drives: Sequence[NDArray], cuffs: Sequence[NDArray]) -> list[NDArray]:
 
 
 def curve_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list[Curve], NDArray]:
-    """Return every curve of time, and their rows (N, t)."""
+    """Return every curve of time, and their rows (N, t), the baseline projected out."""
     told, rows = [], []
     for r, run in enumerate(prepared.runs):
         curves, variance = curves_of_time(run)

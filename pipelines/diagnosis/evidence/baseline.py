@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.effects import Effect
-from pipelines.effects.rigid_body import RigidBody
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.run import kinds_of
 from pipelines.model import Model, ParameterLayout, Term, baseline
 
+FIRST_MOMENT = "kg·m"
 RELAXATION = 0.5
 """Share of the step from a rigid body to a refitted one. Behind a soft spring a full step overshoots, and alternates
 between heavier and lighter bodies for ever."""
@@ -54,9 +54,12 @@ class Baseline:
 
     @cached_property
     def nonnegative(self) -> list[int]:
-        """Columns whose values are never negative: of friction, and of what the machine is known to have."""
+        """Columns whose values are never negative: inertia, friction, and what the machine is known to have.
+
+        First moments of mass may be: a link may be overbalanced.
+        """
         columns = enumerate(self.layout.columns)
-        return [k for k, c in columns if not isinstance(c.effect, RigidBody) and c.parameter.typical[0] >= 0.0]
+        return [k for k, c in columns if c.parameter.typical[0] >= 0.0 and c.parameter.unit != FIRST_MOMENT]
 
     @property
     def size(self) -> int:

@@ -138,8 +138,9 @@ class DecisionRegression:
 
     @cached_property
     def baseline_variance(self) -> NDArray:
-        """The variance that noise gives each value of the baseline, (b,)."""
-        return np.sum(self._inverse**2, axis=1)
+        """The variance that the noise of each output gives each value of the baseline, (b, O)."""
+        of_output = self.output[:, np.newaxis] == np.arange(len(self.torque))
+        return np.asarray(self._inverse**2 @ of_output)
 
     def series(self, output: int) -> Iterator[tuple[NDArray, NDArray]]:
         """Yield for each run the times (m,) s of an output's rows, and what the baseline leaves there, (m,).

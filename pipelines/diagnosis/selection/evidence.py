@@ -48,9 +48,6 @@ class Element:
     resembles_variance: list[float] = field(default_factory=list)
     amplitudes: list[list[float]] = field(default_factory=list)
     """Rows: those amplitudes of the effect that are never negative, per coefficient."""
-    imitation: list[list[float]] = field(default_factory=list)
-    """Rows: values of the baseline that are never negative, per coefficient of a column or a derivative that they
-    imitate."""
     repeats: bool = True
     """Whether it does the same in every period of the motion."""
     first: bool = True
@@ -81,6 +78,31 @@ class Element:
 
 
 @dataclass(frozen=True)
+class Nonnegative:
+    """Values of the baseline that are never negative, as friction and inertia are; f of them."""
+
+    alone: NDArray
+    """(f,) as fitted with no cause."""
+    variance: NDArray
+    """(f, O) by the noise of each output."""
+    imitation: NDArray
+    """(f, n): those that imitate each column best, before the baseline is projected out of it."""
+
+    @classmethod
+    def of(cls, library: Library) -> "Nonnegative":
+        """Read them off a library, whose columns stand in the order of ``_stack``."""
+        regression, chosen = library.regression, library.prepared.baseline.nonnegative
+        values = regression.baseline_values(regression.torque_rows[:, np.newaxis])[:, 0]
+        widths = [cause.columns.shape[1] for cause in library.causes]
+        columns = [cause.imitation[:, :k] for cause, k in zip(library.causes, widths, strict=True)]
+        derivatives = [cause.imitation[:, k:] for cause, k in zip(library.causes, widths, strict=True)]
+        # A torque that wanders for itself in each run imitates hardly any friction.
+        none = np.zeros((len(values), library.curve_columns.shape[1]))
+        imitation = np.hstack([*columns, *derivatives, library.law_imitation, none])
+        return cls(values[chosen], regression.baseline_variance[chosen], imitation[chosen])
+
+
+@dataclass(frozen=True)
 class Evidence:
     """Products over the training runs' rows, of each output (O,) apart: drives first; n columns."""
 
@@ -96,9 +118,7 @@ class Evidence:
     """Log likelihood of causes besides what they do to the mean torque, by label."""
     explained: NDArray
     """(O,) what all columns together explain of each output's rows, squared and in units of the noise."""
-    nonnegative: tuple[tuple[float, float, int], ...] = ()
-    """Values of the baseline that are never negative, as friction, fitted with no cause: value, the variance of noise,
-    and the output that tells most of it."""
+    nonnegative: Nonnegative | None = None
     contexts: tuple[tuple[int, ...], ...] = ()
     """Sets of elements whose causes were refined beside one another."""
     about: Mapping[str, Any] = field(default_factory=dict)
@@ -115,7 +135,7 @@ class Evidence:
         return cls(
             gram, right, (elements := tuple(_elements(library, at))), tuple(_background(library, at)),
             dict(auxiliary), np.array([explained(g, r) for g, r in zip(gram, right, strict=True)]),
-            tuple(_nonnegative(library)), tuple(_contexts(library, elements)), _about(library),
+            Nonnegative.of(library), tuple(_contexts(library, elements)), _about(library),
         )  # fmt: skip
 
     def packed(self) -> dict[str, Any]:
@@ -128,8 +148,8 @@ class Evidence:
                 {
                     "elements": [asdict(element) for element in self.elements],
                     "background": self.background, "auxiliary": self.auxiliary,
-                    "explained": self.explained.tolist(), "nonnegative": self.nonnegative,
-                    "contexts": self.contexts, "about": self.about,
+                    "explained": self.explained.tolist(), "contexts": self.contexts, "about": self.about,
+                    "nonnegative": self.nonnegative and {k: v.tolist() for k, v in vars(self.nonnegative).items()},
                 }
             ),
         }  # fmt: skip
@@ -138,13 +158,14 @@ class Evidence:
     def unpacked(cls, row: Mapping[str, Any]) -> "Evidence":
         """Return the evidence of a row that ``packed`` made."""
         text = json.loads(row["text"])
-        explained = np.array(text["explained"])
+        explained, nonnegative = np.array(text["explained"]), text["nonnegative"]
         right = np.frombuffer(row["right"]).reshape(len(explained), -1)
         return cls(
             _symmetric(row["gram"], right.shape), right,
             tuple(Element(**one) for one in text["elements"]),
             tuple((kind, place, v, noise) for kind, place, v, noise in text["background"]),
-            text["auxiliary"], explained, tuple((v, variance, o) for v, variance, o in text["nonnegative"]),
+            text["auxiliary"], explained,
+            nonnegative and Nonnegative(**{name: np.array(values) for name, values in nonnegative.items()}),
             tuple(map(tuple, text["contexts"])), text["about"],
         )  # fmt: skip
 
@@ -224,7 +245,7 @@ def _in_any_form(elements: Sequence[Element], any_form: Mapping[str, str]) -> li
     return [
         replace(
             of_laws[e.name, e.joint], columns=e.columns, variance=e.variance,
-            derivative=[], resembles=[], resembles_variance=[], amplitudes=[], imitation=[], first=False,
+            derivative=[], resembles=[], resembles_variance=[], amplitudes=[], first=False,
         )
         if e.is_law and e.wearer == "all" and (e.name, e.joint) in of_laws else e
         for e in elements
@@ -271,7 +292,6 @@ def _of_cause(number: int, cause: Cause, at: _Places, laws: Laws, prepared: Prep
         resembles=[p for p, _ in resembles],
         resembles_variance=_normalised([v for _, v in resembles]),
         amplitudes=cause.amplitudes[_positive(cause)].tolist(),
-        imitation=cause.imitation[prepared.baseline.nonnegative].tolist(),
         repeats=not effect.goes_with_time and effect.family != Family.TIME,
         first=cause.first,
         each_run=effect.each_run,
@@ -316,16 +336,6 @@ def _background(library: Library, at: _Places):
         alone = cause.first and cause.context < 0
         if alone and not effect.each_run and effect.run is None:
             yield from (("cause", int(p), float(v), 0.0) for p, v in zip(places, cause.variance, strict=True))
-
-
-def _nonnegative(library: Library):
-    """Yield the values of the baseline that are never negative, their variance, and their joint's output."""
-    regression, baseline = library.regression, library.prepared.baseline
-    values = regression.baseline_values(regression.torque_rows[:, np.newaxis])[:, 0]
-    for k in baseline.nonnegative:
-        joint = baseline.layout.columns[k].effect.joint
-        output = baseline.joints.index(joint) if joint else 0
-        yield float(values[k]), float(regression.baseline_variance[k]), output
 
 
 def _contexts(library: Library, elements: Sequence[Element]):

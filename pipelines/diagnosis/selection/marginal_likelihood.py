@@ -125,31 +125,29 @@ class MarginalLikelihood:
             if element.amplitudes:
                 value += _log_sign(np.array(element.amplitudes), lower, u, sd, at)
             at += k + len(element.derivative)
-        return value + self._log_nonnegative(elements, lower, u, sd)
+        return value + self._log_nonnegative(columns, elements, lower, u, sd)
 
-    def _log_nonnegative(self, elements: Sequence[Element], lower: NDArray, u: NDArray, sd: NDArray) -> float:
-        """Return what knowing that the baseline's friction is not negative adds to the log Bayes factor.
+    def _log_nonnegative(
+        self, columns: NDArray, elements: Sequence[Element], lower: NDArray, u: NDArray, sd: NDArray
+    ) -> float:
+        """Return what knowing that the baseline's friction and inertia are not negative adds to the log Bayes factor.
 
-        Its prior is flat but for the sign. What causes take over from it is subtracted: y = B (b - P a) + A a.
+        Their prior is flat but for the sign. What causes and their forms take over from them is subtracted:
+        y = B (b - P a) + A a.
         """
-        if not self.evidence.nonnegative:
+        known = self.evidence.nonnegative
+        if known is None:
             return 0.0
-        alone, variance = self._friction
-        taken, at = np.zeros((len(sd), len(alone))), 0
+        taken, at = known.imitation.T[columns], 0
         for element in elements:
             width = len(element.columns) + len(element.derivative)
-            if element.imitation:  # no law has any
-                taken[at : at + width] = np.transpose(element.imitation)
+            if element.is_law:  # any function, which may hold friction itself
+                taken[at : at + width] = 0.0
             at += width
         half = _forward(lower, sd[:, np.newaxis] * taken)
-        left, spread = alone - half.T @ u, np.sqrt(variance + np.sum(half**2, axis=0))
-        return float(np.sum(log_ndtr(left / spread) - log_ndtr(alone / np.sqrt(variance))))
-
-    @cached_property
-    def _friction(self) -> tuple[NDArray, NDArray]:
-        """The baseline's friction as fitted with no cause, and its variance, (f,) each."""
-        values, variance, outputs = map(np.array, zip(*self.evidence.nonnegative, strict=True))
-        return values, variance / self.power[outputs]
+        variance = known.variance @ (1.0 / self.power)
+        left, spread = known.alone - half.T @ u, np.sqrt(variance + np.sum(half**2, axis=0))
+        return float(np.sum(log_ndtr(left / spread) - log_ndtr(known.alone / np.sqrt(variance))))
 
     def pairs(self, chosen: Sequence[int]) -> tuple[NDArray, NDArray]:
         """Return all pairs of different labels among elements, (p, 2), and rough log odds, (p,)."""
