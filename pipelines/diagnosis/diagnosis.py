@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.noise_floor import Floor
 from pipelines.diagnosis.evidence.observed_run import Run
@@ -16,7 +17,7 @@ from pipelines.diagnosis.fit.presliding_test import BuildUp
 from pipelines.diagnosis.fit.uncertainty import Uncertainty
 from pipelines.diagnosis.fit.validation import Validated, gains_of
 from pipelines.diagnosis.fit.validation_error import Gain, errors_of
-from pipelines.diagnosis.selection.answer import LIKELY, Named
+from pipelines.diagnosis.selection.answer import Named
 from pipelines.diagnosis.selection.selected import Selected
 from pipelines.diagnosis.training_data import TrainingData
 from pipelines.effects import Effect
@@ -24,11 +25,6 @@ from pipelines.effects.force_sensor_zero import ForceSensorZero
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.estimation.collinearity import collinearities, profiled
 from pipelines.model import Column, unrealizable, upside_down
-
-AT_FLOOR = 1.03
-"""RMSE over noise floor up to which a joint has no systematic error (docs/contracts.md)."""
-EXPLAINED = 0.2
-"""Share of the systematic power that may be left of an explained joint (docs/contracts.md)."""
 
 
 @dataclass(frozen=True)
@@ -85,12 +81,12 @@ class Diagnosis:
         if self.data.spoilt:
             return "unknown_cause"
         if not self.named:
-            missing = 1.0 - self.selected.answer.nothing >= LIKELY
+            missing = 1.0 - self.selected.answer.nothing >= CRITERIA.likely
             return "unknown_cause" if missing else "nothing_missing"
         left = [share for share in self.unexplained if share is not None]
-        is_gone = all(share <= EXPLAINED for share in left)
+        is_gone = all(share <= CRITERIA.explained for share in left)
         more = any(one.level != "cause" for one in self.selected.findings)
-        more |= self.selected.answer.unlisted >= LIKELY
+        more |= self.selected.answer.unlisted >= CRITERIA.likely
         return "explained" if is_gone and not more else "partly_explained"
 
     @property
@@ -104,7 +100,7 @@ class Diagnosis:
         shares: list[float | None] = []
         errors = self.before.errors.rms, self.after.errors.rms
         for floor, before, after in zip(self.floor_rms, *errors, strict=True):
-            if not before > AT_FLOOR * floor:
+            if not before > CRITERIA.at_floor * floor:
                 shares.append(None)
             else:
                 shares.append(float(max(after**2 - floor**2, 0.0) / (before**2 - floor**2)))
@@ -115,7 +111,7 @@ class Diagnosis:
         """Whether the extended model leaves more than noise at some joint."""
         if self.data.spoilt or self.status == "nothing_missing":
             return False
-        return self.status != "explained" or bool(np.any(self.after.errors.rms > AT_FLOOR * self.floor_rms))
+        return self.status != "explained" or bool(np.any(self.after.errors.rms > CRITERIA.at_floor * self.floor_rms))
 
     @cached_property
     def effects(self) -> dict[str, Effect]:

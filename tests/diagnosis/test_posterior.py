@@ -49,6 +49,17 @@ def test_an_empty_library_leaves_nothing_that_could_be_missing():
     assert weighed.marginals == {}
 
 
+def test_what_cannot_be_weighed_is_left_out_and_named():
+    """Rounding made the drag's products impossible: its column would have a negative length."""
+    evidence = problem(strength=0.3)
+    evidence.gram[0][1, 1] = -1e6
+    weighed = posterior(evidence, CRITERIA)
+    assert sum(weighed.by_labels.values()) == pytest.approx(1.0)
+    assert {"drag@hip"} in weighed.unweighed
+    assert all("drag@hip" in labels for labels in weighed.unweighed)
+    assert weighed.marginals["spring@hip"] > 0.5
+
+
 @pytest.mark.parametrize("strength", [0.0, 0.08, 0.3])
 def test_the_order_of_elements_changes_nothing(strength):
     evidence = problem(strength=strength)

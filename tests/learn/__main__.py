@@ -93,11 +93,12 @@ def cross_validate(
 
     for variable in ONE_THREAD:
         os.environ[variable] = "1"
-    rows = []
+    parts = []
     for part in cross_validated(out.resolve(), most, workers, CRITERIA):
-        rows.append(part.as_row())
-        typer.echo(" ".join(rows[-1]))
-    keep(TITLE, {"about": ABOUT.format(most=most), "columns": COLUMNS, "rows": rows})
+        parts.append(part)
+        typer.echo(" ".join(part.as_row()))
+    about = ABOUT.format(most=most, revisions=parts[0].revisions)
+    keep(TITLE, {"about": about, "columns": COLUMNS, "rows": [part.as_row() for part in parts]})
     typer.echo(f"written to {MEASURED}")
 
 

@@ -12,7 +12,7 @@ from pipelines.diagnosis.criteria import HELD, Criteria
 from pipelines.diagnosis.selection.prior import FEATURES, weights
 from tests.blind.splits import FOLDS, fold_of
 from tests.learn.learning import ascended, sessions_of, sets_of
-from tests.learn.objective import LogEvidence, Session
+from tests.learn.objective import LogEvidence, Session, revisions
 from tests.learn.vector import from_vector, to_vector
 
 TITLE = "Worlds and forms left out"
@@ -22,7 +22,8 @@ Measured by `python -m tests.learn cross-validate --most {most}`. Each world is 
 of the forms that effects have in the worlds. The criteria are learned anew from the other sessions and judged on those
 left out. Each learned number starts at twice its shipped value, the prior's learned odds at zero. Numbers that are not
 learned, and the choice of the sets that are compared, come from the shipped criteria, which were learned from all
-sessions. So these losses are lower bounds. The last two columns are the mean log probability of the truth."""
+sessions. So these losses are lower bounds. The last two columns are the mean log probability of the truth. The
+evidence was stored by revision {revisions}."""
 AWAY = 2.0
 """Factor by which each criterion is off where learning starts: none may be right because it was right before."""
 
@@ -32,6 +33,8 @@ class Part:
     """What was left out, and how well the truth of it is told."""
 
     name: str
+    revisions: str
+    """Of what made the evidence."""
     learned_from: int
     judged_on: int
     learned: float
@@ -55,7 +58,7 @@ def cross_validated(root: Path, most: int, workers: int, shipped: Criteria) -> I
         if held and rest:
             learned = _learned(rest, workers, shipped)
             scores = _scores(held, workers, (learned, replace(shipped, base_rate=0.0)))
-            yield Part(name, len(rest), len(held), *scores)
+            yield Part(name, revisions(sessions), len(rest), len(held), *scores)
 
 
 def parts(sessions: Sequence[Session]) -> Iterator[tuple[str, list[Session]]]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.criteria import Criteria
 from pipelines.diagnosis.selection.prior import FEATURES, weights
 from tests.blind.splits import fold_of
-from tests.learn.objective import LogEvidence, Session, padded, reduced, rows
+from tests.learn.objective import LogEvidence, Session, padded, reduced, revisions, rows
 from tests.learn.prior_fit import Sets
 from tests.learn.search import ascend
 from tests.learn.vector import from_vector, names, to_vector
@@ -37,11 +37,12 @@ def learn(
         weigh = LogEvidence(sessions, workers)
         criteria, before, after = ascended(weigh, sets_of(sessions), criteria)
         weigh.close()
-        history.append({"sessions": len(sessions), "before": before, "after": after})
+        history.append({"sessions": len(sessions), "revision": revisions(sessions), "before": before, "after": after})
         print(f"{len(sessions)} sessions: {before:.4f} -> {after:.4f}", flush=True)
+    seeds = [session.truth["case"]["seed"] for session in sessions]
     return {
-        "criteria": asdict(replace(criteria, base_rate=start.base_rate)), "history": history, "worlds": list(worlds),
-        "left_out": sorted(left_out),
+        "criteria": asdict(replace(criteria, base_rate=start.base_rate)), "history": history,
+        "seeds": [min(seeds), max(seeds)], "worlds": list(worlds), "left_out": sorted(left_out),
     }  # fmt: skip
 
 

@@ -5,7 +5,7 @@ are weighed again, so that thousands of sessions can be scored many times.
 """
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
@@ -32,6 +32,8 @@ class Session:
 
     name: str
     world: str
+    revision: str
+    """Of what made the evidence."""
     truth: dict[str, Any]
     evidence: Evidence
     sets: tuple[Set, ...]
@@ -51,12 +53,17 @@ def rows(root: Path, worlds: Sequence[str] = ()) -> Iterator[dict[str, Any]]:
             yield row
 
 
+def revisions(sessions: Iterable[Session]) -> str:
+    """Return the revisions that made the sessions' evidence, commas between."""
+    return ", ".join(sorted({session.revision for session in sessions}))
+
+
 def reduced(row: dict[str, Any], criteria: Criteria) -> Session:
     """Return a session with the sets that matter under some criteria."""
     truth, evidence = json.loads(row["truth"]), Evidence.unpacked(row)
     right = right_sets(truth)
     kept = _kept(posterior(evidence, criteria), right)
-    return Session(row["name"], row["world"], truth, *_compact(evidence, kept, right))
+    return Session(row["name"], row["world"], row["revision"], truth, *_compact(evidence, kept, right))
 
 
 def _kept(found: Posterior, right: Right) -> list[Set]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t
 
+from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.effects import EFFECTS, Effect, Parameter
@@ -19,8 +20,6 @@ NEVER, ALWAYS = 1e6, -1e6
 """s: onsets after every run's end and before every run's begin."""
 TURNS = ("1/turn", "rad/m")
 """Units of what is counted along a joint's way."""
-DEGREES = 3
-"""Of freedom of the prior of a free shape: its tails are heavy, for typical ranges are known roughly."""
 WAVES = 1.5
 """Of a ripple within the angles that are swept: with fewer it is not seen to repeat, and beside a spring it could
 imitate any function of the angle."""
@@ -95,7 +94,7 @@ class Candidate:
         free = [i for i, p in enumerate(self.effect.shape) if self.is_free(i) and not (p.swept or p.per_run)]
         offs = [self.effect.shape[i].off_middle(self.shapes[0][i]) for i in free if not self.directions]
         # Off the middle in halves of the range, with a scale of a quarter; a range is four scales long.
-        return float(np.sum(np.log(4.0) + t.logpdf(2.0 * np.array(offs), DEGREES)) - np.log(forms))
+        return float(np.sum(np.log(4.0) + t.logpdf(2.0 * np.array(offs), CRITERIA.shape_freedom)) - np.log(forms))
 
     def is_free(self, i: int) -> bool:
         """Tell whether shape parameter ``i`` is fitted, and not held at its usual value or at one of its forms."""

@@ -3,13 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.selection.evidence import Element
 from pipelines.diagnosis.selection.posterior import Posterior, Set
-
-LIKELY = 0.5
-"""Probability at which a cause, alone or with its ties, is named, and at which a finding is reported."""
-TIED = 0.1
-"""Odds against the named cause from which another counts as not told apart."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +40,7 @@ class Answer:
         validation runs with a cause over those without it, ``trained`` is the posterior of the training runs.
         """
         lowered = [_lowered(one, min(ratios.get(one.element.label, 0.0), 0.0), trained) for one in self.named]
-        kept = [one for one in lowered if one.probability >= LIKELY]
+        kept = [one for one in lowered if one.probability >= CRITERIA.likely]
         weighed = trained.judged(ratios)
         return Answer(tuple(sorted(kept, key=lambda one: -one.probability)), weighed.nothing, _unlisted(weighed))
 
@@ -53,7 +49,7 @@ def answer_of(posterior: Posterior) -> Answer:
     """Name the likely causes of the median probability set, each with its ties."""
     best = _best(posterior)
     found = [_named(posterior, best, i) for i in best if not posterior.elements[i].is_law]
-    named = [one for one in found if one.probability >= LIKELY]
+    named = [one for one in found if one.probability >= CRITERIA.likely]
     return Answer(tuple(sorted(named, key=lambda one: -one.probability)), posterior.nothing, _unlisted(posterior))
 
 
@@ -78,7 +74,7 @@ def _best(posterior: Posterior) -> Set:
     What most sets have in common may be likely where the most probable single set lacks it (Barbieri and Berger,
     2004, Annals of Statistics 32(3): the median probability model).
     """
-    likely = {label for label, p in posterior.marginals.items() if p >= LIKELY}
+    likely = {label for label, p in posterior.marginals.items() if p >= CRITERIA.likely}
     has_all = [labels for labels in posterior.by_labels if likely <= labels]
     labels = max(has_all or posterior.by_labels, key=lambda key: posterior.by_labels[key])
     return next(chosen for chosen in posterior.sets if frozenset(posterior.elements[i].label for i in chosen) == labels)
@@ -104,7 +100,7 @@ def _named(posterior: Posterior, best: Set, i: int) -> Named:
     element = posterior.elements[i]
     rest = frozenset(posterior.elements[k].label for k in best) - {element.label}
     own, rivals = in_place(posterior, element.label, rest)
-    ties = [(label, p) for label, p in rivals.items() if p >= TIED * own]
+    ties = [(label, p) for label, p in rivals.items() if p >= CRITERIA.tied * own]
     members = {element.label, *(label for label, _ in ties)}
     together = sum(p for labels, p in posterior.by_labels.items() if labels & members)
     alone = posterior.marginals[element.label]

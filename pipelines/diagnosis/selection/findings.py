@@ -8,7 +8,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pipelines.diagnosis.selection.answer import LIKELY, Answer, Named
+from pipelines.diagnosis.criteria import CRITERIA
+from pipelines.diagnosis.selection.answer import Answer, Named
 from pipelines.diagnosis.selection.posterior import Posterior
 
 CLOSEST = 3
@@ -59,7 +60,7 @@ def _cause(label: str, probability: float) -> dict[str, Any]:
 
 def findings(posterior: Posterior, answer: Answer) -> list[Finding]:
     """Return what is missing, the most probable first; empty where nothing is."""
-    if 1.0 - posterior.nothing < LIKELY:
+    if 1.0 - posterior.nothing < CRITERIA.likely:
         return []
     found = [_of_cause(posterior, named) for named in answer.named]
     named = {label for one in found for label, _ in one.causes}
@@ -115,7 +116,7 @@ def _likely(posterior: Posterior, rest: Inside, node: Mapping[str, Any]) -> Iter
         for one in nodes:
             inside = _within(posterior, one) & rest
             probability = _chance(posterior, inside)
-            if probability >= LIKELY:
+            if probability >= CRITERIA.likely:
                 likely.append((_finding(posterior, one, inside, probability), inside))
         if likely:
             yield from likely

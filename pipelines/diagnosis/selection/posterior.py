@@ -81,6 +81,15 @@ class Posterior:
             found[labels] = found.get(labels, 0.0) + float(p)
         return found
 
+    @cached_property
+    def unweighed(self) -> frozenset[frozenset[str]]:
+        """Sets of labels that could not be weighed at any shapes: their matrices are singular but for rounding."""
+        finite: dict[frozenset[str], bool] = {}
+        for chosen, odds in zip(self.sets, self.log_odds, strict=True):
+            labels = frozenset(self.elements[i].label for i in chosen)
+            finite[labels] = finite.get(labels, False) or bool(np.isfinite(odds))
+        return frozenset(labels for labels, known in finite.items() if not known)
+
     @property
     def nothing(self) -> float:
         """Probability that nothing is missing."""

@@ -3,9 +3,9 @@
 from typing import Any
 
 from pipelines.contracts.joints import the
+from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.data_faults import Fault
-from pipelines.diagnosis.diagnosis import AT_FLOOR, EXPLAINED, Diagnosis
-from pipelines.diagnosis.selection.answer import LIKELY
+from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.verdict.cause_evidence import doubt_of_gain
 from pipelines.diagnosis.verdict.caveats import floor_that_hides
 from pipelines.diagnosis.verdict.findings_in_words import findings, label_in_words
@@ -120,10 +120,10 @@ def _unlisted(d: Diagnosis) -> str:
         return "Something is missing, and no listed cause is likely."
     first, *more = found
     also = "".join(f"; and {one['words']} ({one['probability']:.2f})" for one in more)
-    unlisted = d.selected.answer.unlisted >= LIKELY
+    unlisted = d.selected.answer.unlisted >= CRITERIA.likely
     which = "that no listed cause explains" if unlisted else "and these data do not tell which listed cause it is"
     said = f"Something is missing {which}: {first['words']} (probability {first['probability']:.2f}){also}."
-    laws = [law for law in first["laws"] if law["probability"] >= LIKELY]
+    laws = [law for law in first["laws"] if law["probability"] >= CRITERIA.likely]
     if laws and laws[0]["words"] != first["words"]:
         said += f" Most likely it is {laws[0]['words']} ({laws[0]['probability']:.2f})."
     return f"{said}{_dropped(d) or _closest(first)}"
@@ -189,7 +189,7 @@ def _no_gain_at_its_own(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
 def _remains(d: Diagnosis, most: int) -> str:
     """Say how far the joint is from its floor, and where else something stays unexplained."""
     ratio = d.after.errors.rms / d.floor_rms
-    left = [share is not None and share > EXPLAINED for share in d.unexplained]
+    left = [share is not None and share > CRITERIA.explained for share in d.unexplained]
     here = f"{'still ' if left[most] else ''}{ratio[most]:.2f} times the floor"
     others = [
         f"; {the(joint)}'s is then {amount(d.baseline.machine, joint, d.after.errors.rms[j])}, "
@@ -197,7 +197,7 @@ def _remains(d: Diagnosis, most: int) -> str:
         for j, joint in enumerate(d.baseline.joints)
         if left[j] and j != most
     ]
-    return (here if ratio[most] > AT_FLOOR else "which is noise") + "".join(others)
+    return (here if ratio[most] > CRITERIA.at_floor else "which is noise") + "".join(others)
 
 
 def _in_words(cause: dict[str, Any]) -> str:
