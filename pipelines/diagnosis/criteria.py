@@ -76,10 +76,11 @@ HELD = (
     "shape_freedom", "likely", "tied", "at_floor", "explained",
 )  # fmt: skip
 """What is not learned. The first two and the freedom of a shape act before the evidence is stored; the mixture of the
-sessions decides the base rate. The score is flat in the model error over a factor of three, under the larger of which a second
-cause beside a large one is lost, and in how much lines count over one of thirty. Drives that ripple by a percent of
-their torque, as good ones may, are too rare among the sessions to teach the size of a good rig's line: learned alone it
-called such ripple missing. So are sensors that are tared anew at each start, which labs have: their odds are of
-sessions that had more. The last four say what is told of the probabilities and errors, and change none of them."""
+sessions decides the base rate. The score is flat in the model error over a factor of three, under the larger of which
+a second cause beside a large one is lost, and in how much lines count over one of thirty. Drives that ripple by a
+percent of their torque, as good ones may, are too rare among the sessions to teach the size of a good rig's line:
+learned alone it called such ripple missing. So are sensors that are tared anew at each start, which labs have: their
+odds are of sessions that had more. The last four say what is told of the probabilities and errors, and change none of
+them."""
 
 CRITERIA = Criteria()

@@ -12,18 +12,26 @@ class LoadDependentFriction(Effect):
     side = Side.DRIVE
     family = Family.LOAD
     resembles = ("load", "speed", "friction_by_angle")
-    forms_differ = "a real share differs between driving a load and being driven by it"
+    forms_differ = "a real share changes with the speed and along the gear"
     holds = True
-    equation = "tau = mu abs(transmitted torque) sgn(v)"
-    source = "Hamon, Gautier, Garrec (2010), IROS: dry friction depending on load and velocity"
+    equation = "tau = mu abs(T) (sgn(v) + k sgn(T)), T the transmitted torque, k = 0 unless said"
+    source = "Hamon, Gautier, Garrec (2010), IROS: dry friction depending on load and velocity, in four quadrants"
     looks_like = "a square wave with the motion's direction whose height follows the load"
     confirm = "hang weights on the joint, move it slowly both ways, and plot half the difference against the load"
     linear = (Parameter("load_coefficient", "1", "friction per unit of transmitted torque", "mu", (0.02, 0.3)),)
+    shape = (
+        Parameter(
+            "driving_excess", "1",
+            "share by which friction is larger where the drive moves the load, and smaller where the load moves it",
+            "k", (-0.5, 0.5), default=0.0, forms=(0.0, 0.4, -0.4),
+        ),
+    )  # fmt: skip
     parity = Parity.ODD
     dissipative = True
     reads_load = True
 
     @reaction
     def reaction(at, state, values, geometry, joint, out):
-        """Add mu abs(load) sgn v at the joint."""
-        out[joint] += values[0] * abs(at.load[joint]) * at.direction[joint]
+        """Add mu (abs(load) sgn v + k load) at the joint."""
+        load = at.load[joint]
+        out[joint] += values[0] * (abs(load) * at.direction[joint] + values[1] * load)
