@@ -23,7 +23,7 @@ class LoadDependentFriction(Effect):
         Parameter(
             "driving_excess", "1",
             "share by which friction is larger where the drive moves the load, and smaller where the load moves it",
-            "k", (-0.5, 0.5), default=0.0, forms=(0.0, 0.4, -0.4),
+            "k", (-1.0, 1.0), default=0.0, forms=(0.0, 0.5, -0.5),
         ),
     )  # fmt: skip
     parity = Parity.ODD

@@ -97,6 +97,12 @@ def saturating_with_load(rng, joint):
     return dict(install=install, start=0.1, largest=0.5, shape=shape)
 
 
+@new("load_dependent_friction", ("mujoco",))
+def lopsided(rng, joint):
+    """A gear that loses a share of the torque where it drives, and none where it is driven."""
+    return dict(install=hidden_torque(dry.LOAD_LOPSIDED, joint), start=0.1, largest=0.5)
+
+
 @new("quadratic_drag", PLANAR)
 def with_a_cubic_part(rng, joint):
     shape = (rng.uniform(0.1, 0.5),)

@@ -229,19 +229,11 @@ def wandering_viscosity(rng, joint):
     return dict(install=install, start=2.0, slow=True, shape=(smoothing,))
 
 
-@unlisted("load", "reversal", held_back=True)
-def lopsided_efficiency(rng, joint):
-    """A gear that loses a share of the torque where it drives, and none where it is driven."""
-    install = hidden_torque(dry.LOAD_LOPSIDED, joint)
-    kin = ("load_dependent_friction", "torque_gain")
-    return dict(install=install, start=0.1, largest=0.5, kin=kin)
-
-
 OUTSIDE = tuple(KINDS)
 """Names of all kinds; the first four are those of the fixed set, in its order."""
 OF_ONE_JOINT = (
     "tone", "cable_drag", "ringing", "kicks", "dead_zone_damper", "detent", "bent_gain",
-    "creeping_spring", "torque_steps", "held_torque", "wandering_viscosity", "lopsided_efficiency",
+    "creeping_spring", "torque_steps", "held_torque", "wandering_viscosity",
 )  # fmt: skip
 """What a machine of one joint can have of it."""
 
