@@ -17,17 +17,14 @@ def judged(
     while True:
         after, without = _fitted(selected, refine, prepared, before)
         # A torque whose size each run has for itself says nothing of another run.
-        shared = {c.label for c in selected.candidates if not any(p.per_run for p in c.effect.linear)}
-        ratios = {
-            label: log_likelihood_ratio(less, after, prepared.noise)
-            for label, less in without.items()
-            if label in shared
-        }
+        named = zip(selected.answer.named, selected.candidates, strict=True)
+        shared = [one.element for one, cause in named if not any(p.per_run for p in cause.effect.linear)]
+        ratios = {e.variant: log_likelihood_ratio(without[e.label], after, prepared.noise) for e in shared}
         kept = selected.judged(ratios)
-        harmful = ratios.keys() - {one.element.label for one in kept.answer.named}
+        harmful = ratios.keys() - {one.element.variant for one in kept.answer.named}
         if not harmful:
             return kept, after, without
-        worst = min(harmful, key=lambda label: ratios[label])
+        worst = min(harmful, key=lambda variant: ratios[variant])
         selected = selected.judged({worst: ratios[worst]})
 
 

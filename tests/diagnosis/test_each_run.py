@@ -69,6 +69,14 @@ def test_intervals_of_the_offsets_that_were_fitted_hold_the_truth_and_the_others
     assert intervals["run_1.parquet"] is intervals["run_3.parquet"] is None
 
 
+def test_zeros_that_differ_only_in_the_validation_runs_are_each_run_s_own():
+    hidden = {"run_0.parquet": 0.06, "run_1.parquet": -0.05, "run_2.parquet": 0.058, "run_3.parquet": -0.06}
+    told = verdict(diagnose([zeroed(m, hidden[m.file]) for m in session(seconds=30.0)]))
+    (cause,) = told["causes"]
+    assert (cause["effect"], cause["joint"], cause["fitted_on_validate"]) == ("encoder_offset", "knee", ["offset"])
+    assert {one["file"]: one["values"]["offset"] for one in cause["each_run"]} == pytest.approx(hidden, abs=0.01)
+
+
 def test_one_offset_in_all_runs_is_one_and_no_run_has_another():
     told = verdict(diagnose([zeroed(m, 0.06) for m in session(seconds=30.0)]))
     (cause,) = told["causes"]

@@ -37,9 +37,10 @@ class Answer:
         """Return the answer after validation: a cause that harms there is less probable.
 
         Each named cause is judged by what it does itself beside the others. ``ratios`` are log likelihoods of the
-        validation runs with a cause over those without it, ``trained`` is the posterior of the training runs.
+        validation runs with a cause over those without it, by variant; ``trained`` is the posterior of the training
+        runs. Where a value that all runs share does harm, one that each run has for itself may take its place.
         """
-        lowered = [_lowered(one, min(ratios.get(one.element.label, 0.0), 0.0), trained) for one in self.named]
+        lowered = [_lowered(one, min(ratios.get(one.element.variant, 0.0), 0.0), trained) for one in self.named]
         kept = [one for one in lowered if one.probability >= CRITERIA.likely]
         weighed = trained.judged(ratios)
         return Answer(tuple(sorted(kept, key=lambda one: -one.probability)), weighed.nothing, _unlisted(weighed))
@@ -62,10 +63,13 @@ def _lowered(one: Named, ratio: float, trained: Posterior) -> Named:
     """Return a named cause whose odds, and those of its ties, change by a log likelihood ratio."""
     if ratio == 0.0:
         return one
-    members = {one.element.label, *(label for label, _ in one.ties)}
-    judged = trained.judged(dict.fromkeys(members, ratio))
+    label, variant = one.element.label, one.element.variant
+    members = {label, *(tie for tie, _ in one.ties)}
+    judged = trained.judged({member + variant.removeprefix(label): ratio for member in members})
     together = sum(p for labels, p in judged.by_labels.items() if labels & members)
-    return replace(one, probability=min(together, 1.0), alone=judged.marginals[one.element.label])
+    now = next(e for chosen in judged.sets for i in chosen if (e := judged.elements[i]).label == label)
+    element = one.element if now.variant == variant else now
+    return replace(one, element=element, probability=min(together, 1.0), alone=judged.marginals[label])
 
 
 def _best(posterior: Posterior) -> Set:

@@ -62,12 +62,13 @@ class Posterior:
         Parameters
         ----------
         ratios : mapping of str to float
-            Log likelihoods of the validation runs with a cause over those without it, by label.
+            Log likelihoods of the validation runs with a cause over those without it, by variant: a value that all
+            runs share is judged, one that each run has for itself is not.
         """
         if not ratios:
             return self
-        labels = [{self.elements[i].label for i in chosen} for chosen in self.sets]
-        harm = [sum(min(ratio, 0.0) for label, ratio in ratios.items() if label in own) for own in labels]
+        variants = [{self.elements[i].variant for i in chosen} for chosen in self.sets]
+        harm = [sum(min(ratio, 0.0) for variant, ratio in ratios.items() if variant in own) for own in variants]
         log_odds = self.log_odds + np.array(harm)
         order = np.argsort(-log_odds, kind="stable")
         return Posterior(self.elements, tuple(self.sets[k] for k in order), log_odds[order])

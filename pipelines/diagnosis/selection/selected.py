@@ -39,7 +39,7 @@ class Selected:
     dropped: frozenset[str] = frozenset()
     """Labels that the training runs would name, and the validation runs speak against."""
     ratios: Mapping[str, float] = field(default_factory=dict)
-    """Log likelihoods of the validation runs with a cause over those without it, by label."""
+    """Log likelihoods of the validation runs with a cause over those without it, by variant."""
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
@@ -54,7 +54,7 @@ class Selected:
         return None if self.trained is None else self.trained.judged(self.ratios)
 
     def judged(self, ratios: Mapping[str, float]) -> "Selected":
-        """Return the same after the validation runs, log likelihood ratios of causes by label."""
+        """Return the same after the validation runs, log likelihood ratios of causes by variant."""
         if self.trained is None or not ratios:
             return self
         judged = replace(self, ratios={**self.ratios, **ratios})
