@@ -62,20 +62,22 @@ class Criteria:
     """Degrees of freedom of the Student prior of a free shape: its tails are heavy, for typical ranges are known
     roughly."""
     likely: float = 0.5
-    """Probability from which a cause, alone or with its ties, is named, and from which a finding is reported."""
+    """Least probability at which a cause, alone or with its ties, is named, and at which a finding is reported."""
     tied: float = 0.1
-    """Odds against a named cause from which another counts as not told apart."""
+    """Least probability, relative to the named cause's, at which another counts as not told apart from it."""
     at_floor: float = 1.03
     """RMSE over noise floor up to which a joint has no systematic error (contracts.md)."""
-    explained: float = 0.2
-    """Share of the systematic power that may be left of an explained joint (contracts.md)."""
+    left_of_explained: float = 0.2
+    """Largest share of the systematic power that is left at a joint which counts as explained (contracts.md)."""
 
 
+BEFORE_EVIDENCE = ("explained_share", "form_misfit", "shape_freedom")
+"""Criteria that act before the evidence of a session is stored."""
 HELD = (
-    "explained_share", "form_misfit", "model_error", "background_line", "each_run", "lines", "base_rate",
-    "shape_freedom", "likely", "tied", "at_floor", "explained",
+    *BEFORE_EVIDENCE, "model_error", "background_line", "each_run", "lines", "base_rate",
+    "likely", "tied", "at_floor", "left_of_explained",
 )  # fmt: skip
-"""What is not learned. The first two and the freedom of a shape act before the evidence is stored; the mixture of the
+"""What is not learned. The first three act before the evidence is stored; the mixture of the
 sessions decides the base rate. The score is flat in the model error over a factor of three, under the larger of which
 a second cause beside a large one is lost, and in how much lines count over one of thirty. Drives that ripple by a
 percent of their torque, as good ones may, are too rare among the sessions to teach the size of a good rig's line:

@@ -84,7 +84,7 @@ class Diagnosis:
             missing = 1.0 - self.selected.answer.nothing >= CRITERIA.likely
             return "unknown_cause" if missing else "nothing_missing"
         left = [share for share in self.unexplained if share is not None]
-        is_gone = all(share <= CRITERIA.explained for share in left)
+        is_gone = all(share <= CRITERIA.left_of_explained for share in left)
         more = any(one.level != "cause" for one in self.selected.findings)
         more |= self.selected.answer.unlisted >= CRITERIA.likely
         return "explained" if is_gone and not more else "partly_explained"

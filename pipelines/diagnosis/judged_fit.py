@@ -16,15 +16,15 @@ def judged(
     """
     while True:
         after, without = _fitted(selected, refine, prepared, before)
-        # A torque whose size each run has for itself says nothing of another run.
-        named = zip(selected.answer.named, selected.candidates, strict=True)
-        shared = [one.element for one, cause in named if not any(p.per_run for p in cause.effect.linear)]
-        ratios = {e.variant: log_likelihood_ratio(without[e.label], after, prepared.noise) for e in shared}
+        # One run says nothing of a value that another run has for itself.
+        shared = [c for c in selected.candidates if not (c.effect.each_run or any(p.per_run for p in c.effect.linear))]
+        ratios = {c.label: log_likelihood_ratio(without[c.label], after, prepared.noise) for c in shared}
         kept = selected.judged(ratios)
-        harmful = ratios.keys() - {one.element.variant for one in kept.answer.named}
+        still = {one.element.label for one in kept.answer.named if not one.element.each_run}
+        harmful = ratios.keys() - still
         if not harmful:
             return kept, after, without
-        worst = min(harmful, key=lambda variant: ratios[variant])
+        worst = min(harmful, key=lambda label: ratios[label])
         selected = selected.judged({worst: ratios[worst]})
 
 

@@ -41,7 +41,7 @@ class CuffCompliance(Effect):
         Parameter("stiffness", "N·m/rad", "torque between machine and limb per small angle", "k", (30.0, 2000.0)),
         Parameter(
             "shank_held", "1", "1 where the shank's own cuff holds it while the thigh moves", "e", (0.0, 1.0),
-            default=0.0, forms=(1.0, 0.0),
+            default=0.0, forms=(1.0, 0.0), between_forms=False,
         ),
         Parameter(
             "hardening", "1/rad²", "growth of the stiffness with the angle's square", "h", (0.0, 200.0), default=0.0,

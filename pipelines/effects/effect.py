@@ -124,6 +124,8 @@ class Parameter:
     """What it is where nobody says; a shape parameter that has one may be held in a fit."""
     forms: tuple[float, ...] = ()
     """Values that stand for the known members of a family of shapes; empty where the range is all there is."""
+    between_forms: bool = True
+    """False where only the forms exist, as of a sign or a switch."""
     grain: float = 1.0
     """Step of a search along what an effect oscillates with."""
     swept: bool = False

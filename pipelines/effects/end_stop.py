@@ -50,6 +50,7 @@ class EndStop(Effect):
             (-1.0, 1.0),
             default=1.0,
             forms=(1.0, -1.0),
+            between_forms=False,
         ),
         Parameter(
             "exponent",

@@ -1,6 +1,8 @@
 """Friction in proportion to the load on the gear's teeth."""
 
-from pipelines.effects.effect import Effect, Family, Parameter, Parity, Side
+from dataclasses import replace
+
+from pipelines.effects.effect import Effect, Family, Parameter, Side
 from pipelines.effects.kernel import reaction
 
 
@@ -17,7 +19,10 @@ class LoadDependentFriction(Effect):
     equation = "tau = mu abs(T) (sgn(v) + k sgn(T)), T the transmitted torque, k = 0 unless said"
     source = "Hamon, Gautier, Garrec (2010), IROS: dry friction depending on load and velocity, in four quadrants"
     looks_like = "a square wave with the motion's direction whose height follows the load"
-    confirm = "hang weights on the joint, move it slowly both ways, and plot half the difference against the load"
+    confirm = (
+        "hang weights on the joint, move it slowly both ways, and plot half the difference against the load; "
+        "half the sum, less gravity, shows the driving excess"
+    )
     linear = (Parameter("load_coefficient", "1", "friction per unit of transmitted torque", "mu", (0.02, 0.3)),)
     shape = (
         Parameter(
@@ -26,9 +31,15 @@ class LoadDependentFriction(Effect):
             "k", (-1.0, 1.0), default=0.0, forms=(0.0, 0.5, -0.5),
         ),
     )  # fmt: skip
-    parity = Parity.ODD
-    dissipative = True
+    dissipative = True  # for abs(k) <= 1
     reads_load = True
+
+    def __post_init__(self) -> None:
+        """Hold the excess at zero on a machine of one joint, where its torque is one of the rigid body's."""
+        super().__post_init__()
+        if len(self.on.names) == 1:
+            (excess,) = self.shape
+            object.__setattr__(self, "shape", (replace(excess, forms=(0.0,)),))
 
     @reaction
     def reaction(at, state, values, geometry, joint, out):

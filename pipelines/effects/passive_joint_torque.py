@@ -29,7 +29,7 @@ class PassiveJointTorque(Effect):
         Parameter("onset_angle", "rad", "angle beyond which it acts", "q0", (-1.6, 0.9)),
         Parameter(
             "width", "rad", "travel over which it grows e-fold; its sign is the side it acts on", "w", (-0.4, 0.4),
-            default=0.25, forms=(0.25, -0.25, 0.1, -0.1, 5.0, -5.0),
+            default=0.25, forms=(0.25, -0.25, 0.1, -0.1, 5.0, -5.0), between_forms=False,
         ),
     )  # fmt: skip
     parity = Parity.EVEN

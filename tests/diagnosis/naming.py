@@ -29,7 +29,7 @@ def naming(d: Diagnosis, *labels: str, ties: tuple[tuple[str, float], ...] = ())
     weighed = Posterior(selected.posterior.elements, tuple(sets), np.array(log_odds))
     answer = Answer(named, 1.0 - PROBABILITY, 0.0)
     found = tuple(findings(weighed, answer))
-    given = replace(selected, trained=weighed, ratios={}, answer=answer, findings=found, dropped=frozenset())
+    given = replace(selected, trained=weighed, charged={}, answer=answer, findings=found, dropped=frozenset())
     return _validated(d.data, selected.library.prepared, given)
 
 

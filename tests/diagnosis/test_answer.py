@@ -1,5 +1,7 @@
 """What is named, what is tied, and at which depth something is known, read off a posterior."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -132,8 +134,9 @@ def test_nothing_missing_has_no_findings():
 
 
 def after(posterior, ratios):
-    """Return the answer after validation."""
-    return answer_of(posterior).judged(ratios, posterior)
+    """Return the answer after validation, log likelihood ratios of named causes by label."""
+    answer = answer_of(posterior)
+    return answer.judged(answer.charged(ratios, posterior), posterior)
 
 
 def test_validation_lowers_a_cause_that_harms_and_raises_none():
@@ -158,6 +161,37 @@ def test_a_cause_stays_named_though_the_sets_that_held_it_held_one_that_harms():
 def test_where_all_that_was_named_harms_nothing_may_be_missing():
     answer = after(weighed(_2=0.97, _=0.03), {"quadratic_drag@hip": -9.0})
     assert answer.named == () and answer.nothing > 0.99
+
+
+ONCE, EVERY = cause("encoder_offset", "hip", "angle"), replace(cause("encoder_offset", "hip", "angle"), each_run=True)
+TILT, WORN = cause("base_tilt", "hip", "angle"), replace(cause("base_tilt", "hip", "angle"), worn=True)
+
+
+def of(elements, **sets):
+    return replace(weighed(**sets), elements=elements)
+
+
+def test_a_zero_of_each_run_takes_the_place_of_one_for_all_runs_that_harms():
+    posterior = of((ONCE, EVERY), _0=0.9, _1=0.08, _=0.02)
+    (named,) = after(posterior, {"encoder_offset@hip": -20.0}).named
+    assert named.element is EVERY
+    assert named.probability == pytest.approx(0.8)
+    assert after(posterior, {"encoder_offset@hip": 20.0}).named[0].element is ONCE
+
+
+def test_a_tie_with_a_zero_of_each_run_is_named_instead_of_the_cause_that_harms():
+    posterior = of((ONCE, EVERY, TILT), _2=0.6, _0=0.3, _1=0.08, _=0.02)
+    answer = answer_of(posterior)
+    assert answer.named[0].element is TILT
+    (named,) = after(posterior, {"base_tilt@hip": -20.0}).named
+    assert named.element is EVERY and named.ties == ()
+    judged = posterior.judged(answer.charged({"base_tilt@hip": -20.0}, posterior))
+    assert judged.marginals["encoder_offset@hip"] == pytest.approx(named.probability)
+
+
+def test_what_the_person_carries_does_not_take_the_place_of_what_the_machine_has():
+    posterior = of((TILT, WORN), _0=0.7, _1=0.28, _=0.02)
+    assert after(posterior, {"base_tilt@hip": -20.0}).named == ()
 
 
 def test_sets_stay_in_the_order_of_their_probability():

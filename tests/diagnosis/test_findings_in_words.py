@@ -42,10 +42,11 @@ def diagnosed(sets, ratios=(), joints=HIP_AND_KNEE):
     order = sorted(sets, key=lambda chosen: -sets[chosen])
     p = np.array([sets[chosen] for chosen in order])
     trained = Posterior(ELEMENTS, tuple(order), np.log(p))
-    named, weighed = answer_of(trained).named, trained.judged(dict(ratios))
-    answer = answer_of(trained).judged(dict(ratios), trained)
+    before = answer_of(trained)
+    charged = before.charged(dict(ratios), trained)
+    weighed, answer = trained.judged(charged), before.judged(charged, trained)
     labels = tuple(one.element.label for one in answer.named)
-    dropped = frozenset(one.element.label for one in named) - set(labels)
+    dropped = frozenset(one.element.label for one in before.named) - set(labels)
     return SimpleNamespace(
         selected=SimpleNamespace(
             posterior=weighed, answer=answer, findings=tuple(read_off(weighed, answer)), dropped=dropped

@@ -162,6 +162,9 @@ def test_a_strong_cause_is_found_and_a_set_that_cannot_be_weighed_is_left_out():
 
 def test_evidence_survives_being_packed():
     _, _, evidence = problem(strength=0.2)
+    rng = np.random.default_rng(4)
+    friction = Nonnegative(np.array([0.3, 0.1]), rng.random((2, 2)), rng.normal(size=(2, evidence.gram.shape[1])))
+    evidence = replace(evidence, nonnegative=friction)
     again = Evidence.unpacked(evidence.packed())
     np.testing.assert_allclose(again.gram, evidence.gram, rtol=1e-6)
     assert again.elements == evidence.elements

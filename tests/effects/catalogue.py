@@ -11,7 +11,7 @@ SIZES = {
     "stribeck_friction": (3.0, 0.15, 2.0),
     "coulomb_asymmetry": (1.5,),
     "viscous_asymmetry": (1.5,),
-    "load_dependent_friction": (0.15,),
+    "load_dependent_friction": (0.15, 0.5),
     "quadratic_drag": (2.0,),
     "position_dependent_friction": (1.5, 2.0),
     "presliding_hysteresis": (3.0, 0.03, 1.0),

@@ -97,6 +97,8 @@ def cross_validate(
     for part in cross_validated(out.resolve(), most, workers, CRITERIA):
         parts.append(part)
         typer.echo(" ".join(part.as_row()))
+    if not parts:
+        raise typer.BadParameter(f"{out} has evidence of no session to learn from; run `make evidence`")
     about = ABOUT.format(most=most, revisions=parts[0].revisions)
     keep(TITLE, {"about": about, "columns": COLUMNS, "rows": [part.as_row() for part in parts]})
     typer.echo(f"written to {MEASURED}")

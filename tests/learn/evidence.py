@@ -13,6 +13,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from pipelines.diagnosis.criteria import BEFORE_EVIDENCE, CRITERIA
 from tests.blind.cases import Case
 from tests.blind.examine import Folders, neutral_name, prepare
 
@@ -20,7 +21,8 @@ SOURCES = (
     "pipelines", "tests/blind",
     ":!pipelines/diagnosis/criteria.py", ":!pipelines/diagnosis/criteria_measured.json",
 )  # fmt: skip
-"""What evidence depends on, as git names it. Of the criteria it depends on two that are held."""
+"""What evidence depends on, as git names it; of the criteria it depends on those of ``BEFORE_EVIDENCE`` alone."""
+CHANGED = ", changed"
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -32,15 +34,16 @@ def write_evidence(cases: Sequence[Case], root: Path, workers: int, keep: bool =
     """
     for name in ONE_THREAD:
         os.environ[name] = "1"
-    made_by = revision()
-    missing = [case for case in cases if _made_by(_place(root, case)) != made_by]
+    current = current_revision()
+    changed = current.endswith(CHANGED)
+    missing = [case for case in cases if changed or _stored_revision(_place(root, case)) != current]
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
-        pending = [pool.submit(_one, case, root, made_by, keep) for case in missing]
+        pending = [pool.submit(_one, case, root, current, keep) for case in missing]
         for done in as_completed(pending):
             yield done.result()
 
 
-def revision() -> str:
+def current_revision() -> str:
     """Return the last commit that changed what evidence depends on, and whether it was changed since."""
 
     def git(*arguments: str) -> str:
@@ -48,10 +51,11 @@ def revision() -> str:
         folder = Path(__file__).parents[2]
         return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout.strip()
 
-    return git("log", "-1", "--format=%h") + (", changed" if git("status", "--porcelain") else "")
+    values = (f", {name} {getattr(CRITERIA, name):g}" for name in BEFORE_EVIDENCE)
+    return "".join([git("log", "-1", "--format=%h"), *values, CHANGED if git("status", "--porcelain") else ""])
 
 
-def _made_by(place: Path) -> str | None:
+def _stored_revision(place: Path) -> str | None:
     """Return the revision that made a row; None where there is none, or it does not tell."""
     if not place.exists() or "revision" not in pq.read_schema(place).names:
         return None
@@ -62,14 +66,14 @@ def _place(root: Path, case: Case) -> Path:
     return root / "evidence" / case.world / f"{neutral_name(case)}.parquet"
 
 
-def _one(case: Case, root: Path, made_by: str, keep: bool) -> str:
+def _one(case: Case, root: Path, revision: str, keep: bool) -> str:
     """Write one case's evidence, or why there is none."""
     folders, name = Folders(root), neutral_name(case)
     prepare(case, folders)
     truth = json.loads(folders.truth(name).read_text())
     row = evidence_row(folders.recordings(name))
     row |= {
-        "name": name, "world": case.world, "seed": case.seed, "revision": made_by, "truth": json.dumps(truth),
+        "name": name, "world": case.world, "seed": case.seed, "revision": revision, "truth": json.dumps(truth),
     }  # fmt: skip
     place = _place(root, case)
     place.parent.mkdir(parents=True, exist_ok=True)

@@ -49,6 +49,8 @@ def rows(root: Path, worlds: Sequence[str] = ()) -> Iterator[dict[str, Any]]:
         if worlds and file.parent.name not in worlds:
             continue
         row = pq.read_table(file).to_pylist()[0]
+        if "revision" not in row:
+            raise ValueError(f"{file}: stored before revisions were; remove it, and run `make evidence`")
         if not row["refused"]:
             yield row
 

@@ -1,4 +1,4 @@
-"""How much each criterion matters: what a change by 30 %, or doing without it, does to the probability of the truth."""
+"""How much each criterion matters: what a change by 30 %, or its neutral value, does to the truth's probability."""
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.diagnosis.criteria import Criteria
+from pipelines.diagnosis.criteria import BEFORE_EVIDENCE, Criteria
 from pipelines.diagnosis.selection.prior import FEATURES, weights
 from tests.learn.learning import sessions_of, sets_of
 from tests.learn.objective import LogEvidence, revisions
@@ -20,22 +20,20 @@ TITLE = "How much each matters"
 CHANGE = 1.3
 """Factor by which a number is changed, up and down."""
 COLUMNS = (
-    "changed", "ln p, larger", "ln p, smaller", "ln p, without",
-    "right first, larger", "right first, smaller", "right first, without",
+    "changed", "ln p, larger", "ln p, smaller", "ln p, neutral",
+    "right first, larger", "right first, smaller", "right first, neutral",
 )  # fmt: skip
 ABOUT = """\
 Measured by `make sensitivity` on {sessions} simulated sessions of seeds for tuning, whose evidence was stored by
 revision {revisions}. As they stand the criteria give the truth a mean log probability of {score:.3f}, and the most
 probable set is the truth in {share:.1%}. The table has the changes of both where one number is multiplied by 1.3
-(larger), divided by 1.3 (smaller), or has no effect (without), all else as it stands. Of the numbers that are not there
-`explained_share`, `form_misfit` and `shape_freedom` act before the evidence is stored, the sessions have a base rate of
-their own, and the last four change no probability."""
-UNTOLD = (
-    "explained_share", "form_misfit", "shape_freedom", "base_rate", "likely", "tied", "at_floor", "explained",
-)  # fmt: skip
+(larger), divided by 1.3 (smaller), or set to its neutral value, all else as it stands. Neutral is one for weights and
+lines, which then count in full; one of several values is then not there; all else is zero. Eight numbers have no row:
+three act before evidence is stored, the base rate is the sessions' own, and four change no probability."""
+NOT_MEASURED = (*BEFORE_EVIDENCE, "base_rate", "likely", "tied", "at_floor", "left_of_explained")
 """Criteria of which the probability of the truth, given stored evidence, tells nothing."""
 NEUTRAL = {"drive_weight": 1.0, "cuff_weight": 1.0, "lines": 1.0, "shape_sd": 1e-6}
-"""Values at which a number has no effect, where that is not zero."""
+"""Neutral values, where they are not zero."""
 
 
 def sensitivity(root: Path, worlds: Sequence[str], most: int, workers: int, criteria: Criteria) -> dict[str, Any]:
@@ -59,10 +57,10 @@ def sensitivity(root: Path, worlds: Sequence[str], most: int, workers: int, crit
 
 
 def changes(criteria: Criteria) -> Iterator[tuple[str, Criteria, Criteria, Criteria]]:
-    """Yield each number's name, and the criteria with it larger, smaller, and without effect."""
+    """Yield each number's name, and the criteria with it larger, smaller, and neutral."""
     for field in fields(Criteria):
         name, value = field.name, getattr(criteria, field.name)
-        if name in UNTOLD:
+        if name in NOT_MEASURED:
             continue
         if not isinstance(value, tuple):
             other = (value * CHANGE, value / CHANGE, NEUTRAL.get(name, 0.0))

@@ -17,6 +17,7 @@ from pipelines.mechanics.run import kinds_of
 from pipelines.model import Model, ParameterLayout, Term, baseline
 
 FIRST_MOMENT = "kg·m"
+"""Unit of a body's first moments of mass, by which they are known."""
 RELAXATION = 0.5
 """Share of the step from a rigid body to a refitted one. Behind a soft spring a full step overshoots, and alternates
 between heavier and lighter bodies for ever."""
@@ -56,7 +57,7 @@ class Baseline:
     def nonnegative(self) -> list[int]:
         """Columns whose values are never negative: inertia, friction, and what the machine is known to have.
 
-        First moments of mass may be: a link may be overbalanced.
+        First moments of mass may be negative: a link may be overbalanced.
         """
         columns = enumerate(self.layout.columns)
         return [k for k, c in columns if c.parameter.typical[0] >= 0.0 and c.parameter.unit != FIRST_MOMENT]

@@ -13,7 +13,6 @@ from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.evidence.slow_error import slow_error
 from pipelines.diagnosis.fit.change_point import ALIKE_S
 from pipelines.diagnosis.fit.joint_fit import Fit, laden, onsets_of, slope, stacked_columns
-from pipelines.effects import Parameter
 from pipelines.estimation.long_run import long_run_covariance
 
 
@@ -102,20 +101,15 @@ def _onsets(
 def _forms(causes: Sequence[Candidate]) -> list[tuple[int, int, int]]:
     """Return shapes that were chosen among forms and could lie between them: (cause, shape parameter, -1).
 
-    A sign or a switch cannot, and zero stands for a form without the parameter.
+    Where no value is negative, zero stands for a form without the parameter.
     """
     return [
         (number, i, -1)
         for number, cause in enumerate(causes)
         for i, parameter in enumerate(cause.effect.shape)
-        if parameter.forms and _between_forms(parameter) and cause.shapes[0][i] > 0.0
-    ]
-
-
-def _between_forms(parameter: Parameter) -> bool:
-    """Tell whether a parameter may have values between its forms."""
-    switch = parameter.unit == "1" and 0.0 in parameter.forms
-    return parameter.typical[0] >= 0.0 and not switch
+        if len(parameter.forms) > 1 and parameter.between_forms
+        and (cause.shapes[0][i] > 0.0 or parameter.typical[0] < 0.0)
+    ]  # fmt: skip
 
 
 def _shapes(causes: Sequence[Candidate], runs: int, fitted: bool) -> list[tuple[int, int, int]]:

@@ -1,7 +1,7 @@
 """Which causes are named, and what could stand in their place: read off the posterior."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.selection.evidence import Element
@@ -21,6 +21,11 @@ class Named:
     ties: tuple[tuple[str, float], ...]
     """Labels that cannot be told from it, with their probabilities."""
 
+    @property
+    def members(self) -> frozenset[str]:
+        """Its label and those of its ties."""
+        return frozenset((self.element.label, *(label for label, _ in self.ties)))
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -33,16 +38,31 @@ class Answer:
     unlisted: float
     """Probability that an unlisted law is missing."""
 
-    def judged(self, ratios: Mapping[str, float], trained: Posterior) -> "Answer":
-        """Return the answer after validation: a cause that harms there is less probable.
+    def charged(self, ratios: Mapping[str, float], trained: Posterior) -> dict[str, float]:
+        """Return what harm on the validation runs takes from log odds, by variant.
 
-        Each named cause is judged by what it does itself beside the others. ``ratios`` are log likelihoods of the
-        validation runs with a cause over those without it, by variant; ``trained`` is the posterior of the training
-        runs. Where a value that all runs share does harm, one that each run has for itself may take its place.
+        Where a named cause does harm, so do its ties: these data cannot tell them apart. A value that each run has for
+        itself is not charged, for one run says nothing of another's.
+
+        Parameters
+        ----------
+        ratios : mapping of str to float
+            Log likelihoods of the validation runs with a named cause over those without it, by label.
+        trained : Posterior
+            By the training runs.
         """
-        lowered = [_lowered(one, min(ratios.get(one.element.variant, 0.0), 0.0), trained) for one in self.named]
+        found: dict[str, float] = {}
+        for one in self.named:
+            harm = min(ratios.get(one.element.label, 0.0), 0.0)
+            alike = [e for e in trained.elements if e.label in one.members and not e.each_run]
+            found |= {e.variant: harm for e in alike if harm < 0.0}
+        return found
+
+    def judged(self, charged: Mapping[str, float], trained: Posterior) -> "Answer":
+        """Return the answer after validation: each named cause is judged by its own harm beside the others."""
+        lowered = [_lowered(one, charged, trained) for one in self.named]
         kept = [one for one in lowered if one.probability >= CRITERIA.likely]
-        weighed = trained.judged(ratios)
+        weighed = trained.judged(charged)
         return Answer(tuple(sorted(kept, key=lambda one: -one.probability)), weighed.nothing, _unlisted(weighed))
 
 
@@ -59,17 +79,23 @@ def _unlisted(posterior: Posterior) -> float:
     return sum(float(p) for chosen, p in pairs if any(posterior.elements[i].is_law for i in chosen))
 
 
-def _lowered(one: Named, ratio: float, trained: Posterior) -> Named:
-    """Return a named cause whose odds, and those of its ties, change by a log likelihood ratio."""
-    if ratio == 0.0:
+def _lowered(one: Named, charged: Mapping[str, float], trained: Posterior) -> Named:
+    """Return a named cause after what it and its ties are charged.
+
+    Where one value for all runs does harm, the same with a value for each run may take its place.
+    """
+    own = {e.variant for e in trained.elements if e.label in one.members} & charged.keys()
+    if one.element.each_run or not own:
         return one
-    label, variant = one.element.label, one.element.variant
-    members = {label, *(tie for tie, _ in one.ties)}
-    judged = trained.judged({member + variant.removeprefix(label): ratio for member in members})
-    together = sum(p for labels, p in judged.by_labels.items() if labels & members)
-    now = next(e for chosen in judged.sets for i in chosen if (e := judged.elements[i]).label == label)
-    element = one.element if now.variant == variant else now
-    return replace(one, element=element, probability=min(together, 1.0), alone=judged.marginals[label])
+    judged = trained.judged({variant: charged[variant] for variant in own})
+    has_one = ((chosen, i) for chosen in judged.sets for i in chosen if judged.elements[i].label in one.members)
+    best, i = next(has_one)
+    if judged.elements[i].each_run:
+        return _named(judged, best, i)
+    alone = judged.marginals[one.element.label]
+    together = sum(p for labels, p in judged.by_labels.items() if labels & one.members)
+    ties = tuple((label, p * alone / one.alone) for label, p in one.ties)
+    return Named(one.element, min(together, 1.0), alone, ties)
 
 
 def _best(posterior: Posterior) -> Set:

@@ -89,16 +89,14 @@ class Nonnegative:
     """(f, n): those that imitate each column best, before the baseline is projected out of it."""
 
     @classmethod
-    def of(cls, library: Library) -> "Nonnegative":
-        """Read them off a library, whose columns stand in the order of ``_stack``."""
+    def of(cls, library: Library, at: "_Places", count: int) -> "Nonnegative":
+        """Read them off a library, whose columns stand at places among ``count``."""
         regression, chosen = library.regression, library.prepared.baseline.nonnegative
         values = regression.baseline_values(regression.torque_rows[:, np.newaxis])[:, 0]
-        widths = [cause.columns.shape[1] for cause in library.causes]
-        columns = [cause.imitation[:, :k] for cause, k in zip(library.causes, widths, strict=True)]
-        derivatives = [cause.imitation[:, k:] for cause, k in zip(library.causes, widths, strict=True)]
-        # A torque that wanders for itself in each run imitates hardly any friction.
-        none = np.zeros((len(values), library.curve_columns.shape[1]))
-        imitation = np.hstack([*columns, *derivatives, library.law_imitation, none])
+        imitation = np.zeros((len(values), count))  # of a torque that wanders in each run it stays zero: hardly any
+        for cause, columns, derivatives in zip(library.causes, at.causes, at.derivatives, strict=True):
+            imitation[:, [*columns, *derivatives]] = cause.imitation
+        imitation[:, at.laws] = library.law_imitation
         return cls(values[chosen], regression.baseline_variance[chosen], imitation[chosen])
 
 
@@ -135,7 +133,7 @@ class Evidence:
         return cls(
             gram, right, (elements := tuple(_elements(library, at))), tuple(_background(library, at)),
             dict(auxiliary), np.array([explained(g, r) for g, r in zip(gram, right, strict=True)]),
-            Nonnegative.of(library), tuple(_contexts(library, elements)), _about(library),
+            Nonnegative.of(library, at, X.shape[1]), tuple(_contexts(library, elements)), _about(library),
         )  # fmt: skip
 
     def packed(self) -> dict[str, Any]:

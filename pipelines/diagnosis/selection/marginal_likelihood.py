@@ -141,7 +141,7 @@ class MarginalLikelihood:
         taken, at = known.imitation.T[columns], 0
         for element in elements:
             width = len(element.columns) + len(element.derivative)
-            if element.is_law:  # any function, which may hold friction itself
+            if element.is_law:  # an unlisted law may hold friction itself, a listed cause in any form may not
                 taken[at : at + width] = 0.0
             at += width
         half = _forward(lower, sd[:, np.newaxis] * taken)

@@ -54,21 +54,20 @@ class Posterior:
         p = np.exp(self.log_odds - self.log_odds.max())  # the empty set is always finite
         return np.asarray(p / p.sum())
 
-    def judged(self, ratios: Mapping[str, float]) -> "Posterior":
+    def judged(self, charged: Mapping[str, float]) -> "Posterior":
         """Return the posterior after validation: a cause that harms there is less probable.
 
         A cause that helps there gains nothing: the training runs have counted what it explains.
 
         Parameters
         ----------
-        ratios : mapping of str to float
-            Log likelihoods of the validation runs with a cause over those without it, by variant: a value that all
-            runs share is judged, one that each run has for itself is not.
+        charged : mapping of str to float
+            What harm on the validation runs takes from log odds, negative, by variant of a cause.
         """
-        if not ratios:
+        if not charged:
             return self
         variants = [{self.elements[i].variant for i in chosen} for chosen in self.sets]
-        harm = [sum(min(ratio, 0.0) for variant, ratio in ratios.items() if variant in own) for own in variants]
+        harm = [sum(charged[variant] for variant in own & charged.keys()) for own in variants]
         log_odds = self.log_odds + np.array(harm)
         order = np.argsort(-log_odds, kind="stable")
         return Posterior(self.elements, tuple(self.sets[k] for k in order), log_odds[order])
@@ -84,7 +83,7 @@ class Posterior:
 
     @cached_property
     def unweighed(self) -> frozenset[frozenset[str]]:
-        """Sets of labels that could not be weighed at any shapes: their matrices are singular but for rounding."""
+        """Sets of labels without a finite log odds at any shape: rounding made their matrices indefinite."""
         finite: dict[frozenset[str], bool] = {}
         for chosen, odds in zip(self.sets, self.log_odds, strict=True):
             labels = frozenset(self.elements[i].label for i in chosen)

@@ -38,8 +38,8 @@ class Selected:
     """Of each joint: how its residual repeats."""
     dropped: frozenset[str] = frozenset()
     """Labels that the training runs would name, and the validation runs speak against."""
-    ratios: Mapping[str, float] = field(default_factory=dict)
-    """Log likelihoods of the validation runs with a cause over those without it, by variant."""
+    charged: Mapping[str, float] = field(default_factory=dict)
+    """What harm on the validation runs takes from log odds, by variant of a cause."""
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
@@ -51,14 +51,14 @@ class Selected:
     @cached_property
     def posterior(self) -> Posterior | None:
         """How probable each set is after validation."""
-        return None if self.trained is None else self.trained.judged(self.ratios)
+        return None if self.trained is None else self.trained.judged(self.charged)
 
     def judged(self, ratios: Mapping[str, float]) -> "Selected":
-        """Return the same after the validation runs, log likelihood ratios of causes by variant."""
+        """Return the same after the validation runs, log likelihood ratios of named causes by label."""
         if self.trained is None or not ratios:
             return self
-        judged = replace(self, ratios={**self.ratios, **ratios})
-        answer = self.answer.judged(judged.ratios, self.trained)
+        judged = replace(self, charged={**self.charged, **self.answer.charged(ratios, self.trained)})
+        answer = self.answer.judged(judged.charged, self.trained)
         gone = {one.element.label for one in self.answer.named} - {one.element.label for one in answer.named}
         assert judged.posterior is not None
         # What takes the place of a cause that harms was not fitted: it is a finding, and not named.

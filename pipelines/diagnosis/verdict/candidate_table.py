@@ -105,7 +105,7 @@ def _judged(d: Diagnosis, labels: frozenset[str], probability: float) -> tuple[s
 def _against(d: Diagnosis, labels: frozenset[str], probability: float) -> Iterator[str]:
     """Yield why a set is not named."""
     if d.selected.posterior is not None and labels in d.selected.posterior.unweighed:
-        yield "it was left out: its columns are too much alike to be weighed"
+        yield "it was left out: rounding made its matrix indefinite"
         return
     yield f"its probability is {probability:.2g}"
     if any(label.startswith(LAW) for label in labels):

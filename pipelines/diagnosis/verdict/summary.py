@@ -189,7 +189,7 @@ def _no_gain_at_its_own(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
 def _remains(d: Diagnosis, most: int) -> str:
     """Say how far the joint is from its floor, and where else something stays unexplained."""
     ratio = d.after.errors.rms / d.floor_rms
-    left = [share is not None and share > CRITERIA.explained for share in d.unexplained]
+    left = [share is not None and share > CRITERIA.left_of_explained for share in d.unexplained]
     here = f"{'still ' if left[most] else ''}{ratio[most]:.2f} times the floor"
     others = [
         f"; {the(joint)}'s is then {amount(d.baseline.machine, joint, d.after.errors.rms[j])}, "
