@@ -27,14 +27,10 @@ class Criteria:
     """Share of a residual's rms that counts as noise: no form of any cause follows it exactly."""
     background_cause: float = 0.00293
     """Share of each cause of the catalogue on a good rig."""
-    background_wander: float = 0.000215
-    """Share by which a good rig's torque wanders in each run."""
     background_line: float = 0.006
     """Share of a line over the angle or over time on a good rig."""
-    amplitudes: tuple[float, float, float] = (0.0456, 0.137, 1.31)
+    amplitudes: tuple[float, float] = (0.0456, 0.137)
     """Shares that a cause or a law may have, equally likely: prior standard deviations."""
-    misfits: tuple[float, float] = (0.0, 0.0578)
-    """Shares of a cause's own size by which its true form may differ from ours, equally likely."""
     shape_sd: float = 0.393
     """Prior standard deviation of a shape about its best value, in its unit of change."""
     base_rate: float = -1.39
@@ -46,8 +42,6 @@ class Criteria:
     """Prior log odds of an unlisted law against none."""
     further: float = -1.6
     """Prior log odds of each element beyond the first."""
-    other_shape: float = -0.713
-    """Log odds of a shape that is not the one which explains most."""
     searched: float = -0.663
     """Log odds per log number of the values among which a wave, a tone or an onset was sought."""
     each_run: float = -2.57

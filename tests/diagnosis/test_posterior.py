@@ -20,7 +20,7 @@ def cause(name: str, columns: list[int]) -> Element:
 
 def evidence_from(X: np.ndarray, y: np.ndarray, elements: tuple[Element, ...], **more) -> Evidence:
     """Return the evidence of rows that are all of drives; the last column is a good rig's."""
-    background = (("cause", X.shape[1] - 1, 1.0, 0.0),)
+    background = ((X.shape[1] - 1, 1.0, 0.0),)
     gram, right = (np.array([part, np.zeros_like(part)]) for part in (X.T @ X, X.T @ y))
     return Evidence(gram, right, elements, background, {}, np.zeros(2), **more)
 
@@ -79,7 +79,7 @@ def test_the_order_of_columns_changes_nothing():
         gram=evidence.gram[:, order[:, np.newaxis], order],
         right=evidence.right[:, order],
         elements=tuple(replace(e, columns=[place[c] for c in e.columns]) for e in evidence.elements),
-        background=tuple((kind, place[c], *sizes) for kind, c, *sizes in evidence.background),
+        background=tuple((place[c], *sizes) for c, *sizes in evidence.background),
     )
     ours, theirs = (by_labels(posterior(one, CRITERIA)) for one in (evidence, moved))
     assert theirs == pytest.approx(ours, rel=1e-9)

@@ -83,10 +83,10 @@ def _compact(
 ) -> tuple[Evidence, tuple[Set, ...], NDArray, NDArray]:
     """Keep the elements and columns that sets need, and the background's."""
     elements = sorted({i for chosen in sets for i in chosen})
-    columns = {place for _, place, *_ in evidence.background}
+    columns = {place for place, *_ in evidence.background}
     for i in elements:
         e = evidence.elements[i]
-        columns.update((*e.columns, *e.derivative, *e.resembles))
+        columns.update((*e.columns, *e.derivative))
     kept = np.array(sorted(columns))
     new = {int(old): n for n, old in enumerate(kept)}
 
@@ -94,14 +94,13 @@ def _compact(
         return [new[p] for p in places]
 
     own = tuple(
-        replace(e, columns=moved(e.columns), derivative=moved(e.derivative),
-                resembles=moved(e.resembles))
+        replace(e, columns=moved(e.columns), derivative=moved(e.derivative))
         for e in (evidence.elements[i] for i in elements)
     )  # fmt: skip
     square, known = np.ix_(kept, kept), evidence.nonnegative
     small = replace(
         evidence, gram=evidence.gram[:, *square].astype(np.float32), right=evidence.right[:, kept],
-        elements=own, background=tuple((k, new[p], v, n) for k, p, v, n in evidence.background),
+        elements=own, background=tuple((new[p], v, n) for p, v, n in evidence.background),
         nonnegative=known and replace(known, imitation=known.imitation[:, kept]),
     )  # fmt: skip
     number = {i: n for n, i in enumerate(elements)}

@@ -22,7 +22,7 @@ from pipelines.diagnosis.evidence.prepared_runs import Prepared
 
 
 def law_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list[LawColumn], NDArray]:
-    """Return every smooth law and its rows (N, l), the baseline still in them."""
+    """Return every smooth law and its rows (N, l), the baseline projected out."""
     joints = regression.joints
     spans = Spans.of(prepared.runs, prepared.torque[:joints])
     drives: list[NDArray] = []
@@ -42,7 +42,7 @@ def law_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list[L
         own = [replace(laws[i], wearer="cuffs") for i in chosen]
         parts.append((own, [x[:, :, chosen] for x in _both(zero, worn)]))
     parts += _hums(prepared, joints)
-    rows = [regression.rows(columns) for _, columns in parts]
+    rows = [regression.project(regression.rows(columns)) for _, columns in parts]
     return [law for some, _ in parts for law in some], np.hstack(rows)
 
 

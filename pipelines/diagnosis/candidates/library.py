@@ -56,8 +56,6 @@ class Library:
     laws: tuple[LawColumn, ...]
     law_columns: NDArray
     """(N, l)."""
-    law_imitation: NDArray
-    """(b, l): values of the baseline that imitate each law best, before it is projected out."""
     curves: tuple[Curve, ...]
     """The curves of time."""
     curve_columns: NDArray
@@ -152,10 +150,9 @@ def build_library(prepared: Prepared, report: Report = silent) -> Library:
         left_out += [] if shapes else [effect.label]
     causes += _ripples(prepared, alone, regression)
     laws, law_columns = law_rows(prepared, regression)
-    imitation = regression.baseline_values(law_columns)
     curves, curve_columns = curve_rows(prepared, regression)
     return Library(
-        prepared, regression, rows, tuple(causes), tuple(laws), regression.project(law_columns), imitation,
+        prepared, regression, rows, tuple(causes), tuple(laws), law_columns,
         tuple(curves), curve_columns, tuple(dict.fromkeys(left_out)), (), tuple(grids),
     )  # fmt: skip
 

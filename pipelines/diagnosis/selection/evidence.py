@@ -20,7 +20,7 @@ from pipelines.diagnosis.candidates.smooth_laws import FAMILIES, HUM, TIME, LawC
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
-from pipelines.effects import Cogging, Effect, Family
+from pipelines.effects import Cogging, Family
 
 Shown = tuple[float, float, int]
 """A line's log likelihood ratio, its share of the torque, and the phases that it has."""
@@ -43,9 +43,6 @@ class Element:
     """Relative prior variance of each coefficient; they add up to one."""
     derivative: list[int] = field(default_factory=list)
     """Places of the derivative columns along its shapes, and towards another form."""
-    resembles: list[int] = field(default_factory=list)
-    """Places of the laws that its true form may differ by."""
-    resembles_variance: list[float] = field(default_factory=list)
     amplitudes: list[list[float]] = field(default_factory=list)
     """Rows: those amplitudes of the effect that are never negative, per coefficient."""
     repeats: bool = True
@@ -93,10 +90,9 @@ class Nonnegative:
         """Read them off a library, whose columns stand at places among ``count``."""
         regression, chosen = library.regression, library.prepared.baseline.nonnegative
         values = regression.baseline_values(regression.torque_rows[:, np.newaxis])[:, 0]
-        imitation = np.zeros((len(values), count))  # of a torque that wanders in each run it stays zero: hardly any
+        imitation = np.zeros((len(values), count))  # an unlisted law may hold friction itself: it imitates none
         for cause, columns, derivatives in zip(library.causes, at.causes, at.derivatives, strict=True):
             imitation[:, [*columns, *derivatives]] = cause.imitation
-        imitation[:, at.laws] = library.law_imitation
         return cls(values[chosen], regression.baseline_variance[chosen], imitation[chosen])
 
 
@@ -109,9 +105,8 @@ class Evidence:
     right: NDArray
     """(O, n) of the columns with the measured torque."""
     elements: tuple[Element, ...]
-    background: tuple[tuple[str, int, float, float], ...]
-    """What a good rig has: kind (``wander``, ``cause``), column, its variance relative to others of the kind,
-    and that of noise besides."""
+    background: tuple[tuple[int, float, float], ...]
+    """What a good rig has: column, its variance relative to other causes' (zero for slow noise), and that of noise."""
     auxiliary: Mapping[str, float]
     """Log likelihood of causes besides what they do to the mean torque, by label."""
     explained: NDArray
@@ -161,7 +156,7 @@ class Evidence:
         return cls(
             _symmetric(row["gram"], right.shape), right,
             tuple(Element(**one) for one in text["elements"]),
-            tuple((kind, place, v, noise) for kind, place, v, noise in text["background"]),
+            tuple((place, v, noise) for place, v, noise in text["background"]),
             text["auxiliary"], explained,
             nonnegative and Nonnegative(**{name: np.array(values) for name, values in nonnegative.items()}),
             tuple(map(tuple, text["contexts"])), text["about"],
@@ -212,10 +207,7 @@ def _elements(library: Library, at: _Places) -> list[Element]:
     for j in range(len(names)):
         own = [(int(p), c.variance) for p, c in zip(at.curves, library.curves, strict=True) if c.joint == j]
         laws[TIME, j, "all"] = own
-    two = any(wearer == "human" for _, _, wearer in laws)
-    elements = [
-        _of_cause(number, cause, at, laws, library.prepared, two) for number, cause in enumerate(library.causes)
-    ]
+    elements = [_of_cause(number, cause, at, library.prepared) for number, cause in enumerate(library.causes)]
     elements += [
         Element(
             label=law_label(kind, j, names),
@@ -243,7 +235,7 @@ def _in_any_form(elements: Sequence[Element], any_form: Mapping[str, str]) -> li
     return [
         replace(
             of_laws[e.name, e.joint], columns=e.columns, variance=e.variance,
-            derivative=[], resembles=[], resembles_variance=[], amplitudes=[], first=False,
+            derivative=[], amplitudes=[], first=False,
         )
         if e.is_law and e.wearer == "all" and (e.name, e.joint) in of_laws else e
         for e in elements
@@ -273,11 +265,10 @@ def _shown(kind: Kind, joint: int, prepared: Prepared) -> list[Shown]:
     return [(line.log_likelihood_ratio, line.amplitude / rms, phases) for line in lines]
 
 
-def _of_cause(number: int, cause: Cause, at: _Places, laws: Laws, prepared: Prepared, two: bool) -> Element:
+def _of_cause(number: int, cause: Cause, at: _Places, prepared: Prepared) -> Element:
     effect, names = cause.candidate.effect, prepared.baseline.joints
     joint = effect.joint
     tracked = isinstance(effect, Cogging) and joint and cause.candidate.shapes[0] == orders_of(joint, prepared)
-    resembles = list(_resembled(effect, laws, names, two))
     return Element(
         label=effect.label,
         name=effect.name,
@@ -287,8 +278,6 @@ def _of_cause(number: int, cause: Cause, at: _Places, laws: Laws, prepared: Prep
         columns=at.causes[number].tolist(),
         variance=cause.variance.tolist(),
         derivative=at.derivatives[number].tolist(),
-        resembles=[p for p, _ in resembles],
-        resembles_variance=_normalised([v for _, v in resembles]),
         amplitudes=cause.amplitudes[_positive(cause)].tolist(),
         repeats=not effect.goes_with_time and effect.family != Family.TIME,
         first=cause.first,
@@ -316,24 +305,15 @@ def _positive(cause: Cause) -> list[int]:
     return [i for i, p in enumerate(effect.linear) if p.typical[0] >= 0]
 
 
-def _resembled(effect: Effect, laws: Laws, names: Sequence[str], two: bool):
-    """Yield place and variance of the laws that an effect's true form may differ by."""
-    wearer = "human" if effect.on_limb and two else "all"
-    for kind in effect.resembles:
-        for j, name in enumerate(names):
-            if effect.joint in (None, name):
-                yield from laws.get((kind, j, "all" if kind == TIME else wearer), [])
-
-
 def _background(library: Library, at: _Places):
-    """Yield what a good rig has: kind, column, relative variance, and the variance of noise."""
+    """Yield what a good rig has: column, relative variance, and the variance of noise."""
     for curve, place in zip(library.curves, at.curves, strict=True):
-        yield "wander", int(place), curve.variance, curve.noise
+        yield int(place), 0.0, curve.noise
     for cause, places in zip(library.causes, at.causes, strict=True):
         effect = cause.candidate.effect
         alone = cause.first and cause.context < 0
         if alone and not effect.each_run and effect.run is None:
-            yield from (("cause", int(p), float(v), 0.0) for p, v in zip(places, cause.variance, strict=True))
+            yield from ((int(p), float(v), 0.0) for p, v in zip(places, cause.variance, strict=True))
 
 
 def _contexts(library: Library, elements: Sequence[Element]):

@@ -1,9 +1,9 @@
 """How well a set of causes and laws explains a session, all amplitudes integrated out.
 
 Given shapes everything is linear and Gaussian: y = sum over the set of (A a + D d) + F f + noise,
-with A the element's columns, D what its true form may differ by (a step along its shapes, and the
-smooth laws that it resembles), and F the background of a good rig. So the marginal likelihood is a
-closed form in Gram matrices (Bishop, 2006, Pattern Recognition and Machine Learning, sec. 3.5):
+with A the element's columns, D steps along its shapes and towards another form, and F the
+background of a good rig. So the marginal likelihood is a closed form in Gram matrices (Bishop, 2006,
+Pattern Recognition and Machine Learning, sec. 3.5):
 
     log p = u' (I + S G S)^-1 u / 2 - log det (I + S G S) / 2,  u = S X'y,  S the prior's sd.
 """
@@ -28,7 +28,7 @@ WIDTHS = (3, 6, WIDEST)
 """Widths by which elements are screened together."""
 CHUNK = 4000
 LEAST_SIZE = 1e-4
-"""Share below which an element's size makes no difference to what its form may differ by."""
+"""Share that an element's size is at least: its logarithm is asked for."""
 
 
 class MarginalLikelihood:
@@ -47,11 +47,9 @@ class MarginalLikelihood:
         self.apart = np.array([e.log_prior + _shown(e, criteria) for e in evidence.elements])
 
     def _background(self) -> tuple[NDArray, NDArray]:
-        c = self.criteria
-        share = {"wander": c.background_wander, "cause": c.background_cause}
         told = self.evidence.background
-        sd = [np.sqrt(share[kind] ** 2 * variance + noise) for kind, _, variance, noise in told]
-        return np.array([place for _, place, _, _ in told], dtype=int), np.array(sd)
+        sd = [np.sqrt(self.criteria.background_cause**2 * variance + noise) for _, variance, noise in told]
+        return np.array([place for place, _, _ in told], dtype=int), np.array(sd)
 
     def prior(self, chosen: Sequence[int]) -> float:
         """Return the prior log odds of a set against the empty one."""
@@ -68,31 +66,16 @@ class MarginalLikelihood:
         """
         if not chosen:
             return 0.0
+        elements = [self.evidence.elements[i] for i in chosen]
+        amplitudes = np.array(self.criteria.amplitudes)
         try:
-            return self._mixed(chosen) + float(self.apart[list(chosen)].sum())
+            nearest = [amplitudes[np.argmin(np.abs(np.log(amplitudes / size)))] for size in self.sizes(chosen)]
+            columns = np.concatenate([self.parts[i] for i in chosen])
+            variance = np.concatenate([self._variance(e, sd**2) for e, sd in zip(elements, nearest, strict=True)])
+            value = self._log_evidence(columns, variance, elements)
         except np.linalg.LinAlgError:
             return -np.inf
-
-    def _mixed(self, chosen: Sequence[int]) -> float:
-        """Return the log Bayes factor over all sizes and misfits."""
-        elements = [self.evidence.elements[i] for i in chosen]
-        sizes = self.sizes(chosen)
-        amplitudes = np.array(self.criteria.amplitudes)
-        nearest = [amplitudes[np.argmin(np.abs(np.log(amplitudes / z)))] for z in sizes]
-        columns = np.concatenate([self.parts[i] for i in chosen])
-        variance = np.concatenate([self._variance(e, sd**2) for e, sd in zip(elements, nearest, strict=True)])
-        differ, spread = _together(elements, sizes)
-        misfits = self.criteria.misfits if len(differ) else (0.0,)
-        weighed = [
-            self._log_evidence(
-                np.append(columns, differ) if share else columns,
-                np.append(variance, share**2 * spread) if share else variance,
-                elements,
-            )
-            for share in misfits
-        ]
-        mixture = -np.log(len(amplitudes)) * len(chosen) - np.log(len(misfits))
-        return float(logsumexp(weighed)) + mixture
+        return value - len(chosen) * float(np.log(len(amplitudes))) + float(self.apart[list(chosen)].sum())
 
     def _variance(self, element: Element, amplitude: float) -> NDArray:
         """Return the prior variances of an element's columns and derivatives."""
@@ -125,26 +108,17 @@ class MarginalLikelihood:
             if element.amplitudes:
                 value += _log_sign(np.array(element.amplitudes), lower, u, sd, at)
             at += k + len(element.derivative)
-        return value + self._log_nonnegative(columns, elements, lower, u, sd)
+        return value + self._log_nonnegative(columns, lower, u, sd)
 
-    def _log_nonnegative(
-        self, columns: NDArray, elements: Sequence[Element], lower: NDArray, u: NDArray, sd: NDArray
-    ) -> float:
+    def _log_nonnegative(self, columns: NDArray, lower: NDArray, u: NDArray, sd: NDArray) -> float:
         """Return what knowing that the baseline's friction and inertia are not negative adds to the log Bayes factor.
 
-        Their prior is flat but for the sign. What causes and their forms take over from them is subtracted:
-        y = B (b - P a) + A a.
+        Their prior is flat but for the sign. What causes take over from them is subtracted: y = B (b - P a) + A a.
         """
         known = self.evidence.nonnegative
         if known is None:
             return 0.0
-        taken, at = known.imitation.T[columns], 0
-        for element in elements:
-            width = len(element.columns) + len(element.derivative)
-            if element.is_law:  # an unlisted law may hold friction itself, a listed cause in any form may not
-                taken[at : at + width] = 0.0
-            at += width
-        half = _forward(lower, sd[:, np.newaxis] * taken)
+        half = _forward(lower, sd[:, np.newaxis] * known.imitation.T[columns])
         variance = known.variance @ (1.0 / self.power)
         left, spread = known.alone - half.T @ u, np.sqrt(variance + np.sum(half**2, axis=0))
         return float(np.sum(log_ndtr(left / spread) - log_ndtr(known.alone / np.sqrt(variance))))
@@ -259,15 +233,6 @@ def _line(ratio: float, variance: float, phases: int, share: float) -> float:
     """Return the log Bayes factor of a line whose sine and cosine have a prior share, against none."""
     prior = 0.5 * share**2
     return ratio * prior / (prior + variance) - phases * float(np.log1p(prior / variance))
-
-
-def _together(elements: Sequence[Element], sizes: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the columns by which the forms of a set may differ, and their variances at share 1."""
-    spread: dict[int, float] = {}
-    for element, size in zip(elements, sizes, strict=True):
-        for place, variance in zip(element.resembles, element.resembles_variance, strict=True):
-            spread[place] = spread.get(place, 0.0) + size**2 * variance
-    return np.array(list(spread), dtype=int), np.array(list(spread.values()))
 
 
 def _log_sign(amplitudes: NDArray, lower: NDArray, u: NDArray, sd: NDArray, at: int) -> float:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.criteria import Criteria
 from pipelines.diagnosis.selection.evidence import Element
 
-FEATURES = ("cause", "law", "further", "other_shape", "searched", "each_run", "worn", "coherence")
+FEATURES = ("cause", "law", "further", "searched", "each_run", "worn", "coherence")
 """Names of the criteria that the features of a set are multiplied by."""
 AUXILIARY = {"voluntary_torque": "coherence"}
 """The criterion by which an effect's auxiliary evidence counts."""
@@ -24,7 +24,6 @@ def features(element: Element, auxiliary: Mapping[str, float]) -> NDArray:
     """
     own = dict.fromkeys(FEATURES, 0.0)
     own["law" if element.is_law else "cause"] = 1.0
-    own["other_shape"] = float(not element.first)
     own["searched"] = element.log_searched
     own["each_run"], own["worn"] = float(element.each_run), float(element.worn)
     if element.name in AUXILIARY:
