@@ -189,8 +189,8 @@ class Effect(ABC):
     any_form: ClassVar[str] = ""
     """The smooth law that is this effect whatever its form; empty where only forms near its own are."""
     resembles: ClassVar[tuple[str, ...]]
-    """Smooth laws of its joint (``LAWS``) that contain it approximately: what the real effect does beyond our equation
-    looks like one of them. One that states none has those of its family (``LAWS_OF_FAMILY``)."""
+    """Smooth laws of its joint (``LAWS``) that contain it approximately: as such a law a verdict tells of a real effect
+    that is too far from our equation. One that states none has those of its family (``LAWS_OF_FAMILY``)."""
     forms_differ: ClassVar[str] = ""
     """How the real effect may differ from the equation, a sentence without its full stop; empty where nobody said."""
     joints: ClassVar[tuple[str, ...] | None] = None
