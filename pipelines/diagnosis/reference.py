@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.diagnosis import criteria
-from pipelines.diagnosis.criteria import CRITERIA, HELD, Criteria
+from pipelines.diagnosis.criteria import CRITERIA, HELD, LEARNED, Criteria
 
 MEASURED = Path(__file__).with_name("criteria_measured.json")
 INTRODUCTION = f"""\
@@ -24,7 +24,7 @@ INTRODUCTION = f"""\
 For those who want to know why a verdict came out as it did, or who change the decision.
 Written by `make docs` from `pipelines/diagnosis/criteria.py`. All but {", ".join(f"`{name}`" for name in HELD)}
 are learned (`make learn`): they maximise the log probability that the posterior gives to the truth, over
-simulated sessions.
+simulated sessions. {LEARNED}
 [science.md](science.md#9-the-decision) has the equations in which they stand.
 """
 
