@@ -30,11 +30,12 @@ def test_the_extended_model_is_better_than_the_published_parameters(fourier, the
         )
         assert (ours < published.rms).all(), motion.file
         assert (by_identify < published.rms).all(), motion.file
-        # Where the form is not exact, other weights of the joints trade one joint's error for the other's.
-        assert np.linalg.norm(by_identify) == pytest.approx(np.linalg.norm(again), rel=0.02), motion.file
+        # Where the form is not exact, as near reversals, samples and joints that are weighed otherwise share the error
+        # otherwise. What least squares fit to this very error, nothing beats on the run that it was fitted to.
+        ratio = np.linalg.norm(by_identify) / np.linalg.norm(again)
+        assert (1.0 if motion.purpose == "train" else 0.96) <= ratio <= 1.04, motion.file
 
 
-@pytest.mark.xfail(strict=True, reason="named at the shoulder alone since sets are weighed by a model")
 def test_friction_that_goes_with_the_load_is_named_at_both_joints(fourier):
     assert {("load_dependent_friction", joint) for joint in ("shoulder", "elbow")} <= set(fourier.causes)
 
