@@ -85,7 +85,7 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
         _refuse_dead_angle(motions, j)
         if (lasts := _seconds(motions, [m[:, j] for m in moving])) < least:
             raise InputError(
-                f"{files}: {the(joint.name)} moves for {lasts:.1f} s (faster than {reversal_speeds(machine)[j]:.2g} "
+                f"{files}: {the(joint.name)} moves for {_rounded_down(lasts):.1f} s (faster than {reversal_speeds(machine)[j]:.2g} "
                 f"{joint.unit('velocity')} and away from reversals), expected {least:.2g} s {together}; "
                 f"excite {('it', 'both joints', 'all joints')[min(len(machine.joints), 3) - 1]}, or record longer; "
                 f"if it did move, check its encoder, and the units of angle and time in {settings_of(motions[0])}"
@@ -93,10 +93,15 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
         _refuse_dead_torque(motions, j)
     if (lasts := _seconds(motions, [m.all(axis=1) for m in moving])) < least:
         raise InputError(
-            f"{files}: {' and '.join(machine.names)} move at once for {lasts:.1f} s, "
+            f"{files}: {' and '.join(machine.names)} move at once for {_rounded_down(lasts):.1f} s, "
             f"expected {least:.2g} s {together}: errors are scored there; "
             "excite both joints at the same time, or record longer"
         )
+
+
+def _rounded_down(seconds: float) -> float:
+    """Return seconds to a tenth, so that what is too short does not look long enough."""
+    return int(10.0 * seconds) / 10.0
 
 
 def _refuse_dead_torque(motions: Sequence[Motion], joint: int) -> None:
