@@ -86,7 +86,8 @@ def _refuse_standstill(motions: Sequence[Motion]) -> None:
         if (lasts := _seconds(motions, [m[:, j] for m in moving])) < least:
             raise InputError(
                 f"{files}: {the(joint.name)} moves for {_rounded_down(lasts):.1f} s "
-                f"(faster than {reversal_speeds(machine)[j]:.2g} {joint.unit('velocity')} and away from reversals), expected {least:.2g} s {together}; "
+                f"(faster than {reversal_speeds(machine)[j]:.2g} {joint.unit('velocity')} and away from reversals), "
+                f"expected {least:.2g} s {together}; "
                 f"excite {('it', 'both joints', 'all joints')[min(len(machine.joints), 3) - 1]}, or record longer; "
                 f"if it did move, check its encoder, and the units of angle and time in {settings_of(motions[0])}"
             )
