@@ -58,7 +58,7 @@ class Criteria:
     likely: float = 0.5
     """Least probability at which a cause, alone or with its ties, is named, and at which a finding is reported."""
     tied: float = 0.1
-    """Least probability, relative to the named cause's, at which another counts as not told apart from it."""
+    """Share of the named cause's probability from which another cause is its tie."""
     at_floor: float = 1.03
     """RMSE over noise floor up to which a joint has no systematic error (contracts.md)."""
     left_of_explained: float = 0.2
@@ -71,19 +71,18 @@ HELD = (
     *BEFORE_EVIDENCE, "model_error", "background_line", "each_run", "lines", "base_rate",
     "likely", "tied", "at_floor", "left_of_explained",
 )  # fmt: skip
-"""What is not learned. The first three act before the evidence is stored; the mixture of the
-sessions decides the base rate. The score is flat in the model error over a factor of three, under the larger of which
-a second cause beside a large one is lost, and in how much lines count over one of thirty. Drives that ripple by a
-percent of their torque, as good ones may, are too rare among the sessions to teach the size of a good rig's line:
-learned alone it called such ripple missing. So are sensors that are tared anew at each start, which labs have: their
-odds are of sessions that had more. The last four say what is told of the probabilities and errors, and change none of
-them."""
+"""What is not learned. The first three act before the evidence is stored. The mixture of the sessions decides the
+base rate. Under a larger model error a second cause beside a large one is lost, and learning tells no difference over
+a factor of three. Nor does it over a factor of thirty in `lines`. Good drives ripple by a percent of their torque;
+too few sessions have such drives, and learned alone `background_line` called their ripple missing. Too few have
+sensors that are tared anew at each start, which labs have: `each_run` is of sessions that had more. The last four
+decide what is told of the probabilities and errors, and change none of them."""
 
 LEARNED = """\
 They were learned from 335 sessions of seeds from 210000 on. Learned anew from 177 sessions whose evidence was stored by
 revision 1b85b45 (`python -m tests.learn fit --most 60`), they gave the truth of these a mean log probability of -1.29
 instead of -1.48, and that of 356 others -1.56 instead of -1.57: they were left as they are. But `cause` is lower by
-0.405, for of three prior sizes two are left: the price of a size was in it."""
+ln(3/2): a cause chooses among two prior sizes now, and chose among three before."""
 """What the criteria were learned from, for docs/criteria.md."""
 
 CRITERIA = Criteria()

@@ -19,6 +19,8 @@ class Unit(NamedTuple):
     """Powers of the joint's torque, travel and speed with which a quantity of this unit grows."""
 
 
+FIRST_MOMENT = "kg·m"
+"""Unit of a rigid body's first moments of mass, by which they are known among its parameters."""
 UNITS = {
     "N·m": Unit("N", 1, 0, 0),
     "N·m/°C": Unit("N/°C", 1, 0, 0),

@@ -7,6 +7,7 @@ from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.machine import THE_LEG, Machine
+from pipelines.mechanics.units import FIRST_MOMENT
 from pipelines.model.model import Model, Term, effect_named, term_from
 
 
@@ -95,7 +96,7 @@ def upside_down(parameters: pd.DataFrame, machine: Machine) -> list[str]:
     """
     if not machine.mechanism.has_gravity:
         return []
-    moments = {parameter.name for parameter in machine.mechanism.parameters if parameter.unit == "kg·m"}
+    moments = {parameter.name for parameter in machine.mechanism.parameters if parameter.unit == FIRST_MOMENT}
     of_bodies = parameters[(parameters["effect"] == RigidBody.name) & parameters["name"].isin(moments)]
     return [
         f"{row['run']}: {row['name']} = {row['value']:.3g} kg·m ({row['ci95_low']:.3g} to {row['ci95_high']:.3g}) has "

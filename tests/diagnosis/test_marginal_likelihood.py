@@ -113,7 +113,7 @@ def test_a_cause_that_leaves_friction_negative_is_as_improbable_as_that_friction
     assert weigh(()) == free(()) == 0.0
 
 
-def test_screening_ranks_pairs_as_the_exact_weighing_does_without_misfit():
+def test_screening_ranks_pairs_as_each_is_weighed_roughly():
     _, _, evidence = problem(strength=0.1)
     weigh = MarginalLikelihood(evidence, CRITERIA)
     pairs, odds = weigh.pairs([0, 1, 2])

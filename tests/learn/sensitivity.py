@@ -47,7 +47,7 @@ def sensitivity(root: Path, worlds: Sequence[str], most: int, workers: int, crit
     rows = []
     for name, *changed in changes(criteria):
         by_prior = name in FEATURES
-        results = [told_of(sets, as_it_is if by_prior or one == criteria else weigh(one), one) for one in changed]
+        results = [told_of(sets, as_it_is if by_prior else weigh(one), one) for one in changed]
         scores = [f"{own - score:+.3f}" for own, _ in results]
         shares = [f"{100.0 * (own - share):+.1f} %" for _, own in results]
         rows.append([f"`{name}`", *scores, *shares])
@@ -67,10 +67,9 @@ def changes(criteria: Criteria) -> Iterator[tuple[str, Criteria, Criteria, Crite
             yield name, *(replace(criteria, **{name: one}) for one in other)
             continue
         for k, one in enumerate(value):
-            if one > 0.0:  # the first misfit is none at all
-                before, after = value[:k], value[k + 1 :]
-                parts = ((one * CHANGE,), (one / CHANGE,), ())
-                yield f"{name}[{k}]", *(replace(criteria, **{name: (*before, *part, *after)}) for part in parts)
+            before, after = value[:k], value[k + 1 :]
+            parts = ((one * CHANGE,), (one / CHANGE,), ())
+            yield f"{name}[{k}]", *(replace(criteria, **{name: (*before, *part, *after)}) for part in parts)
 
 
 def told_of(sets: Sets, evidence: NDArray, criteria: Criteria) -> tuple[float, float]:

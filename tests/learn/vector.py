@@ -32,12 +32,12 @@ def from_vector(vector: NDArray, like: Criteria) -> Criteria:
 
 
 def _places(criteria: Criteria) -> list[tuple[str, int, bool, float]]:
-    """Return name, number, whether there are several, and value; the first misfit is none at all."""
+    """Return name, number, whether there are several, and value."""
     found = []
     for field in fields(Criteria):
         value = getattr(criteria, field.name)
         if field.name in (*FEATURES, *HELD):
             continue
         several = isinstance(value, tuple)
-        found += [(field.name, k, several, v) for k, v in enumerate(value if several else (value,)) if v > 0.0]
+        found += [(field.name, k, several, v) for k, v in enumerate(value if several else (value,))]
     return found

@@ -152,8 +152,8 @@ def build_library(prepared: Prepared, report: Report = silent) -> Library:
     laws, law_columns = law_rows(prepared, regression)
     curves, curve_columns = curve_rows(prepared, regression)
     return Library(
-        prepared, regression, rows, tuple(causes), tuple(laws), law_columns,
-        tuple(curves), curve_columns, tuple(dict.fromkeys(left_out)), (), tuple(grids),
+        prepared, regression, rows, tuple(causes), tuple(laws), law_columns, tuple(curves),
+        curve_columns, tuple(dict.fromkeys(left_out)), (), tuple(grids),
     )  # fmt: skip
 
 

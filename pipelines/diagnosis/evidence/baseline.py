@@ -14,10 +14,9 @@ from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.effects import Effect
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.run import kinds_of
+from pipelines.mechanics.units import FIRST_MOMENT
 from pipelines.model import Model, ParameterLayout, Term, baseline
 
-FIRST_MOMENT = "kg·m"
-"""Unit of a body's first moments of mass, by which they are known."""
 RELAXATION = 0.5
 """Share of the step from a rigid body to a refitted one. Behind a soft spring a full step overshoots, and alternates
 between heavier and lighter bodies for ever."""

@@ -93,9 +93,8 @@ def _lowered(one: Named, charged: Mapping[str, float], trained: Posterior) -> Na
     if judged.elements[i].each_run:
         return _named(judged, best, i)
     alone = judged.marginals[one.element.label]
-    together = sum(p for labels, p in judged.by_labels.items() if labels & one.members)
     ties = tuple((label, p * alone / one.alone) for label, p in one.ties)
-    return Named(one.element, min(together, 1.0), alone, ties)
+    return Named(one.element, judged.any_of(one.members), alone, ties)
 
 
 def _best(posterior: Posterior) -> Set:
@@ -107,7 +106,7 @@ def _best(posterior: Posterior) -> Set:
     likely = {label for label, p in posterior.marginals.items() if p >= CRITERIA.likely}
     has_all = [labels for labels in posterior.by_labels if likely <= labels]
     labels = max(has_all or posterior.by_labels, key=lambda key: posterior.by_labels[key])
-    return next(chosen for chosen in posterior.sets if frozenset(posterior.elements[i].label for i in chosen) == labels)
+    return next(chosen for chosen in posterior.sets if posterior.labels_of(chosen) == labels)
 
 
 def in_place(posterior: Posterior, label: str, others: frozenset[str]) -> tuple[float, dict[str, float]]:
@@ -128,10 +127,8 @@ def in_place(posterior: Posterior, label: str, others: frozenset[str]) -> tuple[
 def _named(posterior: Posterior, best: Set, i: int) -> Named:
     """Return a cause of the best set with its ties: listed causes that could replace it."""
     element = posterior.elements[i]
-    rest = frozenset(posterior.elements[k].label for k in best) - {element.label}
+    rest = posterior.labels_of(best) - {element.label}
     own, rivals = in_place(posterior, element.label, rest)
     ties = [(label, p) for label, p in rivals.items() if p >= CRITERIA.tied * own]
-    members = {element.label, *(label for label, _ in ties)}
-    together = sum(p for labels, p in posterior.by_labels.items() if labels & members)
-    alone = posterior.marginals[element.label]
-    return Named(element, min(together, 1.0), alone, tuple(ties))
+    members = frozenset((element.label, *(label for label, _ in ties)))
+    return Named(element, posterior.any_of(members), posterior.marginals[element.label], tuple(ties))

@@ -72,23 +72,29 @@ class Posterior:
         order = np.argsort(-log_odds, kind="stable")
         return Posterior(self.elements, tuple(self.sets[k] for k in order), log_odds[order])
 
+    def labels_of(self, chosen: Set) -> frozenset[str]:
+        """Return the labels of a set's elements."""
+        return frozenset(self.elements[i].label for i in chosen)
+
+    def any_of(self, labels: frozenset[str]) -> float:
+        """Return the probability that at least one of some labels is in the true set."""
+        return min(sum(p for own, p in self.by_labels.items() if own & labels), 1.0)
+
     @cached_property
     def by_labels(self) -> dict[frozenset[str], float]:
         """Probability of each set of labels, whatever the shapes."""
         found: dict[frozenset[str], float] = {}
         for chosen, p in zip(self.sets, self.probabilities, strict=True):
-            labels = frozenset(self.elements[i].label for i in chosen)
+            labels = self.labels_of(chosen)
             found[labels] = found.get(labels, 0.0) + float(p)
         return found
 
     @cached_property
     def unweighed(self) -> frozenset[frozenset[str]]:
         """Sets of labels without a finite log odds at any shape: rounding made their matrices indefinite."""
-        finite: dict[frozenset[str], bool] = {}
-        for chosen, odds in zip(self.sets, self.log_odds, strict=True):
-            labels = frozenset(self.elements[i].label for i in chosen)
-            finite[labels] = finite.get(labels, False) or bool(np.isfinite(odds))
-        return frozenset(labels for labels, known in finite.items() if not known)
+        pairs = zip(self.sets, self.log_odds, strict=True)
+        weighed = {self.labels_of(chosen) for chosen, odds in pairs if np.isfinite(odds)}
+        return frozenset(self.by_labels.keys() - weighed)
 
     @property
     def nothing(self) -> float:
