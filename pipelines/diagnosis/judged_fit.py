@@ -1,5 +1,6 @@
 """The named causes fitted to the training runs, and judged on the validation runs."""
 
+from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
 from pipelines.diagnosis.fit.joint_refinement import Refinement
 from pipelines.diagnosis.fit.validation import Validated, log_likelihood_ratio, without_each
@@ -9,23 +10,23 @@ from pipelines.diagnosis.selection.selected import Selected
 def judged(
     selected: Selected, refine: Refinement, prepared: Prepared, before: Validated
 ) -> tuple[Selected, Validated, dict[str, Validated]]:
-    """Return the causes that the validation runs leave named, fitted, and the same without each.
+    """Return the causes that training and validation runs leave named, fitted, and the same without each.
 
-    The most harmful cause is dropped first and the rest fitted anew: beside it, what others do may
-    seem to harm too.
+    The most harmful cause is charged first: beside it, what others do may seem to harm too. What
+    takes its place is fitted and judged as well.
     """
+    fitted: tuple[Candidate, ...] | None = None
     while True:
-        after, without = _fitted(selected, refine, prepared, before)
+        if selected.candidates != fitted:
+            fitted = selected.candidates
+            after, without = _fitted(selected, refine, prepared, before)
         # One run says nothing of a value that another run has for itself.
-        shared = [c for c in selected.candidates if not (c.effect.each_run or any(p.per_run for p in c.effect.linear))]
-        ratios = {c.label: log_likelihood_ratio(without[c.label], after, prepared.noise) for c in shared}
-        kept = selected.judged(ratios)
-        still = {one.element.label for one in kept.answer.named if not one.element.each_run}
-        harmful = ratios.keys() - still
-        if not harmful:
-            return kept, after, without
-        worst = min(harmful, key=lambda label: ratios[label])
-        selected = selected.judged({worst: ratios[worst]})
+        shared = [c.label for c in fitted if not (c.effect.each_run or any(p.per_run for p in c.effect.linear))]
+        ratios = {label: log_likelihood_ratio(without[label], after, prepared.noise) for label in shared}
+        charges = [charge for label, ratio in ratios.items() if (charge := selected.charges_of(label, ratio))]
+        if not charges:
+            return selected, after, without
+        selected = selected.judged(min(charges, key=lambda charge: min(charge.values())))
 
 
 def _fitted(

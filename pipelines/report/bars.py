@@ -133,12 +133,13 @@ def torque_unit(verdict: dict[str, Any], joint: str) -> str:
 def label_in_words(label: str) -> str:
     """Return ``cogging@knee`` as a sentence says it; an effect that is not known here by its name."""
     name, _, joint = label.partition("@")
+    at = f" at {the(joint)}" if joint else ""
     if name.startswith(LAW):
-        return f"unlisted law at {the(joint)}: {name.removeprefix(LAW).replace('_', ' ')}"
+        return f"unlisted law{at}: {name.removeprefix(LAW).replace('_', ' ')}"
     try:
         return in_words(effect_labelled(label))
     except InputError:
-        return name.replace("_", " ") + (f" at {the(joint)}" if joint else "")
+        return name.replace("_", " ") + at
 
 
 def cause_in_words(cause: Mapping[str, Any]) -> str:

@@ -1,6 +1,7 @@
 """What is named, what is tied, and at which depth something is known, read off a posterior."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from pipelines.diagnosis.selection.answer import answer_of
 from pipelines.diagnosis.selection.evidence import Element
 from pipelines.diagnosis.selection.findings import findings
 from pipelines.diagnosis.selection.posterior import Posterior
+from pipelines.diagnosis.selection.selected import Selected
 
 
 def cause(name: str, joint: str, family: str) -> Element:
@@ -134,33 +136,50 @@ def test_nothing_missing_has_no_findings():
 
 
 def after(posterior, ratios):
-    """Return the answer after validation, log likelihood ratios of named causes by label."""
-    answer = answer_of(posterior)
-    return answer.judged(answer.charged(ratios, posterior), posterior)
+    """Return the answer after validation, the log likelihood ratios of causes by label, as ``judged_fit`` charges."""
+    selected = Selected(None, None, posterior, answer_of(posterior), (), ())
+    while True:
+        named = [one.element for one in selected.answer.named if not one.element.each_run]
+        charges = [selected.charges_of(e.label, ratios.get(e.label, 0.0)) for e in named]
+        if not any(charges):
+            return selected
+        selected = selected.judged(min(filter(None, charges), key=lambda charge: min(charge.values())))
 
 
 def test_validation_lowers_a_cause_that_harms_and_raises_none():
     posterior = weighed(_02=0.95, _0=0.05)
     answer = answer_of(posterior)
-    helped = after(posterior, {"parallel_spring@knee": 40.0, "quadratic_drag@hip": 9.0})
+    helped = after(posterior, {"parallel_spring@knee": 40.0, "quadratic_drag@hip": 9.0}).answer
     assert [one.probability for one in helped.named] == [one.probability for one in answer.named]
-    harmed = after(posterior, {"parallel_spring@knee": 40.0, "quadratic_drag@hip": -6.0})
+    harmed = after(posterior, {"parallel_spring@knee": 40.0, "quadratic_drag@hip": -6.0}).answer
     assert [one.element.label for one in harmed.named] == ["parallel_spring@knee"]
-    doubted = after(posterior, {"quadratic_drag@hip": -1.0})
+    doubted = after(posterior, {"quadratic_drag@hip": -1.0}).answer
     (drag,) = [one for one in doubted.named if one.element.label == "quadratic_drag@hip"]
     odds = np.exp(-1.0) * 0.95 / 0.05
     assert drag.probability == pytest.approx(odds / (1.0 + odds))
 
 
 def test_a_cause_stays_named_though_the_sets_that_held_it_held_one_that_harms():
-    """It was fitted without that one, too, and does no harm."""
-    answer = after(weighed(_02=0.9, _=0.1), {"quadratic_drag@hip": -20.0})
-    assert [one.element.label for one in answer.named] == ["parallel_spring@knee"]
+    selected = after(weighed(_02=0.9, _0=0.01, _=1e-6), {"quadratic_drag@hip": -20.0})
+    assert [one.element.label for one in selected.answer.named] == ["parallel_spring@knee"]
+    assert selected.dropped == {"quadratic_drag@hip"}
 
 
 def test_where_all_that_was_named_harms_nothing_may_be_missing():
-    answer = after(weighed(_2=0.97, _=0.03), {"quadratic_drag@hip": -9.0})
-    assert answer.named == () and answer.nothing > 0.99
+    selected = after(weighed(_2=0.97, _=0.03), {"quadratic_drag@hip": -9.0})
+    assert selected.answer.named == () and selected.answer.nothing > 0.99
+
+
+@pytest.mark.parametrize("harm", [-0.5, -1.0, -1.3, -2.0, -6.0])
+def test_what_is_named_and_the_findings_tell_the_same_probabilities_after_validation(harm):
+    """Two causes that harm a little each are as doubtful as the path to them."""
+    selected = after(weighed(_02=0.9, _=0.1), {"parallel_spring@knee": harm, "quadratic_drag@hip": harm})
+    assert bool(selected.answer.named) == (selected.answer.nothing < 0.5)
+    told = [one for one in selected.findings if one.level == "cause"]
+    assert [one.probability for one in told] == [one.probability for one in selected.answer.named]
+    for one in told:
+        likely = [p for _, _, p in one.path]
+        assert all(below <= above + 1e-12 for above, below in pairwise(likely))
 
 
 ONCE, EVERY = cause("encoder_offset", "hip", "angle"), replace(cause("encoder_offset", "hip", "angle"), each_run=True)
@@ -173,25 +192,24 @@ def of(elements, **sets):
 
 def test_a_zero_of_each_run_takes_the_place_of_one_for_all_runs_that_harms():
     posterior = of((ONCE, EVERY), _0=0.9, _1=0.08, _=0.02)
-    (named,) = after(posterior, {"encoder_offset@hip": -20.0}).named
+    (named,) = after(posterior, {"encoder_offset@hip": -20.0}).answer.named
     assert named.element is EVERY
     assert named.probability == pytest.approx(0.8)
-    assert after(posterior, {"encoder_offset@hip": 20.0}).named[0].element is ONCE
+    assert after(posterior, {"encoder_offset@hip": 20.0}).answer.named[0].element is ONCE
 
 
 def test_a_tie_with_a_zero_of_each_run_is_named_instead_of_the_cause_that_harms():
     posterior = of((ONCE, EVERY, TILT), _2=0.6, _0=0.3, _1=0.08, _=0.02)
-    answer = answer_of(posterior)
-    assert answer.named[0].element is TILT
-    (named,) = after(posterior, {"base_tilt@hip": -20.0}).named
+    assert answer_of(posterior).named[0].element is TILT
+    selected = after(posterior, {"base_tilt@hip": -20.0})
+    (named,) = selected.answer.named
     assert named.element is EVERY and named.ties == ()
-    judged = posterior.judged(answer.charged({"base_tilt@hip": -20.0}, posterior))
-    assert judged.marginals["encoder_offset@hip"] == pytest.approx(named.probability)
+    assert selected.posterior.marginals["encoder_offset@hip"] == pytest.approx(named.probability)
 
 
 def test_what_the_person_carries_does_not_take_the_place_of_what_the_machine_has():
     posterior = of((TILT, WORN), _0=0.7, _1=0.28, _=0.02)
-    assert after(posterior, {"base_tilt@hip": -20.0}).named == ()
+    assert after(posterior, {"base_tilt@hip": -20.0}).answer.named == ()
 
 
 def test_sets_stay_in_the_order_of_their_probability():
@@ -200,11 +218,16 @@ def test_sets_stay_in_the_order_of_their_probability():
     assert judged.probabilities.sum() == pytest.approx(1.0)
 
 
-def test_what_becomes_likely_only_by_validation_is_not_named():
-    """It was not fitted, and nobody knows what it does on the validation runs."""
-    answer = after(weighed(_2=0.7, _3=0.05, _4=0.2, _=0.05), {"quadratic_drag@hip": -10.0})
-    assert answer.named == ()
-    assert answer.unlisted == pytest.approx(0.2 / 0.3, abs=1e-3)
+def test_what_takes_the_place_of_a_cause_that_harms_is_named_unless_it_harms_too():
+    posterior = weighed(_2=0.7, _3=0.05, _4=0.02, _=0.01)
+    helped = after(posterior, {"quadratic_drag@hip": -10.0, "stribeck_friction@hip": 3.0})
+    (named,) = helped.answer.named
+    assert named.element is PEAK and named.probability == pytest.approx(0.05 / 0.08, abs=1e-3)
+    assert helped.dropped == {"quadratic_drag@hip"}
+    harmed = after(posterior, {"quadratic_drag@hip": -10.0, "stribeck_friction@hip": -10.0})
+    assert harmed.answer.named == ()
+    assert harmed.dropped == {"quadratic_drag@hip", "stribeck_friction@hip"}
+    assert harmed.answer.unlisted == pytest.approx(0.02 / 0.03, abs=1e-3)
 
 
 def test_two_causes_that_stand_for_one_are_no_ties_of_it():

@@ -11,6 +11,7 @@ from pipelines.diagnosis.selection.answer import answer_of
 from pipelines.diagnosis.selection.evidence import Element
 from pipelines.diagnosis.selection.findings import findings as read_off
 from pipelines.diagnosis.selection.posterior import Posterior
+from pipelines.diagnosis.selection.selected import Selected
 from pipelines.diagnosis.verdict.findings_in_words import findings
 from pipelines.label import effect_labelled
 
@@ -42,20 +43,18 @@ def diagnosed(sets, ratios=(), joints=HIP_AND_KNEE):
     order = sorted(sets, key=lambda chosen: -sets[chosen])
     p = np.array([sets[chosen] for chosen in order])
     trained = Posterior(ELEMENTS, tuple(order), np.log(p))
-    before = answer_of(trained)
-    charged = before.charged(dict(ratios), trained)
-    weighed, answer = trained.judged(charged), before.judged(charged, trained)
-    labels = tuple(one.element.label for one in answer.named)
-    dropped = frozenset(one.element.label for one in before.named) - set(labels)
+    answer = answer_of(trained)
+    selected = Selected(None, None, trained, answer, tuple(read_off(trained, answer)), ())
+    for label, ratio in dict(ratios).items():
+        selected = selected.judged(selected.charges_of(label, ratio))
+    labels = tuple(one.element.label for one in selected.answer.named)
     return SimpleNamespace(
-        selected=SimpleNamespace(
-            posterior=weighed, answer=answer, findings=tuple(read_off(weighed, answer)), dropped=dropped
-        ),
+        selected=selected,
         baseline=SimpleNamespace(machine=SimpleNamespace(joint={joint.name: joint for joint in joints}.get)),
         effects={label: effect_labelled(label) for label in labels},
         effect_of=effect_labelled,
         causes=labels,
-        named=answer.named,
+        named=selected.answer.named,
         status="explained" if labels else "unknown_cause",
     )
 
@@ -116,7 +115,7 @@ def test_a_cause_that_does_harm_on_the_validation_runs_is_dropped_and_with_it_wh
     assert findings(d) == []
 
 
-def test_what_takes_the_place_of_a_dropped_cause_is_a_finding_and_not_named():
+def test_a_law_that_takes_the_place_of_a_dropped_cause_is_a_finding_beside_it():
     d = diagnosed({(COGGING,): 0.94, (ANGLE,): 0.05, (): 0.01}, {"cogging@knee": -4.0})
     assert d.causes == ()
     (found,) = findings(d)

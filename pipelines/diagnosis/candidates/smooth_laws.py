@@ -7,10 +7,11 @@ dimensionless and of order one, so that its coefficient is a share of the joint'
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial.legendre import legvander
+from numpy.polynomial.legendre import legder, legval, legvander
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.evidence.observed_run import Run
@@ -22,6 +23,7 @@ FAMILIES = {
     "load": "load", "other_load": "load",
     "inertia_by_angle": "transmission",
     "gain_over_time": "time", "friction_over_time": "time", "time": "time", "hum": "time",
+    "across_joints": "angle",
 }  # fmt: skip
 """The family that each law belongs to."""
 IN_WORDS = {
@@ -39,6 +41,7 @@ IN_WORDS = {
     "friction_over_time": "friction of {joint} that changes with time",
     "time": "a torque of {joint} that wanders in time and does not repeat",
     "hum": "a tone at {joint} that does not follow the motion",
+    "across_joints": "an elastic torque across both joints",
 }
 IN_CUFFS = ("angle", "both_angles", "speed", "inertia_by_angle", "load", "other_load")
 """Laws by which cuff forces may be a little wrong on their own."""
@@ -54,11 +57,16 @@ TIME = "time"
 """The law whose columns are each run's own curves of time."""
 HUM = "hum"
 """The law whose columns are tones with a phase in each run."""
+ACROSS = "across_joints"
+"""The law of no single joint: what stretches over two, as a muscle or a band, pulls at both."""
+ACROSS_DEGREE = 4
+"""Highest degree of its elastic energy."""
 
 
-def law_label(kind: str, joint: int, joints: Sequence[str], wearer: str = "all") -> str:
+def law_label(kind: str, joint: int | None, joints: Sequence[str], wearer: str = "all") -> str:
     """Return what a law is called, ``law:angle@hip``; with ``/human`` if it is the person's."""
-    return f"law:{kind}@{joints[joint]}" + ("" if wearer == "all" else f"/{wearer}")
+    at = "" if joint is None else f"@{joints[joint]}"
+    return f"law:{kind}{at}" + ("" if wearer == "all" else f"/{wearer}")
 
 
 @dataclass(frozen=True)
@@ -66,7 +74,8 @@ class LawColumn:
     """One column of a smooth law."""
 
     kind: str
-    joint: int
+    joint: int | None
+    """None where it acts at both joints at once."""
     wearer: str
     """``all`` runs' drives; the ``human``'s share, in drives and cuffs; the ``cuffs`` alone."""
     variance: float
@@ -125,20 +134,48 @@ def smooth_laws(run: Run, spans: Spans, load: NDArray) -> tuple[list[LawColumn],
     """
     joints = run.state[0].shape[1]
     laws: list[LawColumn] = []
-    parts = []
+    parts: list[tuple[int | slice, NDArray]] = []
     for j in range(joints):
         for kind, degree, column in _laws_of(run, spans, load, j):
             laws.append(LawColumn(kind, j, "all", 1.0 / (1.0 + degree)))
             parts.append((j, column))
+    if joints == 2:
+        for degree, pulls in _across_joints(_scaled_angle(run, spans), spans):
+            laws.append(LawColumn(ACROSS, None, "all", 1.0 / (1.0 + degree)))
+            parts.append((slice(None), pulls))
     columns = np.zeros((len(run.time), joints, len(parts)))
-    for k, (j, column) in enumerate(parts):
-        columns[:, j, k] = column
+    for k, (at, column) in enumerate(parts):
+        columns[:, at, k] = column
     return laws, columns
+
+
+def _scaled_angle(run: Run, spans: Spans) -> NDArray:
+    """Return the angles (m, J), scaled to lie between -1 and 1 on the training runs."""
+    return np.clip((run.state[0] - spans.middle) / spans.half_range, -1.5, 1.5)
+
+
+def _across_joints(x: NDArray, spans: Spans) -> Iterator[tuple[int, NDArray]]:
+    """Yield degree and torque (m, 2) of each part of an elastic energy of both angles.
+
+    Where only the energy is unknown, one law tells the torques at both joints: its slopes. Of each part, a product of
+    Legendre polynomials of the scaled angles ``x`` (m, 2), the larger one is of order one.
+    """
+    every = np.eye(ACROSS_DEGREE + 1)
+    value, slope = legval(x, every), legval(x, legder(every))
+    degree = np.arange(ACROSS_DEGREE + 1)
+    # Over the whole range, a polynomial's rms and its slope's.
+    rms, steep = 1.0 / np.sqrt(2.0 * degree + 1.0), np.sqrt(0.5 * degree * (degree + 1.0))
+    units = spans.half_range * spans.torque
+    for a, b in product(degree, degree):
+        if 2 <= a + b <= ACROSS_DEGREE:
+            pulls = np.column_stack([slope[a, :, 0] * value[b, :, 1], value[a, :, 0] * slope[b, :, 1]]) / units
+            largest = max(steep[a] * rms[b] / units[0], rms[a] * steep[b] / units[1])
+            yield int(a + b - 1), pulls / largest
 
 
 def _laws_of(run: Run, spans: Spans, load: NDArray, j: int) -> Iterator[tuple[str, int, NDArray]]:
     """Yield kind, degree and column (m,) of each law at one joint."""
-    q = np.clip((run.state[0] - spans.middle) / spans.half_range, -1.5, 1.5)
+    q = _scaled_angle(run, spans)
     v, a = run.state[1] / spans.speed, run.state[2] / spans.acceleration
     sign, tau = np.sign(run.state[1]), load / spans.torque
     here, way, force = v[:, j], sign[:, j], tau[:, j]

@@ -1,6 +1,5 @@
 """Which causes are named, and what could stand in their place: read off the posterior."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from pipelines.diagnosis.criteria import CRITERIA
@@ -38,33 +37,6 @@ class Answer:
     unlisted: float
     """Probability that an unlisted law is missing."""
 
-    def charged(self, ratios: Mapping[str, float], trained: Posterior) -> dict[str, float]:
-        """Return what harm on the validation runs takes from log odds, by variant.
-
-        Where a named cause does harm, so do its ties: these data cannot tell them apart. A value that each run has for
-        itself is not charged, for one run says nothing of another's.
-
-        Parameters
-        ----------
-        ratios : mapping of str to float
-            Log likelihoods of the validation runs with a named cause over those without it, by label.
-        trained : Posterior
-            By the training runs.
-        """
-        found: dict[str, float] = {}
-        for one in self.named:
-            harm = min(ratios.get(one.element.label, 0.0), 0.0)
-            alike = [e for e in trained.elements if e.label in one.members and not e.each_run]
-            found |= {e.variant: harm for e in alike if harm < 0.0}
-        return found
-
-    def judged(self, charged: Mapping[str, float], trained: Posterior) -> "Answer":
-        """Return the answer after validation: each named cause is judged by its own harm beside the others."""
-        lowered = [_lowered(one, charged, trained) for one in self.named]
-        kept = [one for one in lowered if one.probability >= CRITERIA.likely]
-        weighed = trained.judged(charged)
-        return Answer(tuple(sorted(kept, key=lambda one: -one.probability)), weighed.nothing, _unlisted(weighed))
-
 
 def answer_of(posterior: Posterior) -> Answer:
     """Name the likely causes of the median probability set, each with its ties."""
@@ -77,24 +49,6 @@ def answer_of(posterior: Posterior) -> Answer:
 def _unlisted(posterior: Posterior) -> float:
     pairs = zip(posterior.sets, posterior.probabilities, strict=True)
     return sum(float(p) for chosen, p in pairs if any(posterior.elements[i].is_law for i in chosen))
-
-
-def _lowered(one: Named, charged: Mapping[str, float], trained: Posterior) -> Named:
-    """Return a named cause after what it and its ties are charged.
-
-    Where one value for all runs does harm, the same with a value for each run may take its place.
-    """
-    own = {e.variant for e in trained.elements if e.label in one.members} & charged.keys()
-    if one.element.each_run or not own:
-        return one
-    judged = trained.judged({variant: charged[variant] for variant in own})
-    has_one = ((chosen, i) for chosen in judged.sets for i in chosen if judged.elements[i].label in one.members)
-    best, i = next(has_one)
-    if judged.elements[i].each_run:
-        return _named(judged, best, i)
-    alone = judged.marginals[one.element.label]
-    ties = tuple((label, p * alone / one.alone) for label, p in one.ties)
-    return Named(one.element, judged.any_of(one.members), alone, ties)
 
 
 def _best(posterior: Posterior) -> Set:

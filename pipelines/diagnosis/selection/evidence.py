@@ -31,7 +31,7 @@ class Element:
     """A cause at one shape, or a smooth law: what sets are made of."""
 
     label: str
-    """``effect@joint``, or ``law:kind@joint``."""
+    """``effect@joint``, ``law:kind@joint``; without a joint where it is of none alone."""
     name: str
     """The effect's name, or the law's kind."""
     joint: str | None
@@ -212,14 +212,14 @@ def _elements(library: Library, at: _Places) -> list[Element]:
         Element(
             label=law_label(kind, j, names),
             name=kind,
-            joint=names[j],
+            joint=None if j is None else names[j],
             family=FAMILIES[kind],
             is_law=True,
             columns=[int(p) for p, _ in own],
             variance=_normalised([v for _, v in own]),
             repeats=FAMILIES[kind] != Family.TIME,
             wearer=wearer,
-            shown=_shown(Kind.TIME, j, library.prepared) if kind == HUM else [],
+            shown=_shown(Kind.TIME, j, library.prepared) if kind == HUM and j is not None else [],
         )
         for (kind, j, wearer), own in laws.items()
         if wearer != "cuffs"
@@ -242,7 +242,7 @@ def _in_any_form(elements: Sequence[Element], any_form: Mapping[str, str]) -> li
     ]  # fmt: skip
 
 
-Laws = dict[tuple[str, int, str], list[tuple[int, float]]]
+Laws = dict[tuple[str, int | None, str], list[tuple[int, float]]]
 
 
 def _laws_by_kind(laws: Sequence[LawColumn], places: NDArray) -> Laws:

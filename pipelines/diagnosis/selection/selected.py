@@ -53,17 +53,35 @@ class Selected:
         """How probable each set is after validation."""
         return None if self.trained is None else self.trained.judged(self.charged)
 
-    def judged(self, ratios: Mapping[str, float]) -> "Selected":
-        """Return the same after the validation runs, log likelihood ratios of named causes by label."""
-        if self.trained is None or not ratios:
-            return self
-        judged = replace(self, charged={**self.charged, **self.answer.charged(ratios, self.trained)})
-        answer = self.answer.judged(judged.charged, self.trained)
-        gone = {one.element.label for one in self.answer.named} - {one.element.label for one in answer.named}
-        assert judged.posterior is not None
-        # What takes the place of a cause that harms was not fitted: it is a finding, and not named.
-        found = tuple(findings(judged.posterior, answer))
-        return replace(judged, answer=answer, findings=found, dropped=self.dropped | gone)
+    def charges_of(self, label: str, ratio: float) -> dict[str, float]:
+        """Return what harm on the validation runs takes from log odds, by variant that was not charged yet.
+
+        Where a named cause does harm, so do its ties: these data cannot tell them apart. A value that each run has for
+        itself is not charged, for one run says nothing of another's.
+
+        Parameters
+        ----------
+        label : str
+            Of a named cause.
+        ratio : float
+            Log likelihood of the validation runs with it over that without it.
+        """
+        if self.trained is None or ratio >= 0.0:
+            return {}
+        one = next(one for one in self.answer.named if one.element.label == label)
+        alike = {e.variant for e in self.trained.elements if e.label in one.members and not e.each_run}
+        return dict.fromkeys(alike - self.charged.keys(), ratio)
+
+    def judged(self, charges: Mapping[str, float]) -> "Selected":
+        """Return what is named where the validation runs take this from log odds as well, by variant of a cause."""
+        assert self.trained is not None
+        charged = {**self.charged, **charges}
+        weighed = self.trained.judged(charged)
+        answer = answer_of(weighed)
+        doubted = {one.element.label for one in self.answer.named if one.element.variant in charges}
+        dropped = (self.dropped | doubted) - {one.element.label for one in answer.named}
+        found = tuple(findings(weighed, answer))
+        return replace(self, answer=answer, findings=found, charged=charged, dropped=dropped)
 
 
 def select(prepared: Prepared, report: Report = silent) -> Selected:

@@ -43,7 +43,9 @@ def label_in_words(label: str, machine: Machine) -> str:
 
 
 def _said_of(words: str, joint: str, machine: Machine) -> str:
-    """Return words about a joint; one that slides has a position and a force."""
+    """Return words about a joint, if any; one that slides has a position and a force."""
+    if not joint:
+        return words
     own = machine.joint(joint)
     return words.replace("angle", own.place).replace("torque", own.effort).format(joint=the(joint))
 
@@ -81,7 +83,7 @@ def _node_in_words(node: dict[str, Any], finding: dict[str, Any], machine: Machi
         return f"something at {the(value)}" if value else "something of no single joint"
     if level == "family":
         if not finding["joint"]:
-            return FAMILIES[value].format(joint="the machine")
+            return FAMILIES[value].replace("angle", "angles").format(joint="the machine")
         return _said_of(FAMILIES[value], finding["joint"], machine)
     return str(finding["causes"][0]["words"])
 
@@ -98,4 +100,4 @@ def _laws(finding: Finding, machine: Machine) -> Iterator[dict[str, Any]]:
         if p >= WORTH_A_LINE:
             kind, joint = _law_of(label)
             words = label_in_words(label, machine)
-            yield {"law": kind, "joint": joint, "probability": p, "words": words}
+            yield {"law": kind, "joint": joint or None, "probability": p, "words": words}

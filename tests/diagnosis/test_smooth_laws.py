@@ -1,0 +1,69 @@
+"""What stretches over two joints pulls at both as one elastic energy says, and is found as one law."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.diagnosis.candidates.smooth_laws import ACROSS, Spans, smooth_laws
+from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.verdict.verdict import verdict
+from tests.diagnosis.screening import Screening
+from tests.diagnosis.sessions import session
+
+STEP = 1e-5
+LABEL = f"law:{ACROSS}"
+
+
+@pytest.fixture(scope="module")
+def prepared():
+    return Screening.of(session()).prepared
+
+
+def across(run, spans, q):
+    """Return the torques of the law's parts, (m, 2, k) N·m, where a run's angles are others."""
+    moved = replace(run, state=(q, *run.state[1:]))
+    laws, columns = smooth_laws(moved, spans, np.zeros_like(q))
+    return columns[:, :, [law.kind == ACROSS for law in laws]] * spans.torque[:, np.newaxis]
+
+
+def test_its_torques_are_the_slopes_of_an_energy(prepared):
+    """So what the hip's torque changes with the knee's angle, the knee's does with the hip's."""
+    run, spans = prepared.runs[0], Spans.of(prepared.runs, prepared.torque[:2])
+    q = run.state[0]
+    of_knee, of_hip = (
+        (across(run, spans, q + step) - across(run, spans, q - step)) / (2.0 * STEP)
+        for step in (np.array([0.0, STEP]), np.array([STEP, 0.0]))
+    )
+    largest = np.abs(of_hip).max()
+    np.testing.assert_allclose(of_knee[:, 0], of_hip[:, 1], atol=1e-6 * largest)
+    assert np.abs(of_hip[:, 1]).max() > 0.1 * largest
+
+
+def test_a_part_is_of_order_one_at_the_joint_where_it_is_larger(prepared):
+    spans = Spans.of(prepared.runs, prepared.torque[:2])
+    rng = np.random.default_rng(0)
+    run = prepared.runs[0]
+    q = spans.middle + spans.half_range * rng.uniform(-1.0, 1.0, run.state[0].shape)
+    rms = np.sqrt(np.mean(across(run, spans, q) ** 2, axis=0)) / spans.torque[:, np.newaxis]
+    np.testing.assert_allclose(rms.max(axis=0), 1.0, atol=0.1)
+
+
+def test_a_band_across_both_joints_is_one_unlisted_law_of_no_single_joint():
+    """A band from the pelvis to the shank that is slack in a part of its range: no spring of either joint."""
+    pulled = []
+    for motion in session(seed=5):
+        stretch = np.maximum(motion.q @ (0.8, -0.7) - 1.1, 0.0)
+        pulled.append(replace(motion, torque=motion.torque + 12.0 * np.outer(stretch, (0.8, -0.7))))
+    said = verdict(diagnose(pulled))
+    assert said["status"] == "unknown_cause"
+    (finding,) = said["findings"]
+    assert (finding["joint"], finding["family"]) == (None, "angle")
+    assert finding["laws"][0]["words"] == "an elastic torque across both joints"
+    assert said["posterior"]["laws"][LABEL] > 0.9
+
+
+def test_a_spring_of_one_joint_is_none():
+    said = verdict(diagnose(session("parallel_spring", "knee", seed=5, stiffness=10.0, rest_angle=-0.9)))
+    assert said["causes"][0]["effect"] == "parallel_spring"
+    assert said["posterior"]["laws"].get(LABEL, 0.0) < 0.05
