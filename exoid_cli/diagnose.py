@@ -48,7 +48,7 @@ def diagnose(
       exoid diagnose recordings/*.parquet --known rotor_inertia@knee
     """
     from pipelines.contracts import CANDIDATES, PARAMETERS, RESIDUALS, describe
-    from pipelines.contracts.atomic import all_or_none, open_folder, write_text
+    from pipelines.contracts.atomic import all_or_none, folder_to_fill, write_text
     from pipelines.contracts.provenance import recording_behind
     from pipelines.diagnosis.detectability.detectability import as_json, detectability
     from pipelines.diagnosis.diagnose import diagnose as find
@@ -70,8 +70,7 @@ def diagnose(
         contract.refuse_place(output / f"{name}.parquet")
     motions = read_motions(files, settings.filter, geometry_from(settings))
     refuse_another_mechanism(settings.mechanism, motions)
-    open_folder(output)
-    with console.progress("diagnosing", 1.0) as report:
+    with folder_to_fill(output), console.progress("diagnosing", 1.0) as report:
         found = find(motions, report, settings.diagnose.known)
     said = verdict(found)
     machine, geometry = motions[0].machine, motions[0].geometry

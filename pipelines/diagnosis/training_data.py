@@ -66,7 +66,7 @@ def training_data(motions: Sequence[Motion], known: Sequence[str] = ()) -> Train
         runs = [observe(motion, CUTOFF_HZ) for motion in valid]
     train, validate = (_of(runs, purpose) for purpose in WHY)
     if not any(fault.spoils for fault in faults):
-        _refuse_unknown_noise(validate)
+        _refuse_unknown_noise(validate, faults)
     return TrainingData(train, validate, baseline_of(train, effects), faults, noisy)
 
 
@@ -90,15 +90,16 @@ def _refuse_missing_purpose(motions: Sequence[Motion]) -> None:
         )
 
 
-def _refuse_unknown_noise(validate: Sequence[Run]) -> None:
+def _refuse_unknown_noise(validate: Sequence[Run], faults: Sequence[Fault]) -> None:
     """Refuse validation runs of which too little is usable to tell noise from error."""
     joints = validate[0].motion.joints
     floor = noise_floor(validate, [run.measured for run in validate]).rms[: len(joints)]
     for j, joint in enumerate(joints):
         if not np.isfinite(floor[j]):
             usable = sum(int(run.usable[:, j].sum()) for run in validate)
+            files = [run.motion.file for run in validate]
+            wrong = "".join(f"; {fault.file}: {fault.what}" for fault in faults if fault.file in files)
             raise InputError(
-                f"{', '.join(run.motion.file for run in validate)}: {usable} blocks away from "
-                f"{the(joint)}'s reversals, too few in a row to tell noise from error; "
-                "validate on longer runs"
+                f"{', '.join(files)}: {usable} blocks away from {the(joint)}'s reversals, too few in a row to tell "
+                f"noise from error; validate on longer runs{wrong}"
             )

@@ -108,6 +108,7 @@ def _refuse_twins(paths: Sequence[Path]) -> None:
     seen: dict[str, Path] = {}
     for path in paths:
         if path.is_file():
+            contract_of(path)  # empty or damaged files are alike, too, and that is not what is wrong with them
             twin = seen.setdefault(sha256(path), path)
             if twin is not path:
                 raise InputError(f"{path} holds the same data as {twin}; give each run once")

@@ -223,6 +223,14 @@ def test_a_stuck_torque_is_not_taken_for_stale_samples(session):
     assert fault.channel == "knee_torque_nm" and "stuck" in fault.what
 
 
+def test_one_drive_read_for_both_joints_is_named(session):
+    frame, _ = session[SPOILED]
+    frame["knee_torque_nm"] = frame["hip_torque_nm"]
+    (copied,) = [fault for fault in faults_of(session) if "same in every sample" in fault.what]
+    assert (copied.file, copied.channel) == ("with_human.parquet", "knee_torque_nm")
+    assert copied.what.startswith("hip_torque_nm and knee_torque_nm")
+
+
 def test_a_clipped_torque_is_saturated_at_its_limit(session):
     frame, _ = session[SPOILED]
     limit = round(float(frame["hip_torque_nm"].abs().quantile(0.9)), 2)

@@ -1,6 +1,7 @@
 """Channels that stop telling the truth for a while: repeated, stuck, saturated, dead."""
 
 from collections.abc import Iterator
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,7 @@ FLAT_TOP, SATURATED = 3, 10
 def channel_faults(motion: Motion) -> Iterator[Fault]:
     """Yield what is wrong with single channels of one run."""
     yield from _repeated(motion)
+    yield from _copied(motion)
     for joint in range(motion.torque.shape[1]):
         yield from _stuck_angle(motion, joint)
         yield from _torque(motion, joint)
@@ -73,6 +75,18 @@ def _repeated(motion: Motion) -> Iterator[Fault]:
             "the last sample's again, though the joint moved; wait for new data before reading",
             samples,
         )
+
+
+def _copied(motion: Motion) -> Iterator[Fault]:
+    """Report joints whose torques are the same number in every sample: noise alone would part them."""
+    for i, j in combinations(range(len(motion.joints)), 2):
+        if np.array_equal(motion.torque[:, i], motion.torque[:, j]) and np.ptp(motion.torque[:, i]) > 0.0:
+            one, other = (column(motion, k, "torque") for k in (i, j))
+            yield Fault(
+                motion.file, other,
+                f"{one} and {other} are the same in every sample: one drive was read for both joints; "
+                "check the drives' addresses and registers",
+            )  # fmt: skip
 
 
 def _count_of(angle: NDArray) -> float:

@@ -126,7 +126,7 @@ def _not_fitted(d: Diagnosis) -> tuple[str, ...]:
 
 
 def _left_out(d: Diagnosis, label: str) -> dict[str, Any]:
-    return _without_numbers(d, label, "rejected", "it was left out: on these runs its torque is zero or not finite")
+    return _without_numbers(d, label, "rejected", "it was left out: what fits best is none of it")
 
 
 def _absorbed(d: Diagnosis, name: str, joint: str, into: str) -> dict[str, Any]:
