@@ -320,6 +320,11 @@ class Effect(ABC):
         return self.per_run and not self.each_run
 
     @property
+    def sized_each_run(self) -> bool:
+        """Tell whether each run has a size of it for itself, so that one run says nothing of another's."""
+        return self.each_run or any(p.per_run for p in self.linear)
+
+    @property
     def rings(self) -> bool:
         """Tell whether it is a transmission that swings on its load."""
         return self.spring is not None

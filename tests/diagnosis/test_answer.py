@@ -140,10 +140,10 @@ def after(posterior, ratios):
     selected = Selected(None, None, posterior, answer_of(posterior), (), ())
     while True:
         named = [one.element for one in selected.answer.named if not one.element.each_run]
-        charges = [selected.charges_of(e.label, ratios.get(e.label, 0.0)) for e in named]
+        charges = [selected.harm_of(e.label, ratios.get(e.label, 0.0)) for e in named]
         if not any(charges):
             return selected
-        selected = selected.judged(min(filter(None, charges), key=lambda charge: min(charge.values())))
+        selected = selected.judged(min(filter(None, charges), key=lambda charge: min(charge.values())), harms=True)
 
 
 def test_validation_lowers_a_cause_that_harms_and_raises_none():

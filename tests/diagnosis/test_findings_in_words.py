@@ -46,7 +46,7 @@ def diagnosed(sets, ratios=(), joints=HIP_AND_KNEE):
     answer = answer_of(trained)
     selected = Selected(None, None, trained, answer, tuple(read_off(trained, answer)), ())
     for label, ratio in dict(ratios).items():
-        selected = selected.judged(selected.charges_of(label, ratio))
+        selected = selected.judged(selected.harm_of(label, ratio), harms=True)
     labels = tuple(one.element.label for one in selected.answer.named)
     return SimpleNamespace(
         selected=selected,

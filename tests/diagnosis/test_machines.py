@@ -11,6 +11,7 @@ from pipelines.contracts.joints import Joint
 from pipelines.diagnosis.candidates.candidate import proposals
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.evidence.baseline import Baseline
+from pipelines.diagnosis.selection.answer import answer_of
 from pipelines.diagnosis.verdict.candidate_table import candidates
 from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.dynamics.assembly import assemble
@@ -59,6 +60,17 @@ def test_a_spring_at_a_small_servo_is_named_or_tied_and_fitted_to_its_size():
     assert stiffness["value"] == pytest.approx(0.8, rel=0.05)
     assert stiffness["ci95"][0] < 0.8 < stiffness["ci95"][1]
     assert (rest["value"], rest["unit"]) == (pytest.approx(0.3, abs=0.03), "rad")
+
+
+def test_of_ties_the_one_that_predicts_the_validation_run_is_named():
+    """A weak spring and a torque offset explain one training run about alike, and not another motion."""
+    found = diagnose(motions(pendulum, spring=0.4))
+    (trained,) = answer_of(found.selected.trained).named
+    assert {"torque_offset@arm", "parallel_spring@arm"} <= trained.members
+    (named,) = found.named
+    assert named.element.label == "parallel_spring@arm"
+    assert "torque_offset@arm" not in named.members
+    assert found.selected.dropped == frozenset(), "none of them does harm"
 
 
 def test_friction_that_differs_with_direction_is_named_at_a_ball_screw_in_newtons(screw):

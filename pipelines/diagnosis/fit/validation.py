@@ -54,19 +54,21 @@ def gains_of(without: Mapping[str, Validated], whole: Validated) -> dict[str, Ga
     return {label: gain(less.errors, whole.errors) for label, less in without.items()}
 
 
-def log_likelihood_ratio(without: Validated, whole: Validated, noise: NoiseModel) -> float:
-    """Return the log likelihood of the validation runs with a cause over that without it.
+def log_likelihoods(made: Validated, noise: NoiseModel) -> NDArray:
+    """Return the log likelihood of each drive's validation runs under a model, (J,), but for a constant.
 
-    In the decision band, of rows of drives, under the noise that the training runs have.
+    In the decision band, under the noise that the training runs have.
     """
-    sigma = noise.sigma(LENGTH_S)
-    total = 0.0
-    pairs = zip(whole.runs, without.residuals, whole.residuals, strict=True)
-    for run, before, after in pairs:
+    joints = made.runs[0].state[0].shape[1]
+    sigma = noise.sigma(LENGTH_S)[:joints]
+    known, total = np.isfinite(sigma), np.zeros(joints)
+    for run, left in zip(made.runs, made.residuals, strict=True):
         band = DecisionBand.of(run)
-        joints = len(run.motion.joints)
-        known = np.isfinite(sigma[:joints])
-        fall = band.average(before) ** 2 - band.average(after) ** 2
-        weighed = band.weight[:, :joints][:, known] * fall[:, :joints][:, known]
-        total += 0.5 * float(np.sum(weighed / sigma[:joints][known] ** 2))
+        squares = np.sum(band.weight[:, :joints] * band.average(left)[:, :joints] ** 2, axis=0)
+        total[known] -= 0.5 * squares[known] / sigma[known] ** 2
     return total
+
+
+def log_likelihood_ratio(without: Validated, whole: Validated, noise: NoiseModel) -> float:
+    """Return the log likelihood of the validation runs with a cause over that without it."""
+    return float(np.sum(log_likelihoods(whole, noise) - log_likelihoods(without, noise)))

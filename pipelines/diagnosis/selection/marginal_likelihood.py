@@ -37,7 +37,7 @@ class MarginalLikelihood:
     def __init__(self, evidence: Evidence, criteria: Criteria) -> None:
         """Weight rows, and marginalise the background."""
         self.evidence, self.criteria = evidence, criteria
-        self.power = _power(evidence.explained, criteria)
+        self.power = power(evidence.explained, criteria)
         gram = np.einsum("o,oij->ij", self.power, evidence.gram)
         self.gram, self.right = _without(gram, self.power @ evidence.right, *self._background())
         self.parts = [np.array([*e.columns, *e.derivative], dtype=int) for e in evidence.elements]
@@ -182,7 +182,7 @@ class MarginalLikelihood:
         return np.array([self((i,)) for i in range(len(self.evidence.elements))])
 
 
-def _power(explained: NDArray, criteria: Criteria) -> NDArray:
+def power(explained: NDArray, criteria: Criteria) -> NDArray:
     """Return how much of each output's likelihood counts, (O,): less where much is explained, for no form is exact."""
     of_each = len(explained) // 2
     weight = np.repeat([criteria.drive_weight, criteria.cuff_weight], of_each)

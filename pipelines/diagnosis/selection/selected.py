@@ -9,8 +9,8 @@ from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.candidates.library import Library, build_library, silent
 from pipelines.diagnosis.evidence.prepared_runs import Prepared, prepare
 from pipelines.diagnosis.evidence.residual_shares import ResidualShares, residual_shares
-from pipelines.diagnosis.selection.answer import Answer, answer_of
-from pipelines.diagnosis.selection.evidence import Evidence
+from pipelines.diagnosis.selection.answer import Answer, Named, answer_of
+from pipelines.diagnosis.selection.evidence import Element, Evidence
 from pipelines.diagnosis.selection.findings import Finding, findings
 from pipelines.diagnosis.selection.posterior import Posterior, likely_contexts, posterior, strongest
 from pipelines.diagnosis.training_data import training_data
@@ -53,7 +53,7 @@ class Selected:
         """How probable each set is after validation."""
         return None if self.trained is None else self.trained.judged(self.charged)
 
-    def charges_of(self, label: str, ratio: float) -> dict[str, float]:
+    def harm_of(self, label: str, ratio: float) -> dict[str, float]:
         """Return what harm on the validation runs takes from log odds, by variant that was not charged yet.
 
         Where a named cause does harm, so do its ties: these data cannot tell them apart. A value that each run has for
@@ -72,13 +72,44 @@ class Selected:
         alike = {e.variant for e in self.trained.elements if e.label in one.members and not e.each_run}
         return dict.fromkeys(alike - self.charged.keys(), ratio)
 
-    def judged(self, charges: Mapping[str, float]) -> "Selected":
-        """Return what is named where the validation runs take this from log odds as well, by variant of a cause."""
+    def rivals_of(self, number: int) -> dict[str, Candidate]:
+        """Return the ties of a named cause in its place, by variant, those that were compared already left out.
+
+        A value that each run has for itself is not compared: a validation run fits its own.
+        """
+        one, found = self.answer.named[number], dict[str, Candidate]()
+        own, *elements = (self._standing(label, one) for label in (one.element.label, *dict(one.ties)))
+        if own.variant in self.charged or self._candidate(own).effect.sized_each_run:
+            return {}
+        for element in elements:
+            candidate = self._candidate(element)
+            if element.variant not in self.charged and not candidate.effect.sized_each_run:
+                found[element.variant] = candidate
+        return found
+
+    def _candidate(self, element: Element) -> Candidate:
+        assert self.library is not None
+        return self.library.causes[element.place].candidate
+
+    def _standing(self, label: str, one: Named) -> Element:
+        """Return a label at its most probable shape in the place of a named cause."""
+        weighed = self.posterior
+        assert weighed is not None
+        rest = {other.element.label for other in self.answer.named} - {one.element.label}
+        has_it = [chosen for chosen in weighed.sets if label in weighed.labels_of(chosen)]
+        best = next((chosen for chosen in has_it if weighed.labels_of(chosen) == rest | {label}), has_it[0])
+        return next(e for i in best if (e := weighed.elements[i]).label == label)
+
+    def judged(self, charges: Mapping[str, float], *, harms: bool = False) -> "Selected":
+        """Return what is named where the validation runs take this from log odds as well, by variant of a cause.
+
+        ``harms`` tells that the model predicts these runs worse with the cause than without it.
+        """
         assert self.trained is not None
         charged = {**self.charged, **charges}
         weighed = self.trained.judged(charged)
         answer = answer_of(weighed)
-        doubted = {one.element.label for one in self.answer.named if one.element.variant in charges}
+        doubted = {one.element.label for one in self.answer.named if harms and one.element.variant in charges}
         dropped = (self.dropped | doubted) - {one.element.label for one in answer.named}
         found = tuple(findings(weighed, answer))
         return replace(self, answer=answer, findings=found, charged=charged, dropped=dropped)
