@@ -6,7 +6,6 @@ from pipelines.diagnosis.data_faults import find_faults
 from pipelines.mechanics.scale import on_one_scale
 from tests.real.machines import LOGS, diagnosed, motions, recordings
 
-PLAY = "backlash, tied with a gain that drifts, is named beside load friction, and removes a tenth of the error"
 HIDDEN = "its noise, told from the band above the motion, comes out at 41 % of its torque and hides what is missing"
 
 
@@ -14,7 +13,7 @@ HIDDEN = "its noise, told from the band above the motion, comes out at 41 % of i
     ("machine", "status"),
     [
         ("simple", "nothing_missing"),
-        pytest.param("xl330", "partly_explained", marks=pytest.mark.xfail(strict=True, reason=PLAY)),
+        ("xl330", "partly_explained"),
         pytest.param("modexo", "partly_explained", marks=pytest.mark.xfail(strict=True, reason=HIDDEN)),
     ],
 )

@@ -9,7 +9,7 @@ from scipy.linalg import block_diag
 
 from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.evidence.baseline import Baseline
-from pipelines.diagnosis.evidence.observed_run import Run
+from pipelines.diagnosis.evidence.observed_run import FOLD_S, Run
 from pipelines.diagnosis.evidence.slow_error import slow_error
 from pipelines.diagnosis.fit.change_point import ALIKE_S
 from pipelines.diagnosis.fit.joint_fit import Fit, laden, onsets_of, slope, stacked_columns
@@ -36,7 +36,7 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
 
     Beside the noise stands what the model gets wrong with the motion: what it leaves of slow error, and at the least
     what no model of a good rig gets right, ``imperfect`` (O,) N·m rms. It is small against the noise, but much alike
-    from sample to sample, and so the larger part of what hours of data leave in doubt. Shapes that are not fitted but
+    from sample to sample and the same again in every period: it is most of what hours of data leave in doubt. Shapes that are not fitted but
     taken at a usual value may be anywhere in their typical range. Of a shape that was chosen among a few forms, as an
     exponent, what is between them is as likely: data and typical range tell how far from the form it may be. When
     something begins is known so much better than
@@ -59,7 +59,7 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
     misfit = np.maximum(imperfect, slow_error(runs, left).excess)
     for run, a in zip(runs, wide, strict=True):
         filling = filling + np.einsum(
-            "mo,o,moi,moj->ij", run.usable, run.blocks_in(ALIKE_S) * (weights * misfit) ** 2, a, a
+            "mo,o,moi,moj->ij", run.usable, _blocks_alike(run) * (weights * misfit) ** 2, a, a
         )
     for place in _shapes(fit.causes, len(runs), fitted=False):
         low, high = fit.causes[place[0]].effect.shape[place[1]].typical
@@ -84,6 +84,12 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
         block_diag(covariance, *(((high - low) / (2.0 * critical)) ** 2 for low, high in onsets.values())),
         critical, (*places, *onsets), block_diag(gram, np.zeros((len(onsets), len(onsets)))), onsets,
     )  # fmt: skip
+
+
+def _blocks_alike(run: Run) -> float:
+    """Return how many blocks share what the model gets wrong: it goes with the state, which comes back."""
+    seconds = len(run.time) / run.blocks_in(1.0)
+    return run.blocks_in(ALIKE_S) * max(seconds / (run.motion.period_s or FOLD_S), 1.0)
 
 
 def _onsets(

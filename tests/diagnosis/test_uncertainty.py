@@ -1,0 +1,33 @@
+"""Noise averages out over more periods; what the model gets wrong is the same again in each."""
+
+import numpy as np
+import pytest
+
+from pipelines.diagnosis.candidates.candidate import Candidate
+from pipelines.diagnosis.evidence.baseline import baseline_of
+from pipelines.diagnosis.evidence.observed_run import observe
+from pipelines.diagnosis.fit.joint_fit import fit
+from pipelines.diagnosis.fit.uncertainty import uncertainty
+from pipelines.effects import ParallelSpring
+from tests.diagnosis.sessions import session
+
+NOISE = np.array([0.3, 0.2])
+"""N·m."""
+
+
+def error_of_stiffness(seconds: float, imperfect: float) -> float:
+    """Return the standard error of a spring at the knee after periods of 10 s, N·m/rad."""
+    motions = session("parallel_spring", "knee", seed=4, seconds=seconds, stiffness=10.0, rest_angle=-0.9)
+    runs = [observe(motion) for motion in motions if motion.purpose == "train"]
+    baseline = baseline_of(runs)
+    effect = ParallelSpring("knee", on=baseline.machine)
+    weights = np.append(NOISE**-2.0, np.zeros(runs[0].measured.shape[1] - 2))
+    made = fit([Candidate(effect, ((),) * len(runs))], runs, baseline, weights)
+    known = uncertainty(made, runs, baseline, np.full(len(weights), imperfect))
+    place = made.columns_of(0).places(0)[0]
+    return float(np.sqrt(known.covariance[place, place]))
+
+
+@pytest.mark.parametrize(("imperfect", "ratio"), [(0.0, 0.5), (3.0, 1.0)])
+def test_four_times_as_many_periods_halve_what_noise_leaves_in_doubt_and_no_misfit(imperfect, ratio):
+    assert error_of_stiffness(80.0, imperfect) / error_of_stiffness(20.0, imperfect) == pytest.approx(ratio, rel=0.2)
