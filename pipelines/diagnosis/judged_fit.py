@@ -21,9 +21,9 @@ def judged(
 ) -> tuple[Selected, Validated, dict[str, Validated]]:
     """Return the causes that training and validation runs leave named, fitted, and the same without each.
 
-    The most harmful cause is charged first: beside it, what others do may seem to harm too. What
-    takes its place is fitted and judged as well. Of causes that the training runs cannot tell apart,
-    those are charged that predict the validation runs worse than the best of them.
+    The most harmful cause is charged first: beside it, what others do may seem to harm too. Of causes
+    that the training runs cannot tell apart, those are charged that predict the validation runs worse
+    than the best of them.
     """
     fitted: tuple[Candidate, ...] | None = None
     while True:

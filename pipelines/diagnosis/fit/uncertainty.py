@@ -36,11 +36,11 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
 
     Beside the noise stands what the model gets wrong with the motion: what it leaves of slow error, and at the least
     what no model of a good rig gets right, ``imperfect`` (O,) N·m rms. It is small against the noise, but much alike
-    from sample to sample and the same again in every period: it is most of what hours of data leave in doubt. Shapes that are not fitted but
-    taken at a usual value may be anywhere in their typical range. Of a shape that was chosen among a few forms, as an
-    exponent, what is between them is as likely: data and typical range tell how far from the form it may be. When
-    something begins is known so much better than
-    how large it is that neither makes the other less sure.
+    from sample to sample and the same again in every period: it is most of what hours of data leave in doubt. Shapes
+    that are not fitted but taken at a usual value may be anywhere in their typical range. Of a shape that was chosen
+    among a few forms, as an exponent, what is between them is as likely: data and typical range tell how far from the
+    form it may be. When something begins is known so much better than how large it is that neither makes the other
+    less sure.
     """
     runs = laden(runs, fit, baseline)
     plain = stacked_columns(fit.causes, runs, baseline)

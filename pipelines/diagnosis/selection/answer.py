@@ -37,6 +37,11 @@ class Answer:
     unlisted: float
     """Probability that an unlisted law is missing."""
 
+    @property
+    def members(self) -> frozenset[str]:
+        """Labels of all that is named, and of the ties."""
+        return frozenset(label for one in self.named for label in one.members)
+
 
 def answer_of(posterior: Posterior) -> Answer:
     """Name the likely causes of the median probability set, each with its ties."""

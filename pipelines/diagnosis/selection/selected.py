@@ -101,16 +101,19 @@ class Selected:
         return next(e for i in best if (e := weighed.elements[i]).label == label)
 
     def judged(self, charges: Mapping[str, float], *, harms: bool = False) -> "Selected":
-        """Return what is named where the validation runs take this from log odds as well, by variant of a cause.
+        """Return the same where the validation runs take this from log odds as well, by variant of a cause.
 
-        ``harms`` tells that the model predicts these runs worse with the cause than without it.
+        What takes the place of a cause is named where it was named or tied before. Else it is a finding: that another
+        is refuted says nothing for it. ``harms`` tells that the model predicts these runs worse with the cause.
         """
         assert self.trained is not None
         charged = {**self.charged, **charges}
         weighed = self.trained.judged(charged)
-        answer = answer_of(weighed)
+        likely = answer_of(weighed)
+        named = tuple(one for one in likely.named if one.element.label in self.answer.members)
+        answer = replace(likely, named=named)
         doubted = {one.element.label for one in self.answer.named if harms and one.element.variant in charges}
-        dropped = (self.dropped | doubted) - {one.element.label for one in answer.named}
+        dropped = (self.dropped | doubted) - {one.element.label for one in named}
         found = tuple(findings(weighed, answer))
         return replace(self, answer=answer, findings=found, charged=charged, dropped=dropped)
 
