@@ -57,7 +57,7 @@ def test_a_third_cause_beside_the_named_one_is_no_tie():
     posterior = weighed(_2=0.5, _02=0.4, _=0.1)
     (named,) = answer_of(posterior).named
     assert named.ties == ()
-    assert named.probability == pytest.approx(0.9)
+    assert named.probability == pytest.approx(0.9, abs=1e-3)
 
 
 def test_what_most_sets_have_is_named_though_the_most_probable_set_lacks_it():
@@ -137,7 +137,7 @@ def test_nothing_missing_has_no_findings():
 
 def after(posterior, ratios):
     """Return the answer after validation, the log likelihood ratios of causes by label, as ``judged_fit`` charges."""
-    selected = Selected(None, None, posterior, answer_of(posterior), (), ())
+    selected = Selected(None, None, posterior, posterior, answer_of(posterior), (), ())
     while True:
         named = [one.element for one in selected.answer.named if not one.element.each_run]
         charges = [selected.harm_of(e.label, ratios.get(e.label, 0.0)) for e in named]
@@ -229,11 +229,34 @@ def test_what_takes_the_place_of_a_cause_that_harms_is_named_only_where_it_was_t
 
 def test_a_tie_that_predicts_the_validation_runs_better_is_named_instead():
     posterior = weighed(_2=0.7, _3=0.25, _=0.05)
-    selected = Selected(None, None, posterior, answer_of(posterior), (), ())
+    selected = Selected(None, None, posterior, posterior, answer_of(posterior), (), ())
     judged = selected.judged({"quadratic_drag@hip": -4.0, "stribeck_friction@hip": 0.0})
     (named,) = judged.answer.named
     assert named.element is PEAK and named.members == {"stribeck_friction@hip"}
     assert judged.dropped == frozenset(), "the other does no harm"
+
+
+def test_what_is_named_beside_a_cause_that_harms_keeps_its_probability_and_all_above_it_is_at_least_as_probable():
+    """Without the one that harms, sets without either explain the training runs better."""
+    selected = after(weighed(_02=0.9, _0=1e-6, _4=0.1, _=1e-8), {"quadratic_drag@hip": -30.0})
+    (named,) = selected.answer.named
+    assert named.element is SPRING and named.probability == pytest.approx(0.9, abs=1e-3)
+    assert selected.posterior.marginals["law:angle@knee"] == pytest.approx(0.1, abs=0.01)
+    (finding,) = [one for one in selected.findings if one.level == "cause"]
+    assert all(p >= 0.9 - 1e-3 for _, _, p in finding.path)
+    assert selected.posterior.probabilities.sum() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("probability", [0.3, 0.999])
+def test_holding_a_probability_changes_no_ratio_within_the_sets_that_hold_it_or_lack_it(probability):
+    before = weighed(_02=0.15, _0=0.05, _4=0.2, _=0.6)
+    held = before.holding(frozenset({"parallel_spring@knee"}), probability)
+    p, was = held.by_labels, before.by_labels
+    assert held.any_of(frozenset({"parallel_spring@knee"})) == pytest.approx(probability)
+    inside = frozenset({"parallel_spring@knee"}), frozenset({"parallel_spring@knee", "quadratic_drag@hip"})
+    assert p[inside[0]] / p[inside[1]] == pytest.approx(was[inside[0]] / was[inside[1]])
+    assert p[frozenset()] / p[frozenset({"law:angle@knee"})] == pytest.approx(3.0)
+    assert before.holding(frozenset({"law:angle@knee"}), 0.1) is before, "it has more"
 
 
 def test_two_causes_that_stand_for_one_are_no_ties_of_it():

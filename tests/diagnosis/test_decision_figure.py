@@ -67,7 +67,7 @@ def test_labels_lie_beside_one_another(drawn):
 
 def test_where_acquisition_is_at_fault_nothing_is_said_to_explain_it():
     d = diagnosed(SETS)
-    d.selected = replace(d.selected, trained=None)
+    d.selected = replace(d.selected, posterior=None)
     made = figure(d, verdict_of(**decision_of() | {"posterior": None}))
     assert "acquisition is at fault" in made.axes[2].texts[0].get_text()
     plt.close(made)

@@ -44,7 +44,7 @@ def diagnosed(sets, ratios=(), joints=HIP_AND_KNEE):
     p = np.array([sets[chosen] for chosen in order])
     trained = Posterior(ELEMENTS, tuple(order), np.log(p))
     answer = answer_of(trained)
-    selected = Selected(None, None, trained, answer, tuple(read_off(trained, answer)), ())
+    selected = Selected(None, None, trained, trained, answer, tuple(read_off(trained, answer)), ())
     for label, ratio in dict(ratios).items():
         selected = selected.judged(selected.harm_of(label, ratio), harms=True)
     labels = tuple(one.element.label for one in selected.answer.named)

@@ -124,6 +124,7 @@ def test_half_a_swing_foretells_the_shoulder_better_than_its_makers_and_names_th
 
 
 @pytest.mark.slow
+@pytest.mark.xfail(strict=True, reason="friction by the angle is named at the elbow, whose gears have play")
 def test_with_the_rotor_that_its_makers_know_half_a_swing_foretells_every_run_better_than_they_do(
     real_data, tmp_path_factory
 ):

@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import logsumexp
 
 from pipelines.diagnosis.candidates.library import Context
 from pipelines.diagnosis.candidates.smooth_laws import TIME
@@ -71,6 +72,21 @@ class Posterior:
         log_odds = self.log_odds + np.array(harm)
         order = np.argsort(-log_odds, kind="stable")
         return Posterior(self.elements, tuple(self.sets[k] for k in order), log_odds[order])
+
+    def holding(self, labels: frozenset[str], probability: float) -> "Posterior":
+        """Return the posterior where at least one of some labels has this probability, or more if it has more.
+
+        What tells them apart otherwise stays as it is (Jeffrey, 1965, The Logic of Decision, chapter 11).
+        """
+        inside = np.array([not labels.isdisjoint(self.labels_of(chosen)) for chosen in self.sets])
+        if not 0.0 < self.any_of(labels) < probability < 1.0:
+            return self
+        told = np.where(inside, np.log(probability), np.log1p(-probability))
+        had = [logsumexp(self.log_odds[side]) for side in (inside, ~inside)]
+        log_odds = self.log_odds + told - np.where(inside, *had)
+        order = np.argsort(-log_odds, kind="stable")
+        empty = log_odds[self.sets.index(())]
+        return Posterior(self.elements, tuple(self.sets[k] for k in order), log_odds[order] - empty)
 
     def labels_of(self, chosen: Set) -> frozenset[str]:
         """Return the labels of a set's elements."""

@@ -23,7 +23,8 @@ def features(element: Element, auxiliary: Mapping[str, float]) -> NDArray:
         Log likelihood of causes besides what they do to the mean torque, by label.
     """
     own = dict.fromkeys(FEATURES, 0.0)
-    own["law" if element.is_law else "cause"] = 1.0
+    # A law of both joints is as improbable as one at each.
+    own["law" if element.is_law else "cause"] = 2.0 if element.is_law and element.joint is None else 1.0
     own["searched"] = element.log_searched
     own["each_run"], own["worn"] = float(element.each_run), float(element.worn)
     if element.name in AUXILIARY:

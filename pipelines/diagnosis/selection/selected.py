@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 from pipelines.diagnosis.candidates.auxiliary_evidence import auxiliary_evidence
 from pipelines.diagnosis.candidates.candidate import Candidate
@@ -32,6 +31,8 @@ class Selected:
     evidence: Evidence | None
     trained: Posterior | None
     """How probable each set is by the training runs."""
+    posterior: Posterior | None
+    """The same after validation."""
     answer: Answer
     findings: tuple[Finding, ...]
     router: tuple[ResidualShares, ...]
@@ -47,11 +48,6 @@ class Selected:
         if self.library is None:
             return ()
         return tuple(self.library.causes[one.element.place].candidate for one in self.answer.named)
-
-    @cached_property
-    def posterior(self) -> Posterior | None:
-        """How probable each set is after validation."""
-        return None if self.trained is None else self.trained.judged(self.charged)
 
     def harm_of(self, label: str, ratio: float) -> dict[str, float]:
         """Return what harm on the validation runs takes from log odds, by variant that was not charged yet.
@@ -109,20 +105,24 @@ class Selected:
         assert self.trained is not None
         charged = {**self.charged, **charges}
         weighed = self.trained.judged(charged)
+        for one in self.answer.named:
+            # What is named beside a cause that harms was fitted without it: it stands or falls by its own harm.
+            if charged.keys().isdisjoint(e.variant for e in weighed.elements if e.label in one.members):
+                weighed = weighed.holding(one.members, one.probability)
         likely = answer_of(weighed)
         named = tuple(one for one in likely.named if one.element.label in self.answer.members)
         answer = replace(likely, named=named)
         doubted = {one.element.label for one in self.answer.named if harms and one.element.variant in charges}
         dropped = (self.dropped | doubted) - {one.element.label for one in named}
         found = tuple(findings(weighed, answer))
-        return replace(self, answer=answer, findings=found, charged=charged, dropped=dropped)
+        return replace(self, posterior=weighed, answer=answer, findings=found, charged=charged, dropped=dropped)
 
 
 def select(prepared: Prepared, report: Report = silent) -> Selected:
     """Weigh all sets of causes and laws, and read the answer off the posterior."""
     library, evidence, found = weighed(prepared, report)
     answer = answer_of(found)
-    return Selected(library, evidence, found, answer, tuple(findings(found, answer)), _router(prepared))
+    return Selected(library, evidence, found, found, answer, tuple(findings(found, answer)), _router(prepared))
 
 
 def evidence_of(motions: Sequence[Motion], known: Sequence[str] = ()) -> Evidence:
@@ -134,7 +134,7 @@ def evidence_of(motions: Sequence[Motion], known: Sequence[str] = ()) -> Evidenc
 
 def nothing_selected(prepared: Prepared) -> Selected:
     """Return the answer where faults of acquisition keep physics from being looked at."""
-    return Selected(None, None, None, Answer((), 0.0, 0.0), (), _router(prepared))
+    return Selected(None, None, None, None, Answer((), 0.0, 0.0), (), _router(prepared))
 
 
 def weighed(prepared: Prepared, report: Report = silent) -> tuple[Library, Evidence, Posterior]:
