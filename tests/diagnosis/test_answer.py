@@ -233,6 +233,9 @@ def test_a_tie_that_predicts_the_validation_runs_better_is_named_instead():
     judged = selected.judged({"quadratic_drag@hip": -4.0, "stribeck_friction@hip": 0.0})
     (named,) = judged.answer.named
     assert named.element is PEAK and named.members == {"stribeck_friction@hip"}
+    assert named.probability == pytest.approx(0.95 * 0.25 / (0.25 + 0.7 * np.exp(-4.0))), (
+        "it has what they had together"
+    )
     assert judged.dropped == frozenset(), "the other does no harm"
 
 

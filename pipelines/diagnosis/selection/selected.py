@@ -106,8 +106,9 @@ class Selected:
         charged = {**self.charged, **charges}
         weighed = self.trained.judged(charged)
         for one in self.answer.named:
-            # What is named beside a cause that harms was fitted without it: it stands or falls by its own harm.
-            if charged.keys().isdisjoint(e.variant for e in weighed.elements if e.label in one.members):
+            own = [charged[e.variant] for e in weighed.elements if e.label in one.members and e.variant in charged]
+            # One of them does no harm: what others do, or how far its ties fall behind it, takes nothing from them.
+            if max(own, default=0.0) == 0.0:
                 weighed = weighed.holding(one.members, one.probability)
         likely = answer_of(weighed)
         named = tuple(one for one in likely.named if one.element.label in self.answer.members)
