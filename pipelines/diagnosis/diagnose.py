@@ -33,8 +33,8 @@ FIT_SHARE = 0.75
 def diagnose(motions: Sequence[Motion], report: Report = silent, known: Sequence[str] = ()) -> Diagnosis:
     """Find what the rigid body with Coulomb and viscous friction gets wrong, and why.
 
-    Selection, shapes and shared parameters use ``train`` runs only. The ``validate`` runs measure
-    every error, and may lower the probability of a cause that does harm there.
+    The search, shapes and shared parameters use ``train`` runs only. The ``validate`` runs measure
+    every error. They may lower the probability of a cause that does harm there, and decide between ties.
 
     Parameters
     ----------

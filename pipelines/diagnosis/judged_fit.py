@@ -30,40 +30,39 @@ def judged(
         if selected.candidates != fitted:
             fitted = selected.candidates
             after, without = _fitted(selected, refine, prepared, before)
-        # One run says nothing of a value that another run has for itself.
-        shared = [c.label for c in fitted if not c.effect.sized_each_run]
-        ratios = {label: log_likelihood_ratio(without[label], after, prepared.noise) for label in shared}
-        harm = [charge for label, ratio in ratios.items() if (charge := selected.harm_of(label, ratio))]
-        if harm:
-            selected = selected.judged(min(harm, key=lambda charge: min(charge.values())), harms=True)
-        elif losses := _losses(selected, after, refine, prepared, before):
-            selected = selected.judged(losses)
+        ratios = {label: log_likelihood_ratio(less, after, prepared.noise) for label, less in without.items()}
+        if harm := selected.worst_harm(ratios):
+            selected = selected.judged(harm, harms=True)
+        elif shortfalls := _shortfalls(selected, after, refine, prepared, before):
+            selected = selected.judged(shortfalls)
         else:
             return selected, after, without
 
 
-def _losses(
+def _shortfalls(
     selected: Selected, after: Validated, refine: Refinement, prepared: Prepared, before: Validated
 ) -> dict[str, float]:
-    """Return by how much named causes and their ties predict the validation runs worse than the best of them.
+    """Return how far each tie falls behind the best of its group on the validation runs.
 
-    In log likelihood, by variant; of ties that were not compared yet.
+    Log likelihoods, by variant; of groups that were not compared yet.
     """
-    losses: dict[str, float] = {}
-    plain = log_likelihoods(before, prepared.noise)
+    shortfalls: dict[str, float] = {}
+    noise = prepared.noise
     for n, one in enumerate(selected.answer.named):
         rest = selected.candidates[:n] + selected.candidates[n + 1 :]
         if not (rivals := selected.rivals_of(n)):
             continue
-        told = {one.element.variant: log_likelihoods(after, prepared.noise)}
+        likelihoods = {one.element.variant: log_likelihoods(after, noise)}
         for variant, rival in rivals.items():
             fitted = Validated.of(refine((*rest, rival)), before.runs, prepared.baseline)
-            told[variant] = log_likelihoods(fitted, prepared.noise)
-        gained = 2.0 * (max(told.values(), key=np.sum) - plain)
-        counts = power(np.append(np.maximum(gained, 0.0), np.zeros_like(gained)), CRITERIA)[: len(gained)]
-        scores = {variant: float(counts @ likelihood) for variant, likelihood in told.items()}
-        losses |= {variant: score - max(scores.values()) for variant, score in scores.items()}
-    return losses
+            likelihoods[variant] = log_likelihoods(fitted, noise)
+        explained = 2.0 * (max(likelihoods.values(), key=np.sum) - log_likelihoods(before, noise))
+        weights = power(np.maximum(explained, 0.0), CRITERIA.drive_weight, CRITERIA.model_error)
+        scores = {variant: float(weights @ likelihood) for variant, likelihood in likelihoods.items()}
+        for variant, score in scores.items():
+            shortfall = score - max(scores.values())
+            shortfalls[variant] = max(shortfalls.get(variant, -np.inf), shortfall)
+    return shortfalls
 
 
 def _fitted(

@@ -29,7 +29,16 @@ def naming(d: Diagnosis, *labels: str, ties: tuple[tuple[str, float], ...] = ())
     weighed = Posterior(selected.posterior.elements, tuple(sets), np.array(log_odds))
     answer = Answer(named, 1.0 - PROBABILITY, 0.0)
     found = tuple(findings(weighed, answer))
-    given = replace(selected, trained=weighed, charged={}, answer=answer, findings=found, dropped=frozenset())
+    compared = {element.variant: 0.0 for element in elements}  # the ties that were asked for stay
+    given = replace(
+        selected,
+        trained=weighed,
+        posterior=weighed,
+        charged=compared,
+        answer=answer,
+        findings=found,
+        dropped=frozenset(),
+    )
     return _validated(d.data, selected.library.prepared, given)
 
 

@@ -136,14 +136,11 @@ def test_nothing_missing_has_no_findings():
 
 
 def after(posterior, ratios):
-    """Return the answer after validation, the log likelihood ratios of causes by label, as ``judged_fit`` charges."""
+    """Return what is selected after validation, given log likelihood ratios of named causes by label."""
     selected = Selected(None, None, posterior, posterior, answer_of(posterior), (), ())
-    while True:
-        named = [one.element for one in selected.answer.named if not one.element.each_run]
-        charges = [selected.harm_of(e.label, ratios.get(e.label, 0.0)) for e in named]
-        if not any(charges):
-            return selected
-        selected = selected.judged(min(filter(None, charges), key=lambda charge: min(charge.values())), harms=True)
+    while harm := selected.worst_harm(ratios):
+        selected = selected.judged(harm, harms=True)
+    return selected
 
 
 def test_validation_lowers_a_cause_that_harms_and_raises_none():
@@ -182,7 +179,10 @@ def test_what_is_named_and_the_findings_tell_the_same_probabilities_after_valida
         assert all(below <= above + 1e-12 for above, below in pairwise(likely))
 
 
-ONCE, EVERY = cause("encoder_offset", "hip", "angle"), replace(cause("encoder_offset", "hip", "angle"), each_run=True)
+ONCE, EVERY = (
+    cause("encoder_offset", "hip", "angle"),
+    replace(cause("encoder_offset", "hip", "angle"), each_run=True, sized_each_run=True),
+)
 TILT, WORN = cause("base_tilt", "hip", "angle"), replace(cause("base_tilt", "hip", "angle"), worn=True)
 
 
@@ -218,7 +218,7 @@ def test_sets_stay_in_the_order_of_their_probability():
     assert judged.probabilities.sum() == pytest.approx(1.0)
 
 
-def test_what_takes_the_place_of_a_cause_that_harms_is_named_only_where_it_was_tied():
+def test_what_takes_the_place_of_a_cause_that_harms_is_a_finding_and_its_ties_are_refuted_with_it():
     tied = after(weighed(_2=0.7, _3=0.2, _4=0.02, _=0.01), {"quadratic_drag@hip": -10.0})
     assert tied.answer.named == () and tied.posterior.marginals["stribeck_friction@hip"] < 0.01, "ties do harm too"
     other = after(weighed(_2=0.7, _0=0.05, _4=0.02, _=0.01), {"quadratic_drag@hip": -10.0})
@@ -250,16 +250,50 @@ def test_what_is_named_beside_a_cause_that_harms_keeps_its_probability_and_all_a
     assert selected.posterior.probabilities.sum() == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize("harm", [-1e-6, -0.2])
+def test_a_little_harm_takes_a_little(harm):
+    posterior = weighed(_02=0.9, _0=1e-6, _4=0.1, _=1e-8)
+    selected = after(posterior, {"quadratic_drag@hip": -30.0, "parallel_spring@knee": harm})
+    (named,) = selected.answer.named
+    odds = 9.0 * np.exp(harm)
+    assert named.probability == pytest.approx(odds / (1.0 + odds), abs=0.01)
+
+
+def test_what_is_certain_stays_so_when_another_cause_is_refuted():
+    sets = ((0, 2), (0,), (4,), ())
+    certain = Posterior(ELEMENTS, sets, np.array([100.0, 40.0, 38.0, 0.0]))
+    (named,) = after(certain, {"quadratic_drag@hip": -80.0}).answer.named
+    assert named.element is SPRING and named.probability > 0.999999
+
+
+def test_of_three_causes_the_two_that_do_no_harm_stay_named():
+    posterior = weighed(_023=0.9, _02=1e-3, _0=1e-3, _2=1e-5, _3=0.05, _=0.01, _5=0.04)
+    selected = after(posterior, {"stribeck_friction@hip": -40.0})
+    assert {one.element.label for one in selected.answer.named} == {"parallel_spring@knee", "quadratic_drag@hip"}
+    assert all(one.probability > 0.89 for one in selected.answer.named)
+
+
+def test_a_tie_that_won_is_charged_when_it_harms():
+    posterior = weighed(_2=0.7, _3=0.25, _=0.05)
+    selected = Selected(None, None, posterior, posterior, answer_of(posterior), (), ())
+    won = selected.judged({"quadratic_drag@hip": -4.0, "stribeck_friction@hip": 0.0})
+    harm = won.worst_harm({"stribeck_friction@hip": -50.0})
+    assert harm == {"stribeck_friction@hip": -50.0}
+    assert won.judged(harm, harms=True).answer.named == ()
+
+
 @pytest.mark.parametrize("probability", [0.3, 0.999])
-def test_holding_a_probability_changes_no_ratio_within_the_sets_that_hold_it_or_lack_it(probability):
+def test_a_floor_changes_no_ratio_within_the_sets_that_hold_the_group_or_lack_it(probability):
     before = weighed(_02=0.15, _0=0.05, _4=0.2, _=0.6)
-    held = before.holding(frozenset({"parallel_spring@knee"}), probability)
-    p, was = held.by_labels, before.by_labels
-    assert held.any_of(frozenset({"parallel_spring@knee"})) == pytest.approx(probability)
-    inside = frozenset({"parallel_spring@knee"}), frozenset({"parallel_spring@knee", "quadratic_drag@hip"})
-    assert p[inside[0]] / p[inside[1]] == pytest.approx(was[inside[0]] / was[inside[1]])
+    group = frozenset({"parallel_spring@knee"})
+    raised = before.at_least(group, probability)
+    p, was = raised.by_labels, before.by_labels
+    assert raised.any_of(group) == pytest.approx(probability)
+    both = group | {"quadratic_drag@hip"}
+    assert p[group] / p[both] == pytest.approx(was[group] / was[both])
     assert p[frozenset()] / p[frozenset({"law:angle@knee"})] == pytest.approx(3.0)
-    assert before.holding(frozenset({"law:angle@knee"}), 0.1) is before, "it has more"
+    assert before.at_least(frozenset({"law:angle@knee"}), 0.1) is before, "it has more"
+    assert before.at_least(frozenset({"base_tilt"}), 0.1) is before, "no set has it"
 
 
 def test_two_causes_that_stand_for_one_are_no_ties_of_it():

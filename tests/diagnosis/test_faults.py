@@ -226,7 +226,7 @@ def test_a_stuck_torque_is_not_taken_for_stale_samples(session):
 def test_one_drive_read_for_both_joints_is_named(session):
     frame, _ = session[SPOILED]
     frame["knee_torque_nm"] = frame["hip_torque_nm"]
-    (copied,) = [fault for fault in faults_of(session) if "same in every sample" in fault.what]
+    (copied,) = [fault for fault in faults_of(session) if "equal in every sample" in fault.what]
     assert (copied.file, copied.channel) == ("with_human.parquet", "knee_torque_nm")
     assert copied.what.startswith("hip_torque_nm and knee_torque_nm")
 

@@ -45,8 +45,8 @@ def diagnosed(sets, ratios=(), joints=HIP_AND_KNEE):
     trained = Posterior(ELEMENTS, tuple(order), np.log(p))
     answer = answer_of(trained)
     selected = Selected(None, None, trained, trained, answer, tuple(read_off(trained, answer)), ())
-    for label, ratio in dict(ratios).items():
-        selected = selected.judged(selected.harm_of(label, ratio), harms=True)
+    while harm := selected.worst_harm(dict(ratios)):
+        selected = selected.judged(harm, harms=True)
     labels = tuple(one.element.label for one in selected.answer.named)
     return SimpleNamespace(
         selected=selected,

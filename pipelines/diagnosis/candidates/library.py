@@ -61,7 +61,7 @@ class Library:
     curve_columns: NDArray
     """(N, t)."""
     left_out: tuple[str, ...] = ()
-    """Labels of effects that at no shape have finite columns that add something."""
+    """Labels of effects whose columns at every shape are not finite or add nothing to the baseline."""
     contexts: tuple[Context, ...] = ()
     """Sets whose causes were refined beside one another."""
     screened: tuple[tuple[Fitted, ...], ...] = ()
@@ -149,12 +149,12 @@ def build_library(prepared: Prepared, report: Report = silent) -> Library:
         grids += [tuple(fits)] if fits else []
         left_out += [] if shapes else [effect.label]
     causes += _ripples(prepared, alone, regression)
-    weighed = {cause.candidate.label for cause in causes}
+    in_library = {cause.candidate.label for cause in causes}
     laws, law_columns = law_rows(prepared, regression)
     curves, curve_columns = curve_rows(prepared, regression)
     return Library(
         prepared, regression, rows, tuple(causes), tuple(laws), law_columns, tuple(curves),
-        curve_columns, tuple(sorted(set(left_out) - weighed)), (), tuple(grids),
+        curve_columns, tuple(sorted(set(left_out) - in_library)), (), tuple(grids),
     )  # fmt: skip
 
 

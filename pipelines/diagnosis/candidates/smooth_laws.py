@@ -58,7 +58,7 @@ TIME = "time"
 HUM = "hum"
 """The law whose columns are tones with a phase in each run."""
 ACROSS = "across_joints"
-"""The law of no single joint: what stretches over two, as a muscle or a band, pulls at both."""
+"""The law of an elastic energy of both angles, as of a muscle or a band over two joints."""
 ACROSS_DEGREE = 4
 """Highest degree of its elastic energy."""
 
@@ -157,8 +157,8 @@ def _scaled_angle(run: Run, spans: Spans) -> NDArray:
 def _across_joints(x: NDArray, spans: Spans) -> Iterator[tuple[int, NDArray]]:
     """Yield degree and torque (m, 2) of each part of an elastic energy of both angles.
 
-    Where only the energy is unknown, one law tells the torques at both joints: its slopes. Of each part, a product of
-    Legendre polynomials of the scaled angles ``x`` (m, 2), the larger one is of order one.
+    The torques at both joints are the slopes of one energy. Its parts are products of Legendre polynomials of the
+    scaled angles ``x`` (m, 2), those of one angle alone among them; the larger torque of each is of order one.
     """
     every = np.eye(ACROSS_DEGREE + 1)
     value, slope = legval(x, every), legval(x, legder(every))

@@ -39,7 +39,7 @@ FLAT_TOP, SATURATED = 3, 10
 
 
 def channel_faults(motion: Motion) -> Iterator[Fault]:
-    """Yield what is wrong with single channels of one run."""
+    """Yield what is wrong with channels of one run, alone or as copies of one another."""
     yield from _repeated(motion)
     yield from _copied(motion)
     for joint in range(motion.torque.shape[1]):
@@ -78,14 +78,14 @@ def _repeated(motion: Motion) -> Iterator[Fault]:
 
 
 def _copied(motion: Motion) -> Iterator[Fault]:
-    """Report joints whose torques are the same number in every sample: noise alone would part them."""
+    """Report joints with identical torque: independent measurements differ at least by noise."""
     for i, j in combinations(range(len(motion.joints)), 2):
         if np.array_equal(motion.torque[:, i], motion.torque[:, j]) and np.ptp(motion.torque[:, i]) > 0.0:
             one, other = (column(motion, k, "torque") for k in (i, j))
             yield Fault(
                 motion.file, other,
-                f"{one} and {other} are the same in every sample: one drive was read for both joints; "
-                "check the drives' addresses and registers",
+                f"{one} and {other} are equal in every sample: probably one drive was read twice; "
+                "check its address, register or column",
             )  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from pipelines.mechanics.slow_motion import filtered, unsure
 from pipelines.signals.blocks import BlockAverage
 
 FOLD_S = 10.0
-"""Length of a fold where the excitation does not repeat; its states come back about as often, s."""
+"""Length of a fold where the excitation does not repeat, s."""
 FOLDS = 4
 
 

@@ -9,11 +9,14 @@ from scipy.linalg import block_diag
 
 from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.evidence.baseline import Baseline
-from pipelines.diagnosis.evidence.observed_run import FOLD_S, Run
+from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.evidence.slow_error import slow_error
 from pipelines.diagnosis.fit.change_point import ALIKE_S
 from pipelines.diagnosis.fit.joint_fit import Fit, laden, onsets_of, slope, stacked_columns
 from pipelines.estimation.long_run import long_run_covariance
+
+RECURRENCE_S = 10.0
+"""Time after which a motion without a period is taken to pass through the same states again, s."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +37,9 @@ class Uncertainty:
 def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: NDArray) -> Uncertainty:
     """Linearise about a fit: its columns, and what a step in each free shape does to the prediction.
 
-    Beside the noise stands what the model gets wrong with the motion: what it leaves of slow error, and at the least
-    what no model of a good rig gets right, ``imperfect`` (O,) N·m rms. It is small against the noise, but much alike
-    from sample to sample and the same again in every period: it is most of what hours of data leave in doubt. Shapes
+    Two errors add: noise, and model error, which is what is left of slow error, at the least what no model of a good
+    rig gets right, ``imperfect`` (O,) N·m rms. Model error is small, but it is correlated over half a second and
+    repeats in every period, so more data do not average it out. Shapes
     that are not fitted but taken at a usual value may be anywhere in their typical range. Of a shape that was chosen
     among a few forms, as an exponent, what is between them is as likely: data and typical range tell how far from the
     form it may be. When something begins is known so much better than how large it is that neither makes the other
@@ -59,7 +62,7 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
     misfit = np.maximum(imperfect, slow_error(runs, left).excess)
     for run, a in zip(runs, wide, strict=True):
         filling = filling + np.einsum(
-            "mo,o,moi,moj->ij", run.usable, _blocks_alike(run) * (weights * misfit) ** 2, a, a
+            "mo,o,moi,moj->ij", run.usable, _correlated_blocks(run) * (weights * misfit) ** 2, a, a
         )
     for place in _shapes(fit.causes, len(runs), fitted=False):
         low, high = fit.causes[place[0]].effect.shape[place[1]].typical
@@ -86,10 +89,10 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
     )  # fmt: skip
 
 
-def _blocks_alike(run: Run) -> float:
-    """Return how many blocks share what the model gets wrong: it goes with the state, which comes back."""
+def _correlated_blocks(run: Run) -> float:
+    """Return the number of blocks with the same model error: neighbours within ``ALIKE_S``, once a period."""
     seconds = len(run.time) / run.blocks_in(1.0)
-    return run.blocks_in(ALIKE_S) * max(seconds / (run.motion.period_s or FOLD_S), 1.0)
+    return run.blocks_in(ALIKE_S) * max(seconds / (run.motion.period_s or RECURRENCE_S), 1.0)
 
 
 def _onsets(

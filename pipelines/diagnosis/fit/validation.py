@@ -55,7 +55,7 @@ def gains_of(without: Mapping[str, Validated], whole: Validated) -> dict[str, Ga
 
 
 def log_likelihoods(made: Validated, noise: NoiseModel) -> NDArray:
-    """Return the log likelihood of each drive's validation runs under a model, (J,), but for a constant.
+    """Return the log likelihood of the validation runs, for each drive (J,), up to a constant.
 
     In the decision band, under the noise that the training runs have.
     """

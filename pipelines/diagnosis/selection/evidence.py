@@ -51,6 +51,8 @@ class Element:
     """Whether it is the best shape of its cause."""
     each_run: bool = False
     """Whether its value is another in every run."""
+    sized_each_run: bool = False
+    """Of a cause: whether each run has a size of it for itself, so that one run says nothing of another's."""
     worn: bool = False
     """Whether the person carries it."""
     wearer: str = "all"
@@ -282,6 +284,7 @@ def _of_cause(number: int, cause: Cause, at: _Places, prepared: Prepared) -> Ele
         repeats=not effect.goes_with_time and effect.family != Family.TIME,
         first=cause.first,
         each_run=effect.each_run,
+        sized_each_run=effect.sized_each_run,
         worn=effect.run is not None,
         place=number,
         log_prior=cause.candidate.log_prior,

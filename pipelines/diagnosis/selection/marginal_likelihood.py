@@ -37,7 +37,11 @@ class MarginalLikelihood:
     def __init__(self, evidence: Evidence, criteria: Criteria) -> None:
         """Weight rows, and marginalise the background."""
         self.evidence, self.criteria = evidence, criteria
-        self.power = power(evidence.explained, criteria)
+        drives, cuffs = np.split(evidence.explained, 2)
+        self.power = np.append(
+            power(drives, criteria.drive_weight, criteria.model_error),
+            power(cuffs, criteria.cuff_weight, criteria.cuff_model_error),
+        )
         gram = np.einsum("o,oij->ij", self.power, evidence.gram)
         self.gram, self.right = _without(gram, self.power @ evidence.right, *self._background())
         self.parts = [np.array([*e.columns, *e.derivative], dtype=int) for e in evidence.elements]
@@ -182,12 +186,12 @@ class MarginalLikelihood:
         return np.array([self((i,)) for i in range(len(self.evidence.elements))])
 
 
-def power(explained: NDArray, criteria: Criteria) -> NDArray:
-    """Return how much of each output's likelihood counts, (O,): less where much is explained, for no form is exact."""
-    of_each = len(explained) // 2
-    weight = np.repeat([criteria.drive_weight, criteria.cuff_weight], of_each)
-    error = np.repeat([criteria.model_error, criteria.cuff_model_error], of_each)
-    return np.asarray(weight / (1.0 + error * weight * explained))
+def power(explained: NDArray, weight: float, model_error: float) -> NDArray:
+    """Return how much of each output's likelihood counts, (o,): less where much is explained, for no form is exact.
+
+    ``explained`` (o,) is squared and in units of the noise.
+    """
+    return np.asarray(weight / (1.0 + model_error * weight * explained))
 
 
 def _without(gram: NDArray, right: NDArray, background: NDArray, sd: NDArray) -> tuple[NDArray, NDArray]:

@@ -8,10 +8,11 @@ cause, of something unlisted, of each family at each joint.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
+from scipy.special import logit, logsumexp
 
 from pipelines.diagnosis.candidates.library import Context
 from pipelines.diagnosis.candidates.smooth_laws import TIME
@@ -35,6 +36,11 @@ CONTEXTS = 8
 
 STRONGEST = 2
 """Single causes whose partners are sought beside them."""
+
+SURE = 1.0 - 1e-12
+"""What counts as certain: beyond it rounding decides."""
+TOLERANCE = 1e-6
+"""Log odds by which a probability may fall short of what it is to be at least."""
 
 Set = tuple[int, ...]
 
@@ -63,7 +69,7 @@ class Posterior:
         Parameters
         ----------
         charged : mapping of str to float
-            What harm on the validation runs takes from log odds, negative, by variant of a cause.
+            What the validation runs take from log odds, zero or negative, by variant of a cause.
         """
         if not charged:
             return self
@@ -73,20 +79,22 @@ class Posterior:
         order = np.argsort(-log_odds, kind="stable")
         return Posterior(self.elements, tuple(self.sets[k] for k in order), log_odds[order])
 
-    def holding(self, labels: frozenset[str], probability: float) -> "Posterior":
-        """Return the posterior where at least one of some labels has this probability, or more if it has more.
+    def at_least(self, labels: frozenset[str], probability: float) -> "Posterior":
+        """Return the posterior where some label of a group has at least this probability.
 
-        What tells them apart otherwise stays as it is (Jeffrey, 1965, The Logic of Decision, chapter 11).
+        Ratios among the sets with such a label, and among those without, are kept (Jeffrey, 1965, The Logic of
+        Decision, chapter 11).
         """
         inside = np.array([not labels.isdisjoint(self.labels_of(chosen)) for chosen in self.sets])
-        if not 0.0 < self.any_of(labels) < probability < 1.0:
+        if not inside.any():
             return self
-        told = np.where(inside, np.log(probability), np.log1p(-probability))
-        had = [logsumexp(self.log_odds[side]) for side in (inside, ~inside)]
-        log_odds = self.log_odds + told - np.where(inside, *had)
+        wanted = float(logit(min(probability, SURE)))
+        lacking = wanted - float(logsumexp(self.log_odds[inside]) - logsumexp(self.log_odds[~inside]))
+        if not TOLERANCE < lacking < np.inf:
+            return self
+        log_odds = self.log_odds + np.where(inside, lacking, 0.0)
         order = np.argsort(-log_odds, kind="stable")
-        empty = log_odds[self.sets.index(())]
-        return Posterior(self.elements, tuple(self.sets[k] for k in order), log_odds[order] - empty)
+        return Posterior(self.elements, tuple(self.sets[k] for k in order), log_odds[order])
 
     def labels_of(self, chosen: Set) -> frozenset[str]:
         """Return the labels of a set's elements."""
@@ -137,6 +145,10 @@ def posterior(evidence: Evidence, criteria: Criteria = CRITERIA) -> Posterior:
         odds[chosen] = weigh(chosen)
     for chosen in _triples(weigh, odds):
         odds[chosen] = weigh(chosen)
+    # Should one cause of the best set be refuted, the others are what is left.
+    best = max(odds, key=lambda chosen: odds[chosen])
+    for chosen in combinations(best, 2):
+        odds.setdefault(chosen, weigh(chosen))
     sets = sorted(odds, key=lambda chosen: -odds[chosen])
     return Posterior(evidence.elements, tuple(sets), np.array([odds[chosen] for chosen in sets]))
 

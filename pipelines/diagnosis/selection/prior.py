@@ -23,8 +23,9 @@ def features(element: Element, auxiliary: Mapping[str, float]) -> NDArray:
         Log likelihood of causes besides what they do to the mean torque, by label.
     """
     own = dict.fromkeys(FEATURES, 0.0)
-    # A law of both joints is as improbable as one at each.
-    own["law" if element.is_law else "cause"] = 2.0 if element.is_law and element.joint is None else 1.0
+    at_both = element.is_law and element.joint is None  # as improbable as a law at each joint
+    own["law" if element.is_law else "cause"] = 1.0 + at_both
+    own["further"] = float(at_both)
     own["searched"] = element.log_searched
     own["each_run"], own["worn"] = float(element.each_run), float(element.worn)
     if element.name in AUXILIARY:
@@ -35,7 +36,7 @@ def features(element: Element, auxiliary: Mapping[str, float]) -> NDArray:
 def of_set(chosen: Sequence[NDArray]) -> NDArray:
     """Return the features (f,) of a set from those of its elements, (f,) each."""
     total = np.sum(chosen, axis=0) if len(chosen) else np.zeros(len(FEATURES))
-    total[FEATURES.index("further")] = max(len(chosen) - 1, 0)
+    total[FEATURES.index("further")] += max(len(chosen) - 1, 0)
     return total
 
 

@@ -3,6 +3,8 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from scipy.special import expit, logit
+
 from pipelines.diagnosis.candidates.auxiliary_evidence import auxiliary_evidence
 from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.candidates.library import Library, build_library, silent
@@ -11,7 +13,7 @@ from pipelines.diagnosis.evidence.residual_shares import ResidualShares, residua
 from pipelines.diagnosis.selection.answer import Answer, Named, answer_of
 from pipelines.diagnosis.selection.evidence import Element, Evidence
 from pipelines.diagnosis.selection.findings import Finding, findings
-from pipelines.diagnosis.selection.posterior import Posterior, likely_contexts, posterior, strongest
+from pipelines.diagnosis.selection.posterior import SURE, Posterior, likely_contexts, posterior, strongest
 from pipelines.diagnosis.training_data import training_data
 from pipelines.mechanics.motion import Motion
 
@@ -19,12 +21,14 @@ LIBRARY_SHARE = 0.6
 """Of the progress bar, where the library is done."""
 PARTNERS = 5
 """Causes that are refined beside a strong one."""
+ROUNDS = 50
+"""Rounds in which the probabilities of several groups are raised to their floors in turn."""
 Report = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
 class Selected:
-    """What the evidence says, before anything is fitted."""
+    """What the evidence says: of the training runs at first, then after what the validation runs charge."""
 
     library: Library | None
     """None where faults of acquisition keep physics from being looked at."""
@@ -32,15 +36,16 @@ class Selected:
     trained: Posterior | None
     """How probable each set is by the training runs."""
     posterior: Posterior | None
-    """The same after validation."""
+    """The same after what the validation runs charge; ``trained`` before them."""
     answer: Answer
     findings: tuple[Finding, ...]
     router: tuple[ResidualShares, ...]
     """Of each joint: how its residual repeats."""
     dropped: frozenset[str] = frozenset()
-    """Labels that the training runs would name, and the validation runs speak against."""
+    """Labels that were named until the validation runs spoke against them."""
     charged: Mapping[str, float] = field(default_factory=dict)
-    """What harm on the validation runs takes from log odds, by variant of a cause."""
+    """What the validation runs take from log odds, by variant of a cause: its harm, or how far it falls behind the best
+    of its ties, which has zero."""
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
@@ -49,74 +54,97 @@ class Selected:
             return ()
         return tuple(self.library.causes[one.element.place].candidate for one in self.answer.named)
 
-    def harm_of(self, label: str, ratio: float) -> dict[str, float]:
-        """Return what harm on the validation runs takes from log odds, by variant that was not charged yet.
+    def worst_harm(self, ratios: Mapping[str, float]) -> dict[str, float]:
+        """Return the charges for the named cause that harms the validation runs most, by variant; empty if none does.
 
-        Where a named cause does harm, so do its ties: these data cannot tell them apart. A value that each run has for
-        itself is not charged, for one run says nothing of another's.
+        Where a named cause does harm, so do its ties: these data cannot tell them apart. A cause whose size each run
+        has for itself is not charged, for one run says nothing of another's.
 
         Parameters
         ----------
-        label : str
-            Of a named cause.
-        ratio : float
-            Log likelihood of the validation runs with it over that without it.
+        ratios : mapping of str to float
+            Log likelihood of the validation runs with a named cause over that without it, by label.
         """
-        if self.trained is None or ratio >= 0.0:
-            return {}
-        one = next(one for one in self.answer.named if one.element.label == label)
-        alike = {e.variant for e in self.trained.elements if e.label in one.members and not e.each_run}
-        return dict.fromkeys(alike - self.charged.keys(), ratio)
-
-    def rivals_of(self, number: int) -> dict[str, Candidate]:
-        """Return the ties of a named cause in its place, by variant, those that were compared already left out.
-
-        A value that each run has for itself is not compared: a validation run fits its own.
-        """
-        one, found = self.answer.named[number], dict[str, Candidate]()
-        own, *elements = (self._standing(label, one) for label in (one.element.label, *dict(one.ties)))
-        if own.variant in self.charged or self._candidate(own).effect.sized_each_run:
-            return {}
-        for element in elements:
-            candidate = self._candidate(element)
-            if element.variant not in self.charged and not candidate.effect.sized_each_run:
-                found[element.variant] = candidate
+        found: dict[str, float] = {}
+        for one in sorted(self.answer.named, key=lambda one: ratios.get(one.element.label, 0.0)):
+            ratio = ratios.get(one.element.label, 0.0)
+            if ratio < 0.0 and not one.element.sized_each_run and not found:
+                alike = {e.variant for e in self._elements if e.label in one.members and not e.sized_each_run}
+                found = {variant: ratio for variant in alike if not self.charged.get(variant)}
         return found
 
-    def _candidate(self, element: Element) -> Candidate:
-        assert self.library is not None
-        return self.library.causes[element.place].candidate
+    def rivals_of(self, number: int) -> dict[str, Candidate]:
+        """Return the ties to fit in the place of a named cause, by variant, unless they were compared before.
 
-    def _standing(self, label: str, one: Named) -> Element:
-        """Return a label at its most probable shape in the place of a named cause."""
-        weighed = self.posterior
-        assert weighed is not None
-        rest = {other.element.label for other in self.answer.named} - {one.element.label}
-        has_it = [chosen for chosen in weighed.sets if label in weighed.labels_of(chosen)]
-        best = next((chosen for chosen in has_it if weighed.labels_of(chosen) == rest | {label}), has_it[0])
-        return next(e for i in best if (e := weighed.elements[i]).label == label)
+        A cause whose size each run has for itself is not compared: a validation run fits its own.
+        """
+        assert self.library is not None
+        one = self.answer.named[number]
+        if one.element.variant in self.charged or one.element.sized_each_run:
+            return {}
+        ties = [self._best_shape(label, one) for label, _ in one.ties]
+        return {
+            tie.variant: self.library.causes[tie.place].candidate
+            for tie in ties
+            if tie.variant not in self.charged and not tie.sized_each_run
+        }
 
     def judged(self, charges: Mapping[str, float], *, harms: bool = False) -> "Selected":
-        """Return the same where the validation runs take this from log odds as well, by variant of a cause.
+        """Return the answer after further charges.
 
-        What takes the place of a cause is named where it was named or tied before. Else it is a finding: that another
-        is refuted says nothing for it. ``harms`` tells that the model predicts these runs worse with the cause.
+        Parameters
+        ----------
+        charges : mapping of str to float
+            What the validation runs take from log odds as well, zero or negative, by variant of a cause.
+        harms : bool
+            Whether the model predicts these runs worse with the charged cause, which is then told as dropped.
         """
         assert self.trained is not None
         charged = {**self.charged, **charges}
-        weighed = self.trained.judged(charged)
-        for one in self.answer.named:
-            own = [charged[e.variant] for e in weighed.elements if e.label in one.members and e.variant in charged]
-            # One of them does no harm: what others do, or how far its ties fall behind it, takes nothing from them.
-            if max(own, default=0.0) == 0.0:
-                weighed = weighed.holding(one.members, one.probability)
+        floors = {one.members: _lowered(one, charges, self._elements) for one in self.answer.named}
+        weighed = _with_floors(self.trained.judged(charged), floors)
         likely = answer_of(weighed)
+        # Anything else that becomes likely is a finding: refuting one cause is no evidence for another.
         named = tuple(one for one in likely.named if one.element.label in self.answer.members)
         answer = replace(likely, named=named)
         doubted = {one.element.label for one in self.answer.named if harms and one.element.variant in charges}
         dropped = (self.dropped | doubted) - {one.element.label for one in named}
         found = tuple(findings(weighed, answer))
         return replace(self, posterior=weighed, answer=answer, findings=found, charged=charged, dropped=dropped)
+
+    @property
+    def _elements(self) -> tuple[Element, ...]:
+        return () if self.trained is None else self.trained.elements
+
+    def _best_shape(self, label: str, one: Named) -> Element:
+        """Return the most probable shape of a tie in the place of a named cause."""
+        assert self.posterior is not None
+        labels = map(self.posterior.labels_of, self.posterior.sets)
+        has_it = [(own, chosen) for own, chosen in zip(labels, self.posterior.sets, strict=True) if label in own]
+        rest = {other.element.label for other in self.answer.named} - {one.element.label}
+        in_place = (chosen for own, chosen in has_it if rest <= own and one.element.label not in own)
+        best = next(in_place, has_it[0][1])
+        return next(e for i in best if (e := self.posterior.elements[i]).label == label)
+
+
+def _lowered(one: Named, charges: Mapping[str, float], elements: Sequence[Element]) -> float:
+    """Return the probability of a named cause and its ties after what the least charged of them is charged itself.
+
+    It was fitted without what else is charged: that takes nothing from it.
+    """
+    own = [charges[e.variant] for e in elements if e.label in one.members and e.variant in charges]
+    return float(expit(logit(min(one.probability, SURE)) + max(own, default=0.0)))
+
+
+def _with_floors(weighed: Posterior, floors: Mapping[frozenset[str], float]) -> Posterior:
+    """Return the posterior where each group of labels has at least its probability."""
+    for _ in range(ROUNDS):
+        before = weighed
+        for members, probability in floors.items():
+            weighed = weighed.at_least(members, probability)
+        if weighed is before:
+            break
+    return weighed
 
 
 def select(prepared: Prepared, report: Report = silent) -> Selected:

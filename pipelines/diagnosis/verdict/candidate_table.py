@@ -126,7 +126,12 @@ def _not_fitted(d: Diagnosis) -> tuple[str, ...]:
 
 
 def _left_out(d: Diagnosis, label: str) -> dict[str, Any]:
-    return _without_numbers(d, label, "rejected", "it was left out: what fits best is none of it")
+    return _without_numbers(
+        d,
+        label,
+        "rejected",
+        "it was left out: at no shape is its torque finite and other than what rigid body and friction explain",
+    )
 
 
 def _absorbed(d: Diagnosis, name: str, joint: str, into: str) -> dict[str, Any]:

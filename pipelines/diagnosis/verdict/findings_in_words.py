@@ -22,6 +22,8 @@ FAMILIES = {
     "person": "something of the person at {joint}",
 }
 """What is missing, known by its family alone."""
+WITHOUT_JOINT = {"angle": "a law of {joint}'s angles"}
+"""The same of no single joint, where it is worded otherwise."""
 LAW = "law:"
 """What the label of an unlisted law begins with."""
 WORTH_A_LINE = 0.01
@@ -83,7 +85,7 @@ def _node_in_words(node: dict[str, Any], finding: dict[str, Any], machine: Machi
         return f"something at {the(value)}" if value else "something of no single joint"
     if level == "family":
         if not finding["joint"]:
-            return FAMILIES[value].replace("angle", "angles").format(joint="the machine")
+            return WITHOUT_JOINT.get(value, FAMILIES[value]).format(joint="the machine")
         return _said_of(FAMILIES[value], finding["joint"], machine)
     return str(finding["causes"][0]["words"])
 
