@@ -154,7 +154,7 @@ def test_what_comes_closest_is_said_where_nothing_is_likely_to_be_missing(stuck,
     elements = stuck.selected.posterior.elements
     offset = next(i for i, element in enumerate(elements) if element.label == "torque_offset@knee")
     weighed = Posterior(elements, ((), (offset,)), np.log([1.0 - p, p]))
-    said = verdict(replace(silent, selected=replace(silent.selected, trained=weighed)))["finding"]
+    said = verdict(replace(silent, selected=replace(silent.selected, posterior=weighed)))["finding"]
     assert said.endswith("Torque offset at the knee (0.30) comes closest.") == told
 
 
@@ -172,7 +172,7 @@ def odds_in_words(d, rival):
     log_odds = np.array([0.0, np.log(rival) - np.log1p(-rival) if rival else -np.inf])
     weighed = Posterior(elements, ((spring,), (offset,)), log_odds)
     named = replace(d.named[0], probability=1.0 - rival)
-    selected = replace(d.selected, trained=weighed, answer=replace(d.selected.answer, named=(named,)))
+    selected = replace(d.selected, posterior=weighed, answer=replace(d.selected.answer, named=(named,)))
     told = cause_evidence(replace(d, selected=selected), named)
     return [one for one in told if "less likely" in one]
 
