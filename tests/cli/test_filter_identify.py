@@ -247,6 +247,23 @@ def test_the_same_run_twice_is_refused(exoid, recordings, tmp_path):
     assert "holds the same data as" in outcome.err
 
 
+@pytest.mark.parametrize(
+    ("content", "said"), [(b"", "is empty (0 bytes)"), (b"no Parquet" * 9, "is not a Parquet file")]
+)
+def test_files_that_are_alike_since_they_hold_nothing_are_not_called_copies(exoid, tmp_path, content, said):
+    for name in ("one.parquet", "two.parquet"):
+        (tmp_path / name).write_bytes(content)
+    outcome = exoid("diagnose", tmp_path / "one.parquet", tmp_path / "two.parquet", "-o", tmp_path / "d")
+    assert (outcome.code, outcome.err.count("\n")) == (2, 1)
+    assert said in outcome.err and "same data" not in outcome.err
+
+
+def test_a_diagnosis_that_is_refused_leaves_no_folder(exoid, recordings, tmp_path):
+    outcome = exoid("diagnose", recordings / "exo_alone_train.parquet", "-o", tmp_path / "new" / "diagnosed")
+    assert outcome.code == 2
+    assert not (tmp_path / "new").exists()
+
+
 def test_a_motion_says_its_filter(exoid, recordings, tmp_path):
     target = tmp_path / "m.parquet"
     exoid("filter", recordings / "exo_alone_train.parquet", "-o", target, "--cutoff-hz", "9")

@@ -71,6 +71,20 @@ def test_of_ties_the_one_that_predicts_the_validation_run_is_named():
     assert named.element.label == "parallel_spring@arm"
     assert "torque_offset@arm" not in named.members
     assert found.selected.dropped == frozenset(), "none of them does harm"
+    assert "torque_offset@arm" in found.selected.doubted
+
+
+def test_too_little_to_validate_on_is_told_with_the_fault_that_leaves_it_out():
+    train, validate = motions(pendulum)
+    torque = validate.torque.copy()
+    torque[len(torque) // 10 :] = torque[len(torque) // 10]
+    with pytest.raises(InputError, match=r"too few in a row to tell noise from error.*torque is stuck"):
+        diagnose([train, replace(validate, torque=torque)])
+
+
+def test_of_what_was_weighed_in_one_variant_it_is_not_said_that_it_was_left_out(screw):
+    library = screw[0].selected.library
+    assert not {cause.candidate.label for cause in library.causes} & set(library.left_out)
 
 
 def test_friction_that_differs_with_direction_is_named_at_a_ball_screw_in_newtons(screw):
@@ -94,6 +108,9 @@ def test_a_cause_that_harms_the_validation_run_is_dropped_and_the_other_stays_na
     found = diagnose([replace(train, torque=train.torque + 200.0 * train.q), validate])
     both = naming(found, "viscous_asymmetry@axis", "parallel_spring@axis")
     assert both.causes == ("viscous_asymmetry@axis",)
+    tried = candidates(both)
+    spring = tried[tried["causes"].map(lambda causes: list(causes) == ["parallel_spring@axis"])]
+    assert spring["reason"].str.contains("the validation runs speak against parallel_spring@axis").all()
 
 
 def test_what_is_rejected_is_told_with_its_probability_and_its_odds_against_nothing(screw):

@@ -54,6 +54,11 @@ class Selected:
             return ()
         return tuple(self.library.causes[one.element.place].candidate for one in self.answer.named)
 
+    @property
+    def doubted(self) -> frozenset[str]:
+        """Labels that the validation runs speak against: they do harm there, or a tie of theirs predicts better."""
+        return frozenset(e.label for e in self._elements if self.charged.get(e.variant, 0.0) < 0.0)
+
     def worst_harm(self, ratios: Mapping[str, float]) -> dict[str, float]:
         """Return the charges for the named cause that harms the validation runs most, by variant; empty if none does.
 

@@ -110,8 +110,8 @@ def _against(d: Diagnosis, labels: frozenset[str], probability: float) -> Iterat
     yield f"its probability is {probability:.2g}"
     if any(label.startswith(LAW) for label in labels):
         yield "it holds a law that is no listed cause"
-    if harmful := sorted(labels & d.selected.dropped):
-        yield f"the validation runs speak against {' and '.join(harmful)}"
+    if doubted := sorted(labels & d.selected.doubted - set(d.causes)):
+        yield f"the validation runs speak against {' and '.join(doubted)}"
 
 
 def _taken_up(effect: type[Effect], machine: Machine) -> dict[str, str]:
