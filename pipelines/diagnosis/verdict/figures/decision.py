@@ -165,9 +165,11 @@ def _bars(d: Diagnosis) -> list[Bar]:
     bars = [Bar(p, tuple(_elements(d, labels))) for labels, p in shown]
     rest = 1.0 - sum(p for _, p in shown)
     if rest >= 0.5 * LEAST:
-        others = len(ranked) - len(shown)
-        words = f"{others} other set{'s' * (others > 1)}"
-        bars.append(Bar(rest, ((words, None, False, False),)))
+        others = ranked[len(shown) :]
+        words = f"{len(others)} other set{'s' * (len(others) > 1)}"
+        if shown and shown[0][0] and 2.0 * sum(p for labels, p in others if labels > shown[0][0]) > rest:
+            words += ", mostly the first and more"
+        bars.append(Bar(rest, ((fill(words, LABEL), None, False, False),)))
     return bars
 
 
