@@ -273,6 +273,16 @@ def test_of_three_causes_the_two_that_do_no_harm_stay_named():
     assert all(one.probability > 0.89 for one in selected.answer.named)
 
 
+def test_ties_that_are_likely_together_stay_named_though_none_is_as_probable_as_nothing():
+    posterior = weighed(_2=0.3, _3=0.2, _0=0.18, _=0.25, _4=0.07)
+    selected = Selected(None, None, posterior, posterior, answer_of(posterior), (), ())
+    assert selected.answer.named[0].members == {"quadratic_drag@hip", "stribeck_friction@hip", "parallel_spring@knee"}
+    judged = selected.judged({"quadratic_drag@hip": -0.4, "stribeck_friction@hip": 0.0, "parallel_spring@knee": 0.0})
+    (named,) = judged.answer.named
+    assert named.element is PEAK and named.alone < judged.answer.nothing
+    assert named.probability == pytest.approx(0.68, abs=0.01)
+
+
 def test_a_tie_that_won_is_charged_when_it_harms():
     posterior = weighed(_2=0.7, _3=0.25, _=0.05)
     selected = Selected(None, None, posterior, posterior, answer_of(posterior), (), ())

@@ -1,5 +1,6 @@
 """Which causes are named, and what could stand in their place: read off the posterior."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pipelines.diagnosis.criteria import CRITERIA
@@ -43,10 +44,18 @@ class Answer:
         return frozenset(label for one in self.named for label in one.members)
 
 
-def answer_of(posterior: Posterior) -> Answer:
-    """Name the likely causes of the median probability set, each with its ties."""
+def answer_of(posterior: Posterior, together: Sequence[frozenset[str]] = ()) -> Answer:
+    """Name the likely causes of the median probability set, each with its ties.
+
+    ``together`` are groups of labels that were named as ties before: one of such a group is named where the group is
+    likely, though none of it may be as probable as nothing.
+    """
     best = _best(posterior)
     found = [_named(posterior, best, i) for i in best if not posterior.elements[i].is_law]
+    for group in together:
+        if posterior.any_of(group) >= CRITERIA.likely and not any(group & one.members for one in found):
+            members = ((chosen, i) for chosen in posterior.sets for i in chosen if posterior.elements[i].label in group)
+            found.append(_named(posterior, *next(members)))
     named = [one for one in found if one.probability >= CRITERIA.likely]
     return Answer(tuple(sorted(named, key=lambda one: -one.probability)), posterior.nothing, _unlisted(posterior))
 

@@ -108,7 +108,7 @@ class Selected:
         charged = {**self.charged, **charges}
         floors = {one.members: _lowered(one, charges, self._elements) for one in self.answer.named}
         weighed = _with_floors(self.trained.judged(charged), floors)
-        likely = answer_of(weighed)
+        likely = answer_of(weighed, [one.members for one in self.answer.named])
         # Anything else that becomes likely is a finding: refuting one cause is no evidence for another.
         named = tuple(one for one in likely.named if one.element.label in self.answer.members)
         answer = replace(likely, named=named)
