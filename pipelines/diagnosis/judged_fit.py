@@ -6,12 +6,7 @@ from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
 from pipelines.diagnosis.fit.joint_refinement import Refinement
-from pipelines.diagnosis.fit.validation import (
-    Validated,
-    log_likelihood_ratio,
-    log_likelihoods,
-    without_each,
-)
+from pipelines.diagnosis.fit.validation import Validated, log_likelihoods, without_each
 from pipelines.diagnosis.selection.marginal_likelihood import power
 from pipelines.diagnosis.selection.selected import Selected
 
@@ -30,7 +25,10 @@ def judged(
         if selected.candidates != fitted:
             fitted = selected.candidates
             after, without = _fitted(selected, refine, prepared, before)
-        ratios = {label: log_likelihood_ratio(less, after, prepared.noise) for label, less in without.items()}
+            whole = log_likelihoods(after, prepared.noise)
+            ratios = {
+                label: float(np.sum(whole - log_likelihoods(less, prepared.noise))) for label, less in without.items()
+            }
         if harm := selected.worst_harm(ratios):
             selected = selected.judged(harm, harms=True)
         elif shortfalls := _shortfalls(selected, after, refine, prepared, before):

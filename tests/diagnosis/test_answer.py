@@ -57,7 +57,7 @@ def test_a_third_cause_beside_the_named_one_is_no_tie():
     posterior = weighed(_2=0.5, _02=0.4, _=0.1)
     (named,) = answer_of(posterior).named
     assert named.ties == ()
-    assert named.probability == pytest.approx(0.9, abs=1e-3)
+    assert named.probability == pytest.approx(0.9)
 
 
 def test_what_most_sets_have_is_named_though_the_most_probable_set_lacks_it():

@@ -39,11 +39,10 @@ def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: ND
 
     Two errors add: noise, and model error, which is what is left of slow error, at the least what no model of a good
     rig gets right, ``imperfect`` (O,) N·m rms. Model error is small, but it is correlated over half a second and
-    repeats in every period, so more data do not average it out. Shapes
-    that are not fitted but taken at a usual value may be anywhere in their typical range. Of a shape that was chosen
-    among a few forms, as an exponent, what is between them is as likely: data and typical range tell how far from the
-    form it may be. When something begins is known so much better than how large it is that neither makes the other
-    less sure.
+    repeats in every period, so more data do not average it out. Shapes that are not fitted but taken at a usual value
+    may be anywhere in their typical range. Of a shape that was chosen among a few forms, as an exponent, what is
+    between them is as likely: data and typical range tell how far from the form it may be. When something begins is
+    known so much better than how large it is that neither makes the other less sure.
     """
     runs = laden(runs, fit, baseline)
     plain = stacked_columns(fit.causes, runs, baseline)

@@ -59,7 +59,7 @@ def log_likelihoods(made: Validated, noise: NoiseModel) -> NDArray:
 
     In the decision band, under the noise that the training runs have.
     """
-    joints = made.runs[0].state[0].shape[1]
+    joints = len(made.runs[0].motion.joints)
     sigma = noise.sigma(LENGTH_S)[:joints]
     known, total = np.isfinite(sigma), np.zeros(joints)
     for run, left in zip(made.runs, made.residuals, strict=True):
@@ -67,8 +67,3 @@ def log_likelihoods(made: Validated, noise: NoiseModel) -> NDArray:
         squares = np.sum(band.weight[:, :joints] * band.average(left)[:, :joints] ** 2, axis=0)
         total[known] -= 0.5 * squares[known] / sigma[known] ** 2
     return total
-
-
-def log_likelihood_ratio(without: Validated, whole: Validated, noise: NoiseModel) -> float:
-    """Return the log likelihood of the validation runs with a cause over that without it."""
-    return float(np.sum(log_likelihoods(whole, noise) - log_likelihoods(without, noise)))

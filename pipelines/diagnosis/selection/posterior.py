@@ -75,9 +75,7 @@ class Posterior:
             return self
         variants = [{self.elements[i].variant for i in chosen} for chosen in self.sets]
         harm = [sum(charged[variant] for variant in own & charged.keys()) for own in variants]
-        log_odds = self.log_odds + np.array(harm)
-        order = np.argsort(-log_odds, kind="stable")
-        return Posterior(self.elements, tuple(self.sets[k] for k in order), log_odds[order])
+        return self._with(self.log_odds + np.array(harm))
 
     def at_least(self, labels: frozenset[str], probability: float) -> "Posterior":
         """Return the posterior where some label of a group has at least this probability.
@@ -92,7 +90,10 @@ class Posterior:
         lacking = wanted - float(logsumexp(self.log_odds[inside]) - logsumexp(self.log_odds[~inside]))
         if not TOLERANCE < lacking < np.inf:
             return self
-        log_odds = self.log_odds + np.where(inside, lacking, 0.0)
+        return self._with(self.log_odds + np.where(inside, lacking, 0.0))
+
+    def _with(self, log_odds: NDArray) -> "Posterior":
+        """Return the posterior where the sets have other log odds, (sets,)."""
         order = np.argsort(-log_odds, kind="stable")
         return Posterior(self.elements, tuple(self.sets[k] for k in order), log_odds[order])
 
@@ -147,8 +148,7 @@ def posterior(evidence: Evidence, criteria: Criteria = CRITERIA) -> Posterior:
         odds[chosen] = weigh(chosen)
     # Should one cause of the best set be refuted, the others are what is left.
     best = max(odds, key=lambda chosen: odds[chosen])
-    for chosen in combinations(best, 2):
-        odds.setdefault(chosen, weigh(chosen))
+    odds |= {chosen: weigh(chosen) for chosen in combinations(best, 2) if chosen not in odds}
     sets = sorted(odds, key=lambda chosen: -odds[chosen])
     return Posterior(evidence.elements, tuple(sets), np.array([odds[chosen] for chosen in sets]))
 

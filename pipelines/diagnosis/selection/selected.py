@@ -70,13 +70,16 @@ class Selected:
         ratios : mapping of str to float
             Log likelihood of the validation runs with a named cause over that without it, by label.
         """
-        found: dict[str, float] = {}
-        for one in sorted(self.answer.named, key=lambda one: ratios.get(one.element.label, 0.0)):
-            ratio = ratios.get(one.element.label, 0.0)
-            if ratio < 0.0 and not one.element.sized_each_run and not found:
-                alike = {e.variant for e in self._elements if e.label in one.members and not e.sized_each_run}
-                found = {variant: ratio for variant in alike if not self.charged.get(variant)}
-        return found
+        harmful = [
+            (ratio, one.members)
+            for one in self.answer.named
+            if (ratio := ratios.get(one.element.label, 0.0)) < 0.0 and not one.element.sized_each_run
+        ]
+        for ratio, members in sorted(harmful, key=lambda pair: pair[0]):
+            alike = {e.variant for e in self._elements if e.label in members and not e.sized_each_run}
+            if charges := {variant: ratio for variant in alike if not self.charged.get(variant)}:
+                return charges
+        return {}
 
     def rivals_of(self, number: int) -> dict[str, Candidate]:
         """Return the ties to fit in the place of a named cause, by variant, unless they were compared before.
