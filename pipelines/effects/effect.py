@@ -65,7 +65,7 @@ class Family(StrEnum):
 LAWS = (
     "angle", "other_angle", "both_angles", "speed", "other_speed", "load", "other_load", "friction_by_angle",
     "friction_by_other_angle", "inertia_by_angle", "gain_over_time", "friction_over_time", "time", "hum",
-    "across_joints",
+    "across_joints", "quantisation",
 )  # fmt: skip
 """Names of the smooth laws that ``Effect.resembles`` may list.
 
@@ -82,6 +82,7 @@ friction_over_time      friction that changes slowly with time
 time                    a torque that wanders with time, in each run in its own way
 hum                     a line at a fixed frequency
 across_joints           torques of both joints that are the slopes of one elastic energy of both angles
+quantisation            what rounding to coarse steps adds to the measured torque
 ======================= ==========================================================================
 """
 

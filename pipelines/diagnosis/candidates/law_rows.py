@@ -6,9 +6,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.diagnosis.candidates.quantisation import coarse_step, rounding
 from pipelines.diagnosis.candidates.smooth_laws import (
     HUM,
     IN_CUFFS,
+    QUANTISATION,
     Curve,
     LawColumn,
     Spans,
@@ -41,7 +43,7 @@ def law_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list[L
         chosen = [i for i, law in enumerate(laws) if law.kind in IN_CUFFS]
         own = [replace(laws[i], wearer="cuffs") for i in chosen]
         parts.append((own, [x[:, :, chosen] for x in _both(zero, worn)]))
-    parts += _hums(prepared, joints)
+    parts += [*_hums(prepared, joints), *_coarse_steps(prepared, joints)]
     rows = [regression.project(regression.rows(columns)) for _, columns in parts]
     return [law for some, _ in parts for law in some], np.hstack(rows)
 
@@ -59,6 +61,21 @@ def _hums(prepared: Prepared, joints: int) -> Iterator[tuple[list[LawColumn], li
             waves = run.average(np.hstack([np.sin(phase), np.cos(phase)]))
             columns[r][:, j, r * width : (r + 1) * width] = waves * prepared.torque[j]
         yield [LawColumn(HUM, j, "all", 1.0)] * (width * count), columns
+
+
+def _coarse_steps(prepared: Prepared, joints: int) -> Iterator[tuple[list[LawColumn], list[NDArray]]]:
+    """Yield the law and the column of each joint whose torque may be told in coarse steps."""
+    pairs = list(zip(prepared.runs, prepared.predicted, strict=True))
+    for j in range(joints):
+        rms = float(prepared.torque[j])
+        left = [run.motion.torque[:, j] - x[:, j] for run, x in pairs]
+        step = coarse_step([x[:, j] for _, x in pairs], left, rms)
+        if step is None:
+            continue
+        columns = [np.zeros((*run.measured.shape, 1)) for run in prepared.runs]
+        for column, (run, x) in zip(columns, pairs, strict=True):
+            column[:, j, 0] = run.average(rounding(x[:, j], step)) * np.sqrt(12.0) / step * rms
+        yield [LawColumn(QUANTISATION, j, "all", 1.0)], columns
 
 
 def _both(drives: Sequence[NDArray], cuffs: Sequence[NDArray]) -> list[NDArray]:

@@ -23,7 +23,7 @@ FAMILIES = {
     "load": "load", "other_load": "load",
     "inertia_by_angle": "transmission",
     "gain_over_time": "time", "friction_over_time": "time", "time": "time", "hum": "time",
-    "across_joints": "angle",
+    "across_joints": "angle", "quantisation": "sensor",
 }  # fmt: skip
 """The family that each law belongs to."""
 IN_WORDS = {
@@ -42,6 +42,7 @@ IN_WORDS = {
     "time": "a torque of {joint} that wanders in time and does not repeat",
     "hum": "a tone at {joint} that does not follow the motion",
     "across_joints": "an elastic torque across both joints",
+    "quantisation": "a torque of {joint} that is told in coarse steps",
 }
 IN_CUFFS = ("angle", "both_angles", "speed", "inertia_by_angle", "load", "other_load")
 """Laws by which cuff forces may be a little wrong on their own."""
@@ -57,6 +58,8 @@ TIME = "time"
 """The law whose columns are each run's own curves of time."""
 HUM = "hum"
 """The law whose columns are tones with a phase in each run."""
+QUANTISATION = "quantisation"
+"""The law whose column is what rounding to the step that the residual shows adds to the torque."""
 ACROSS = "across_joints"
 """The law of an elastic energy of both angles, as of a muscle or a band over two joints."""
 ACROSS_DEGREE = 4

@@ -33,6 +33,8 @@ class Prepared:
     noise: NoiseModel
     torque: NDArray
     """(O,) N·m rms."""
+    predicted: tuple[NDArray, ...]
+    """(n, J) N·m of each run: what the baseline predicts at the full sampling rate."""
     lines: tuple[JointLines, ...]
     """Of each joint's residual at the full sampling rate."""
 
@@ -61,13 +63,14 @@ def prepare(runs: Sequence[Run], baseline: Baseline) -> Prepared:
     laden = tuple(with_load(run, baseline, values) for run in runs)
     residuals = [r.measured - c @ values for r, c in zip(runs, columns, strict=True)]
     noise = noise_model(laden, residuals)
-    lines = lines_in([run.motion for run in laden], _at_full_rate(laden, baseline, values))
+    predicted = _at_full_rate(laden, baseline, values)
+    motions = [run.motion for run in laden]
+    lines = lines_in(motions, [motion.torque - x for motion, x in zip(motions, predicted, strict=True)])
     torque = telling_torque(runs)
-    return Prepared(laden, baseline, columns, values, weights, noise, torque, tuple(lines))
+    return Prepared(laden, baseline, columns, values, weights, noise, torque, predicted, tuple(lines))
 
 
-def _at_full_rate(runs: Sequence[Run], baseline: Baseline, values: NDArray) -> list[NDArray]:
-    """Return what the baseline leaves at the full sampling rate, (n, J) N·m of each run."""
+def _at_full_rate(runs: Sequence[Run], baseline: Baseline, values: NDArray) -> tuple[NDArray, ...]:
+    """Return what the baseline predicts at the full sampling rate, (n, J) N·m of each run."""
     joints, model = len(baseline.joints), Model(baseline.terms)
-    regressors = [model.regressor(run.motion, cuffs=True)[:, :joints] for run in runs]
-    return [run.motion.torque - x @ values for run, x in zip(runs, regressors, strict=True)]
+    return tuple(model.regressor(run.motion, cuffs=True)[:, :joints] @ values for run in runs)

@@ -15,8 +15,9 @@ from scipy.linalg.lapack import dtrtri
 
 from pipelines.diagnosis.candidates.cause import Cause
 from pipelines.diagnosis.candidates.library import Library, orders_of
+from pipelines.diagnosis.candidates.quantisation import TRIED
 from pipelines.diagnosis.candidates.shape_refinement import log_searched
-from pipelines.diagnosis.candidates.smooth_laws import FAMILIES, HUM, TIME, LawColumn, law_label
+from pipelines.diagnosis.candidates.smooth_laws import FAMILIES, HUM, QUANTISATION, TIME, LawColumn, law_label
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
@@ -62,7 +63,7 @@ class Element:
     log_prior: float = 0.0
     """Of a cause: what its shape and form add to the log odds."""
     log_searched: float = 0.0
-    """Of a cause: the log number of values among which its waves, tones and onsets were sought."""
+    """The log number of values among which its waves, tones, onsets or steps were sought."""
     shown: list[Shown] = field(default_factory=list)
     """Of a ripple or a tone: its lines at the full sampling rate."""
     context: int = -1
@@ -221,6 +222,7 @@ def _elements(library: Library, at: _Places) -> list[Element]:
             variance=_normalised([v for _, v in own]),
             repeats=FAMILIES[kind] != Family.TIME,
             wearer=wearer,
+            log_searched=float(np.log(TRIED)) if kind == QUANTISATION else 0.0,
             shown=_shown(Kind.TIME, j, library.prepared) if kind == HUM and j is not None else [],
         )
         for (kind, j, wearer), own in laws.items()
