@@ -1,8 +1,8 @@
 """A torque that is told in coarse steps: the step that a residual shows, and what rounding to it adds.
 
 Rounding to multiples of a step h adds h round(x / h) - x to a torque x: a sawtooth over x. Its first harmonic,
--(h / pi) sin(2 pi x / h), is a line of known phase in the spectrum of the residual over the torque. So the step is found
-also where noise came after the rounding, and no value in the file lies on a grid.
+-(h / pi) sin(2 pi x / h), is a line of known phase in the spectrum of the residual over the torque. So the step is
+found also where noise came after the rounding, and no value in the file lies on a grid.
 """
 
 from collections.abc import Sequence
