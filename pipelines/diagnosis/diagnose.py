@@ -11,18 +11,16 @@ from collections.abc import Sequence
 
 from pipelines.diagnosis.candidates.library import silent
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.evidence.baseline import like_trained, with_load
+from pipelines.diagnosis.evidence.baseline import like_trained
 from pipelines.diagnosis.evidence.model_error import imperfection
 from pipelines.diagnosis.evidence.noise_floor import noise_floor
 from pipelines.diagnosis.evidence.prepared_runs import Prepared, prepare
 from pipelines.diagnosis.fit import parameter_rows
-from pipelines.diagnosis.fit.joint_refinement import Refinement
 from pipelines.diagnosis.fit.presliding_test import built_up
 from pipelines.diagnosis.fit.simulation_error import simulation_error
 from pipelines.diagnosis.fit.uncertainty import uncertainty
-from pipelines.diagnosis.fit.validation import Validated
-from pipelines.diagnosis.judged_fit import judged
-from pipelines.diagnosis.selection.selected import Report, Selected, nothing_selected, select
+from pipelines.diagnosis.judged_fit import JudgedFit, baseline_alone, judged_fit
+from pipelines.diagnosis.selection.selected import Report, nothing_selected, select
 from pipelines.diagnosis.training_data import TrainingData, training_data
 from pipelines.mechanics.motion import Motion
 
@@ -35,6 +33,8 @@ def diagnose(motions: Sequence[Motion], report: Report = silent, known: Sequence
 
     The search, shapes and shared parameters use ``train`` runs only. The ``validate`` runs measure
     every error. They may lower the probability of a cause that does harm there, and decide between ties.
+    Where that leaves nothing missing, and the validation runs have an error above the noise, causes are
+    sought on all runs; they are fitted to the training runs still.
 
     Parameters
     ----------
@@ -52,18 +52,27 @@ def diagnose(motions: Sequence[Motion], report: Report = silent, known: Sequence
     """
     data = training_data(motions, known)
     prepared = prepare(data.train, data.baseline)
+    before = baseline_alone(data, prepared)
     selected = nothing_selected(prepared) if data.spoilt else select(prepared, report)
     report(FIT_SHARE, "fit")
-    return _validated(data, prepared, selected)
+    judged = judged_fit(selected, prepared, before)
+    if not (data.spoilt or judged.selected.shows_something) and before.leaves_more_than_noise:
+        judged = _by_all_runs(data, prepared, judged)
+    return _diagnosis(data, prepared, judged)
 
 
-def _validated(data: TrainingData, prepared: Prepared, selected: Selected) -> Diagnosis:
-    """Fit what is named and measure it on the validation runs."""
-    baseline, weights = data.baseline, prepared.weights
-    refine = Refinement(prepared.runs, baseline, weights)
-    validate = tuple(with_load(like_trained(run, baseline), baseline, prepared.values) for run in data.validate)
-    before = Validated.of(refine(()), validate, baseline)
-    selected, after, without = judged(selected, refine, prepared, before)
+def _by_all_runs(data: TrainingData, prepared: Prepared, judged: JudgedFit) -> JudgedFit:
+    """Return what all runs together show, fitted to the training runs; what was there where they show nothing."""
+    validate = (like_trained(run, data.baseline) for run in data.validate)
+    selected = select(prepare((*data.train, *validate), data.baseline))
+    by_all = judged_fit(selected.trained_on(len(data.train), judged.selected.router), prepared, judged.before)
+    return by_all if by_all.selected.shows_something else judged
+
+
+def _diagnosis(data: TrainingData, prepared: Prepared, judged: JudgedFit) -> Diagnosis:
+    """Measure what is named on the validation runs."""
+    baseline, before, after = data.baseline, judged.before, judged.after
+    validate = before.runs
     known = uncertainty(after.fit, prepared.runs, baseline, imperfection(prepared.runs))
     parameters, covariance = parameter_rows.parameters(after.fit, baseline, known)
     drift = simulation_error(before.fit, validate, baseline)
@@ -71,7 +80,7 @@ def _validated(data: TrainingData, prepared: Prepared, selected: Selected) -> Di
     residuals = {"baseline": before.residuals, "extended": after.residuals}
     reversals = [] if data.spoilt else built_up(after.fit, baseline, prepared.runs, validate)
     return Diagnosis(
-        data, selected, before, after, without, noise_floor(validate, after.residuals), known,
+        data, prepared, judged.selected, before, after, judged.without, noise_floor(validate, after.residuals), known,
         parameters, covariance, parameter_rows.residual_table(validate, residuals), tuple(reversals),
         {"baseline": drift, "extended": after_drift},
     )  # fmt: skip

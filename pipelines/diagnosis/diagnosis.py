@@ -12,6 +12,7 @@ from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.noise_floor import Floor
 from pipelines.diagnosis.evidence.observed_run import Run
+from pipelines.diagnosis.evidence.prepared_runs import Prepared
 from pipelines.diagnosis.fit.fitted_model import values_of_each_run
 from pipelines.diagnosis.fit.presliding_test import BuildUp
 from pipelines.diagnosis.fit.uncertainty import Uncertainty
@@ -32,6 +33,8 @@ class Diagnosis:
     """A session, what is named, and the model with it."""
 
     data: TrainingData
+    prepared: Prepared
+    """The training runs under the baseline alone."""
     selected: Selected
     before: Validated
     """The baseline."""
@@ -58,7 +61,7 @@ class Diagnosis:
     @property
     def train(self) -> tuple[Run, ...]:
         """The training runs, with the loads that the baseline makes."""
-        return self.selected.library.prepared.runs if self.selected.library else self.data.train
+        return self.prepared.runs
 
     @property
     def validate(self) -> tuple[Run, ...]:

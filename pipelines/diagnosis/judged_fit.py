@@ -1,25 +1,52 @@
 """The named causes fitted to the training runs, and judged on the validation runs."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.criteria import CRITERIA
+from pipelines.diagnosis.evidence.baseline import like_trained, with_load
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
 from pipelines.diagnosis.fit.joint_refinement import Refinement
 from pipelines.diagnosis.fit.validation import Validated, log_likelihoods, without_each
 from pipelines.diagnosis.selection.marginal_likelihood import power
 from pipelines.diagnosis.selection.selected import Selected
+from pipelines.diagnosis.training_data import TrainingData
 
 
-def judged(
-    selected: Selected, refine: Refinement, prepared: Prepared, before: Validated
-) -> tuple[Selected, Validated, dict[str, Validated]]:
-    """Return the causes that training and validation runs leave named, fitted, and the same without each.
+def baseline_alone(data: TrainingData, prepared: Prepared) -> Validated:
+    """Return the baseline without causes, fitted, and measured on the validation runs."""
+    validate = (like_trained(run, data.baseline) for run in data.validate)
+    laden = tuple(with_load(run, data.baseline, prepared.values) for run in validate)
+    return Validated.of(_refinement(prepared)(()), laden, data.baseline)
+
+
+def _refinement(prepared: Prepared) -> Refinement:
+    return Refinement(prepared.runs, prepared.baseline, prepared.weights)
+
+
+@dataclass(frozen=True)
+class JudgedFit:
+    """What training and validation runs leave named, fitted to the training runs."""
+
+    selected: Selected
+    before: Validated
+    """The baseline."""
+    after: Validated
+    """The baseline with the named causes."""
+    without: dict[str, Validated]
+    """The named causes less one, by that cause's label."""
+
+
+def judged_fit(selected: Selected, prepared: Prepared, before: Validated) -> JudgedFit:
+    """Judge the named causes on the validation runs, until those that are left stand.
 
     The most harmful cause is charged first: beside it, what others do may seem to harm too. Of causes
     that the training runs cannot tell apart, those are charged that predict the validation runs worse
     than the best of them.
     """
+    refine = _refinement(prepared)
     fitted: tuple[Candidate, ...] | None = None
     while True:
         if selected.candidates != fitted:
@@ -34,7 +61,7 @@ def judged(
         elif shortfalls := _shortfalls(selected, after, refine, prepared, before):
             selected = selected.judged(shortfalls)
         else:
-            return selected, after, without
+            return JudgedFit(selected, before, after, without)
 
 
 def _shortfalls(

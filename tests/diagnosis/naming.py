@@ -5,8 +5,9 @@ from itertools import combinations
 
 import numpy as np
 
-from pipelines.diagnosis.diagnose import _validated
+from pipelines.diagnosis.diagnose import _diagnosis
 from pipelines.diagnosis.diagnosis import Diagnosis
+from pipelines.diagnosis.judged_fit import judged_fit
 from pipelines.diagnosis.selection.answer import Answer, Named
 from pipelines.diagnosis.selection.findings import findings
 from pipelines.diagnosis.selection.posterior import Posterior
@@ -39,7 +40,7 @@ def naming(d: Diagnosis, *labels: str, ties: tuple[tuple[str, float], ...] = ())
         findings=found,
         dropped=frozenset(),
     )
-    return _validated(d.data, selected.library.prepared, given)
+    return _diagnosis(d.data, d.prepared, judged_fit(given, d.prepared, d.before))
 
 
 def _best(d: Diagnosis, label: str):

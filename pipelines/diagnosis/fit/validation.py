@@ -6,8 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.decision_band import LENGTH_S, DecisionBand
+from pipelines.diagnosis.evidence.noise_floor import noise_floor
 from pipelines.diagnosis.evidence.noise_model import NoiseModel
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit.held_out import evaluate
@@ -30,6 +32,12 @@ class Validated:
         """Evaluate a fit on the validation runs."""
         residuals = tuple(evaluate(made, validate, baseline))
         return cls(made, validate, residuals, errors_of(validate, residuals))
+
+    @property
+    def leaves_more_than_noise(self) -> bool:
+        """Whether the error of some joint is above the noise floor."""
+        floor = noise_floor(self.runs, self.residuals).rms[: len(self.errors.rms)]
+        return bool(np.any(self.errors.rms > CRITERIA.at_floor * floor))
 
 
 def without_each(

@@ -8,6 +8,7 @@ from scipy.special import expit, logit
 from pipelines.diagnosis.candidates.auxiliary_evidence import auxiliary_evidence
 from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.candidates.library import Library, build_library, silent
+from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.prepared_runs import Prepared, prepare
 from pipelines.diagnosis.evidence.residual_shares import ResidualShares, residual_shares
 from pipelines.diagnosis.selection.answer import Answer, Named, answer_of
@@ -28,7 +29,10 @@ Report = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class Selected:
-    """What the evidence says: of the training runs at first, then after what the validation runs charge."""
+    """What the evidence says: of the training runs at first, then after what the validation runs charge.
+
+    Where the training runs show nothing and the validation runs more than noise, the evidence is of all runs.
+    """
 
     library: Library | None
     """None where faults of acquisition keep physics from being looked at."""
@@ -47,12 +51,27 @@ class Selected:
     """What the validation runs take from log odds, by variant of a cause: its harm, or how far it falls behind the best
     of its ties, which has zero."""
 
+    by_all: int | None = None
+    """How many of the runs were to train on, where the evidence is of all; else None."""
+
+    @property
+    def shows_something(self) -> bool:
+        """Whether it is more likely than not that something is missing."""
+        return 1.0 - self.answer.nothing >= CRITERIA.likely
+
+    def trained_on(self, runs: int, router: tuple[ResidualShares, ...]) -> "Selected":
+        """Return evidence of all runs as one whose causes are fitted to the first ``runs`` of them."""
+        return replace(self, by_all=runs, router=router)
+
     @property
     def candidates(self) -> tuple[Candidate, ...]:
-        """The named causes at their most probable shapes."""
-        if self.library is None:
-            return ()
-        return tuple(self.library.causes[one.element.place].candidate for one in self.answer.named)
+        """The named causes at their most probable shapes, in the training runs."""
+        return tuple(self._candidate(one.element) for one in self.answer.named)
+
+    def _candidate(self, element: Element) -> Candidate:
+        assert self.library is not None
+        candidate = self.library.causes[element.place].candidate
+        return replace(candidate, shapes=candidate.shapes[: self.by_all])
 
     @property
     def doubted(self) -> frozenset[str]:
@@ -86,13 +105,12 @@ class Selected:
 
         A cause whose size each run has for itself is not compared: a validation run fits its own.
         """
-        assert self.library is not None
         one = self.answer.named[number]
         if one.element.variant in self.charged or one.element.sized_each_run:
             return {}
         ties = [self._best_shape(label, one) for label, _ in one.ties]
         return {
-            tie.variant: self.library.causes[tie.place].candidate
+            tie.variant: self._candidate(tie)
             for tie in ties
             if tie.variant not in self.charged and not tie.sized_each_run
         }

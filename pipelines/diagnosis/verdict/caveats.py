@@ -33,7 +33,7 @@ def caveats(d: Diagnosis) -> list[str]:
     doubtful = [] if d.data.spoilt else [*_high_floor(d), *d.upside_down]
     return [
         *known, *_at_ends(d), *_default_length(d), *[noisy] * d.data.noisy_angles, *_unrealizable(d), *doubtful,
-        *(_reversal(d, one) for one in d.reversals), *_differs(d), *_one_run(d), *_one_kind(d),
+        *(_reversal(d, one) for one in d.reversals), *_by_all_runs(d), *_differs(d), *_one_run(d), *_one_kind(d),
     ]  # fmt: skip
 
 
@@ -103,6 +103,19 @@ def _reversal(d: Diagnosis, one: BuildUp) -> str:
         f"play between encoder and friction. The model ignores it: the {joint.effort} error within "
         f"{NEAR_S:g} s of reversals is {before}, {after} with such a travel"
     )
+
+
+def _by_all_runs(d: Diagnosis) -> list[str]:
+    """Say where the training runs alone show nothing, so that the validation runs helped to find what is missing."""
+    if d.selected.by_all is None:
+        return []
+    said = "the training runs alone show nothing missing; what is said here is by all runs together"
+    if d.causes:
+        said += (
+            ". The causes are fitted to the training runs, but their gain is measured on runs that helped to find "
+            "them: record another run to validate on"
+        )
+    return [said]
 
 
 def _differing(d: Diagnosis) -> dict[str, tuple[float, float]]:

@@ -31,8 +31,7 @@ def summary(d: Diagnosis, causes: list[dict[str, Any]], left: Unexplained | None
 
 def _noise_without_periods(d: Diagnosis) -> str:
     """Say which noise is estimated otherwise than from the differences of periods."""
-    assert d.selected.library is not None
-    weighed, floor = d.selected.library.prepared.noise.from_periods, d.floor.from_periods
+    weighed, floor = d.prepared.noise.from_periods, d.floor.from_periods
     if weighed and floor:
         return ""
     if floor:
