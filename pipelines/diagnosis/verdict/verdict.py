@@ -36,6 +36,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "summary": summary(d, causes, left),
         "finding": None if d.data.spoilt else finding_in_words(d, causes, left),
         "findings": findings(d),
+        "sought_on": "train" if d.selected.by_all is None else "all",
         "router": {joint.name: shares.as_json() for joint, shares in zip(joints, d.selected.router, strict=True)},
         "posterior": _posterior(d),
         "acquisition_at_fault": bool(d.data.spoilt),
