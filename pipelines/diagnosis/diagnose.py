@@ -33,7 +33,7 @@ def diagnose(motions: Sequence[Motion], report: Report = silent, known: Sequence
 
     The search, shapes and shared parameters use ``train`` runs only. The ``validate`` runs measure
     every error. They may lower the probability of a cause that does harm there, and decide between ties.
-    Where that leaves nothing missing, and the validation runs have an error above the noise, causes are
+    Where that leaves no cause named, and the validation runs have an error above the noise, causes are
     sought on all runs; they are fitted to the training runs still.
 
     Parameters
@@ -56,17 +56,22 @@ def diagnose(motions: Sequence[Motion], report: Report = silent, known: Sequence
     selected = nothing_selected(prepared) if data.spoilt else select(prepared, report)
     report(FIT_SHARE, "fit")
     judged = judged_fit(selected, prepared, before)
-    if not (data.spoilt or judged.selected.shows_something) and before.leaves_more_than_noise:
+    if not (data.spoilt or judged.selected.answer.named) and before.leaves_more_than_noise:
         judged = _by_all_runs(data, prepared, judged)
     return _diagnosis(data, prepared, judged)
 
 
 def _by_all_runs(data: TrainingData, prepared: Prepared, judged: JudgedFit) -> JudgedFit:
-    """Return what all runs together show, fitted to the training runs; what was there where they show nothing."""
+    """Return what all runs together show, fitted to the training runs, where they show more than these alone.
+
+    More than nothing is anything; more than an unlisted law are listed causes that leave nothing unlisted.
+    """
     validate = (like_trained(run, data.baseline) for run in data.validate)
     selected = select(prepare((*data.train, *validate), data.baseline))
     by_all = judged_fit(selected.trained_on(len(data.train), judged.selected.router), prepared, judged.before)
-    return by_all if by_all.selected.shows_something else judged
+    shown = by_all.selected
+    more = shown.is_listed if judged.selected.shows_something else shown.shows_something
+    return by_all if more else judged
 
 
 def _diagnosis(data: TrainingData, prepared: Prepared, judged: JudgedFit) -> Diagnosis:

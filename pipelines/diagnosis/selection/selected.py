@@ -59,6 +59,11 @@ class Selected:
         """Whether it is more likely than not that something is missing."""
         return 1.0 - self.answer.nothing >= CRITERIA.likely
 
+    @property
+    def is_listed(self) -> bool:
+        """Whether causes are named, and nothing unlisted is likely beside them."""
+        return bool(self.answer.named) and self.answer.unlisted < CRITERIA.likely
+
     def trained_on(self, runs: int, router: tuple[ResidualShares, ...]) -> "Selected":
         """Return evidence of all runs as one whose causes are fitted to the first ``runs`` of them."""
         return replace(self, by_all=runs, router=router)

@@ -106,10 +106,10 @@ def _reversal(d: Diagnosis, one: BuildUp) -> str:
 
 
 def _by_all_runs(d: Diagnosis) -> list[str]:
-    """Say where the training runs alone show nothing, so that the validation runs helped to find what is missing."""
+    """Say where the training runs alone name nothing, so that the validation runs helped to find what is missing."""
     if d.selected.by_all is None:
         return []
-    said = "the training runs alone show nothing missing; what is said here is by all runs together"
+    said = "the training runs alone do not tell what is missing; what is said here is by all runs together"
     if d.causes:
         said += (
             ". The causes are fitted to the training runs, but their gain is measured on runs that helped to find "
