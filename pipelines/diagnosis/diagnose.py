@@ -33,8 +33,8 @@ def diagnose(motions: Sequence[Motion], report: Report = silent, known: Sequence
 
     The search, shapes and shared parameters use ``train`` runs only. The ``validate`` runs measure
     every error. They may lower the probability of a cause that does harm there, and decide between ties.
-    Where that leaves no cause named, and the validation runs have an error above the noise, causes are
-    sought on all runs; they are fitted to the training runs still.
+    Where what is named leaves an error above the noise there, causes are sought on all runs; they are
+    fitted to the training runs still.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def diagnose(motions: Sequence[Motion], report: Report = silent, known: Sequence
     selected = nothing_selected(prepared) if data.spoilt else select(prepared, report)
     report(FIT_SHARE, "fit")
     judged = judged_fit(selected, prepared, before)
-    if not (data.spoilt or judged.selected.answer.named) and before.leaves_more_than_noise:
+    if not data.spoilt and judged.after.leaves_more_than_noise:
         judged = _by_all_runs(data, prepared, judged)
     return _diagnosis(data, prepared, judged)
 
@@ -64,14 +64,18 @@ def diagnose(motions: Sequence[Motion], report: Report = silent, known: Sequence
 def _by_all_runs(data: TrainingData, prepared: Prepared, judged: JudgedFit) -> JudgedFit:
     """Return what all runs together show, fitted to the training runs, where they show more than these alone.
 
-    More than nothing is anything; more than an unlisted law are listed causes that leave nothing unlisted.
+    More than nothing is anything; more than something are other listed causes that leave nothing unlisted.
     """
+    first = judged.selected
     validate = (like_trained(run, data.baseline) for run in data.validate)
-    selected = select(prepare((*data.train, *validate), data.baseline))
-    by_all = judged_fit(selected.trained_on(len(data.train), judged.selected.router), prepared, judged.before)
-    shown = by_all.selected
-    more = shown.is_listed if judged.selected.shows_something else shown.shows_something
-    return by_all if more else judged
+    selected = select(prepare((*data.train, *validate), data.baseline)).instead_of(first, len(data.train))
+    by_all = judged_fit(selected, prepared, judged.before)
+    found = by_all.selected
+    if first.shows_something:
+        tells_more = found.is_listed and set(found.answer.labels) != set(first.answer.labels)
+    else:
+        tells_more = found.shows_something
+    return by_all if tells_more else judged
 
 
 def _diagnosis(data: TrainingData, prepared: Prepared, judged: JudgedFit) -> Diagnosis:

@@ -76,7 +76,7 @@ class Diagnosis:
     @property
     def causes(self) -> tuple[str, ...]:
         """Labels of the named causes."""
-        return tuple(one.element.label for one in self.named)
+        return self.selected.answer.labels
 
     @property
     def status(self) -> str:

@@ -22,7 +22,7 @@ from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.evidence.baseline import baseline_of
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.diagnosis.evidence.order_tracking import lines_in
-from pipelines.diagnosis.evidence.prepared_runs import Prepared, _at_full_rate, prepare
+from pipelines.diagnosis.evidence.prepared_runs import Prepared, prepare
 from pipelines.diagnosis.selection.evidence import Evidence, _stack
 from pipelines.diagnosis.selection.posterior import posterior
 from pipelines.effects import EFFECTS
@@ -121,7 +121,7 @@ def order_rows(motions: Sequence[Motion]) -> Iterator[Row]:
     """Order tracking of four runs, without lines and with four at one joint."""
     runs = [observe(motion) for motion in motions]
     prepared = prepare(runs, baseline_of(runs))
-    left = _at_full_rate(prepared.runs, prepared.baseline, prepared.values)
+    left = [run.motion.torque - x for run, x in zip(prepared.runs, prepared.predicted, strict=True)]
     ripple = [sum(0.5 * np.sin(n * m.q[:, 1]) for n in (35.0, 88.3, 200.0, 351.0)) for m in motions]
     rippled = [np.column_stack([x[:, 0], x[:, 1] + r]) for x, r in zip(left, ripple, strict=True)]
     for name, residuals in (("no line", left), ("four lines at a joint", rippled)):

@@ -104,21 +104,17 @@ def test_a_floor_that_no_repetition_shows_is_said_to_be_an_estimate(stuck):
     short = replace(stuck, floor=replace(stuck.floor, from_periods=False))
     estimate = ", so the noise floor is estimated from the band above the motion."
     assert f"No validation run holds two periods{estimate}" in verdict(short)["summary"]
-    prepared = stuck.selected.library.prepared
+    prepared = stuck.prepared
     untold = replace(prepared, noise=replace(prepared.noise, from_periods=False))
-    weighed = replace(stuck, selected=with_prepared(stuck, untold))
+    weighed = replace(stuck, prepared=untold)
     assert "No training run holds two periods" in verdict(weighed)["summary"]
-    neither = replace(short, selected=with_prepared(stuck, untold))
+    neither = replace(short, prepared=untold)
     assert f"No run holds two periods{estimate}" in verdict(neither)["summary"]
     runs = tuple(without_a_period(run) for run in stuck.train)
-    selected = with_prepared(stuck, replace(untold, runs=runs))
+    untold = replace(untold, runs=runs)
     before = replace(stuck.before, runs=[without_a_period(run) for run in stuck.validate])
-    told = verdict(replace(short, selected=selected, before=before))["summary"]
+    told = verdict(replace(short, prepared=untold, before=before))["summary"]
     assert f"No recording names a period{estimate}" in told
-
-
-def with_prepared(d, prepared):
-    return replace(d.selected, library=replace(d.selected.library, prepared=prepared))
 
 
 def without_a_period(run):

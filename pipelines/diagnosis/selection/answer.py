@@ -39,6 +39,11 @@ class Answer:
     """Probability that an unlisted law is missing."""
 
     @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels of all that is named, the most probable first."""
+        return tuple(one.element.label for one in self.named)
+
+    @property
     def members(self) -> frozenset[str]:
         """Labels of all that is named, and of the ties."""
         return frozenset(label for one in self.named for label in one.members)

@@ -28,10 +28,20 @@ Report = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
+class ByAll:
+    """That causes were sought on all runs, and why."""
+
+    trained: int
+    """How many runs are to train on: the first ones."""
+    named_before: tuple[str, ...]
+    """Labels that these alone name."""
+
+
+@dataclass(frozen=True)
 class Selected:
     """What the evidence says: of the training runs at first, then after what the validation runs charge.
 
-    Where the training runs show nothing and the validation runs more than noise, the evidence is of all runs.
+    Where what the training runs name leaves more than noise on the validation runs, the evidence is of all runs.
     """
 
     library: Library | None
@@ -51,8 +61,8 @@ class Selected:
     """What the validation runs take from log odds, by variant of a cause: its harm, or how far it falls behind the best
     of its ties, which has zero."""
 
-    by_all: int | None = None
-    """How many of the runs were to train on, where the evidence is of all; else None."""
+    by_all: "ByAll | None" = None
+    """None where the evidence is of the training runs."""
 
     @property
     def shows_something(self) -> bool:
@@ -64,9 +74,9 @@ class Selected:
         """Whether causes are named, and nothing unlisted is likely beside them."""
         return bool(self.answer.named) and self.answer.unlisted < CRITERIA.likely
 
-    def trained_on(self, runs: int, router: tuple[ResidualShares, ...]) -> "Selected":
-        """Return evidence of all runs as one whose causes are fitted to the first ``runs`` of them."""
-        return replace(self, by_all=runs, router=router)
+    def instead_of(self, first: "Selected", trained: int) -> "Selected":
+        """Return what all runs show, the ``trained`` first of them to fit to, after what these alone showed."""
+        return replace(self, by_all=ByAll(trained, first.answer.labels), router=first.router)
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
@@ -76,7 +86,7 @@ class Selected:
     def _candidate(self, element: Element) -> Candidate:
         assert self.library is not None
         candidate = self.library.causes[element.place].candidate
-        return replace(candidate, shapes=candidate.shapes[: self.by_all])
+        return replace(candidate, shapes=candidate.shapes[: self.by_all.trained]) if self.by_all else candidate
 
     @property
     def doubted(self) -> frozenset[str]:

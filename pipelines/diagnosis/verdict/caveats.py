@@ -6,6 +6,7 @@ from pipelines.contracts.joints import the
 from pipelines.diagnosis.candidates.shape_refinement import reach
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fit.presliding_test import NEAR_S, BuildUp
+from pipelines.diagnosis.verdict.findings_in_words import label_in_words
 from pipelines.effects import PreslidingHysteresis
 from pipelines.estimation.angle_noise import CUTOFF_HZ, IN_WORDS
 from pipelines.label import amount
@@ -106,10 +107,15 @@ def _reversal(d: Diagnosis, one: BuildUp) -> str:
 
 
 def _by_all_runs(d: Diagnosis) -> list[str]:
-    """Say where the training runs alone name nothing, so that the validation runs helped to find what is missing."""
-    if d.selected.by_all is None:
+    """Say that the validation runs helped to find what is missing, and why."""
+    by_all = d.selected.by_all
+    if by_all is None:
         return []
-    said = "the training runs alone do not tell what is missing; what is said here is by all runs together"
+    before = " and ".join(label_in_words(label, d.baseline.machine) for label in by_all.named_before)
+    said = (
+        f"by the training runs alone {f'{before} would be named' if before else 'no cause would be named'}, which "
+        "leaves an error above the noise on the validation runs. What is said here is by all runs together"
+    )
     if d.causes:
         said += (
             ". The causes are fitted to the training runs, but their gain is measured on runs that helped to find "
