@@ -64,7 +64,8 @@ def diagnose(motions: Sequence[Motion], report: Report = silent, known: Sequence
 def _by_all_runs(data: TrainingData, prepared: Prepared, judged: JudgedFit) -> JudgedFit:
     """Return what all runs together show, fitted to the training runs, where they show more than these alone.
 
-    More than nothing is anything; more than something are other listed causes that leave nothing unlisted.
+    More than nothing is anything; more than something are other listed causes that leave nothing unlisted and, fitted
+    to the training runs, predict the validation runs better.
     """
     first = judged.selected
     validate = (like_trained(run, data.baseline) for run in data.validate)
@@ -72,7 +73,8 @@ def _by_all_runs(data: TrainingData, prepared: Prepared, judged: JudgedFit) -> J
     by_all = judged_fit(selected, prepared, judged.before)
     found = by_all.selected
     if first.shows_something:
-        tells_more = found.is_listed and set(found.answer.labels) != set(first.answer.labels)
+        others = found.is_listed and set(found.answer.labels) != set(first.answer.labels)
+        tells_more = others and by_all.log_likelihood(prepared.noise) > judged.log_likelihood(prepared.noise)
     else:
         tells_more = found.shows_something
     return by_all if tells_more else judged

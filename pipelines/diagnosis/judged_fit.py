@@ -7,6 +7,7 @@ import numpy as np
 from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.baseline import like_trained, with_load
+from pipelines.diagnosis.evidence.noise_model import NoiseModel
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
 from pipelines.diagnosis.fit.joint_refinement import Refinement
 from pipelines.diagnosis.fit.validation import Validated, log_likelihoods, without_each
@@ -37,6 +38,10 @@ class JudgedFit:
     """The baseline with the named causes."""
     without: dict[str, Validated]
     """The named causes less one, by that cause's label."""
+
+    def log_likelihood(self, noise: NoiseModel) -> float:
+        """Return the log likelihood of the validation runs, up to a constant."""
+        return float(log_likelihoods(self.after, noise).sum())
 
 
 def judged_fit(selected: Selected, prepared: Prepared, before: Validated) -> JudgedFit:

@@ -12,8 +12,10 @@ from pipelines.signals.welch import Welch
 WINDOW_S = 10.0
 NOISE_BAND = (0.6, 0.96)
 """Share of the Nyquist frequency where an angle holds nothing but noise."""
-HIGHEST_SHARE = 0.125
-"""Of the Nyquist frequency: above it there is only what sticking joints do at reversals, which no fit uses."""
+HIGHEST_HZ = 12.5
+"""Above it there is only what sticking joints do at reversals, which no fit uses."""
+HIGHEST_SHARE = (0.125, 0.25)
+"""Of the Nyquist frequency: the highest cut-off is between the two, whatever its frequency in Hz."""
 SLOW_SHARE = 0.9999
 """Of the signal's power: the motion itself, which the filter must leave alone."""
 BEFORE_NOISE = 0.7
@@ -70,7 +72,8 @@ def choose_cutoff(pieces: Iterable[NDArray], samples: int, rate_hz: float, chann
     for piece in pieces:
         welch.add(piece)
     found = [spectrum(welch.frequency_hz, density, rate_hz) for density in welch.density.T]
-    highest = HIGHEST_SHARE * rate_hz / 2
+    least, most = (share * rate_hz / 2 for share in HIGHEST_SHARE)
+    highest = min(max(HIGHEST_HZ, least), most)
     noisiest = int(np.argmin([s.meets_floor_hz for s in found]))
     meets = found[noisiest].meets_floor_hz
     fastest = int(np.argmax([s.motion_hz for s in found]))
@@ -80,5 +83,5 @@ def choose_cutoff(pieces: Iterable[NDArray], samples: int, rate_hz: float, chann
     if chosen < needed:
         return Cutoff(needed, f"{said}, but the {channels[fastest]} moves at up to {needed / 2:.1f} Hz")
     if chosen > highest:
-        return Cutoff(highest, f"{said}; above a sixteenth of the sample rate is only what reversals leave")
+        return Cutoff(highest, f"{said}; above {highest:g} Hz is only what reversals leave")
     return Cutoff(max(chosen, 2.0 * rate_hz / samples), f"{said}; in acceleration noise outweighs signal before that")

@@ -42,6 +42,14 @@ def test_the_cutoff_lies_above_the_highest_harmonic_and_below_a_sixteenth_of_the
     assert chosen.reason.startswith("the hip angle's spectrum meets its noise floor")
 
 
+@pytest.mark.parametrize(("rate_hz", "highest"), [(50.0, 6.25), (100.0, 12.5), (200.0, 12.5), (500.0, 31.25)])
+def test_slow_recordings_keep_what_fast_ones_keep_up_to_an_eighth_of_their_rate(rate_hz, highest):
+    """At 100 Hz a cut-off of 6 Hz would smear the steps of friction beyond the samples that are left out."""
+    time = np.arange(0.0, 60.0, 1.0 / rate_hz)
+    corners = np.abs(np.sin(2 * np.pi * 0.5 * time)) ** 1.5
+    assert choose_cutoff(corners[:, None], rate_hz, ("hip",)).hz == pytest.approx(highest)
+
+
 def test_the_noisier_joint_decides():
     rng = np.random.default_rng(0)
     both = np.column_stack([moving(), moving()])

@@ -23,7 +23,7 @@ TRIED = 2.0 * REACH * (1.0 / FINEST - 1.0 / COARSEST)
 
 
 def rounding(torque: NDArray, step: float) -> NDArray:
-    """Return what rounding to multiples of a step adds to a torque, N·m."""
+    """Return what rounding to multiples of a step adds to a torque (n,), N·m."""
     return step * np.round(torque / step) - torque
 
 
