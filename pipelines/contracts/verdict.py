@@ -94,14 +94,15 @@ class Likely(_Object):
     probability: Probability
     words: str
     dropped: bool
-    """Whether the training runs would name it, and the validation runs speak against it."""
+    """Whether the runs that were searched would name it, and the validation runs speak against it."""
 
 
 class Law(_Object):
     """An unlisted law that a finding could be."""
 
     law: str
-    joint: str
+    joint: str | None
+    """Null of a law of no single joint."""
     probability: Probability
     words: str
 
@@ -222,7 +223,9 @@ class Verdict(_Object):
     """The summary without what it says of acquisition and of the floor; None where acquisition is at fault."""
     acquisition_at_fault: bool = False
     findings: list[Finding] = []
-    """Empty where nothing is missing; files of older versions lack it, as they do the next two."""
+    """Empty where nothing is missing; files of older versions lack it, as they do the next three."""
+    sought_on: Literal["train", "all"] = "train"
+    """The runs that causes were sought on; files of older versions lack it."""
     router: dict[str, Shares] = {}
     posterior: Posterior | None = None
     """None where acquisition is at fault."""

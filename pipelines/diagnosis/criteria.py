@@ -43,7 +43,7 @@ class Criteria:
     further: float = -1.6
     """Prior log odds of each element beyond the first."""
     searched: float = -0.663
-    """Log odds per log number of the values among which a wave, a tone or an onset was sought."""
+    """Log odds per log number of the values among which a wave, a tone, an onset or a step was sought."""
     each_run: float = -2.57
     """Log odds of a cause whose value is another in every run."""
     worn: float = -4.84
@@ -61,6 +61,9 @@ class Criteria:
     """Share of the named cause's probability from which another cause is its tie."""
     at_floor: float = 1.03
     """RMSE over noise floor up to which a joint has no systematic error (contracts.md)."""
+    predicted_better: float = 1.0
+    """Log likelihood of the validation runs that an answer by all runs gains at least: less is not worth more than a
+    bare mention (Kass and Raftery, 1995, J. Am. Statist. Assoc. 90(430))."""
     left_of_explained: float = 0.2
     """Largest share of the systematic power that is left at a joint which counts as explained (contracts.md)."""
 
@@ -69,14 +72,14 @@ BEFORE_EVIDENCE = ("explained_share", "form_misfit", "shape_freedom")
 """Criteria that act before the evidence of a session is stored."""
 HELD = (
     *BEFORE_EVIDENCE, "model_error", "background_line", "each_run", "lines", "base_rate",
-    "likely", "tied", "at_floor", "left_of_explained",
+    "likely", "tied", "at_floor", "predicted_better", "left_of_explained",
 )  # fmt: skip
 """What is not learned. The first three act before the evidence is stored. The mixture of the sessions decides the
 base rate. Under a larger model error a second cause beside a large one is lost, and learning tells no difference over
 a factor of three. Nor does it over a factor of thirty in `lines`. Good drives ripple by a percent of their torque;
 too few sessions have such drives, and learned alone `background_line` called their ripple missing. Too few have
-sensors that are tared anew at each start, which labs have: `each_run` is of sessions that had more. The last four
-decide what is told of the probabilities and errors, and change none of them."""
+sensors that are tared anew at each start, which labs have: `each_run` is of sessions that had more. The last five
+decide what is told of the probabilities and errors, and whether it is by all runs."""
 
 LEARNED = """\
 They were learned from 335 sessions of seeds from 210000 on. Learned anew from 177 sessions whose evidence was stored by

@@ -4,16 +4,16 @@
 2. *Library*: every cause and every unlisted law as columns of one regression.
 3. *Posterior*: how probable each set of causes and laws is.
 4. *Fit*: the named causes with the baseline, their shapes refined.
-5. *Validation*: errors and gains on runs that no fit has seen.
+5. *Validation*: errors and gains on runs that no fit has seen. Where these have an error above the noise, steps 2 to 5
+   are repeated with causes sought on all runs.
 """
 
 from collections.abc import Sequence
 
 from pipelines.diagnosis.candidates.library import silent
+from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.evidence.baseline import like_trained
 from pipelines.diagnosis.evidence.model_error import imperfection
-from pipelines.diagnosis.evidence.noise_floor import noise_floor
 from pipelines.diagnosis.evidence.prepared_runs import Prepared, prepare
 from pipelines.diagnosis.fit import parameter_rows
 from pipelines.diagnosis.fit.presliding_test import built_up
@@ -57,31 +57,35 @@ def diagnose(motions: Sequence[Motion], report: Report = silent, known: Sequence
     report(FIT_SHARE, "fit")
     judged = judged_fit(selected, prepared, before)
     if not data.spoilt and judged.after.leaves_more_than_noise:
-        judged = _by_all_runs(data, prepared, judged)
+        judged = _by_all_runs(data, prepared, judged, report)
     return _diagnosis(data, prepared, judged)
 
 
-def _by_all_runs(data: TrainingData, prepared: Prepared, judged: JudgedFit) -> JudgedFit:
+def _by_all_runs(data: TrainingData, prepared: Prepared, judged: JudgedFit, report: Report) -> JudgedFit:
     """Return what all runs together show, fitted to the training runs, where they show more than these alone.
 
-    More than nothing is anything; more than something are other listed causes that leave nothing unlisted and, fitted
-    to the training runs, predict the validation runs better.
+    Its causes must predict the validation runs better. Where the training runs show something, all runs must name
+    other listed causes, and leave nothing unlisted.
     """
     first = judged.selected
-    validate = (like_trained(run, data.baseline) for run in data.validate)
-    selected = select(prepare((*data.train, *validate), data.baseline)).instead_of(first, len(data.train))
-    by_all = judged_fit(selected, prepared, judged.before)
-    found = by_all.selected
-    if first.shows_something:
-        others = found.is_listed and set(found.answer.labels) != set(first.answer.labels)
-        tells_more = others and by_all.log_likelihood(prepared.noise) > judged.log_likelihood(prepared.noise)
-    else:
-        tells_more = found.shows_something
-    return by_all if tells_more else judged
+    found = select(prepare((*data.train, *data.validate), data.baseline), _in_the_rest(report))
+    by_all = judged_fit(found.as_all_runs_search(first, len(data.train)), prepared, judged.before)
+    now = by_all.selected
+    if not now.answer.named:
+        return judged if first.shows_something or not now.shows_something else by_all
+    others = now.answer.variants != first.answer.variants
+    shows_more = others and now.names_all if first.shows_something else True
+    predicts_better = by_all.log_likelihood > judged.log_likelihood + CRITERIA.predicted_better
+    return by_all if shows_more and predicts_better else judged
+
+
+def _in_the_rest(report: Report) -> Report:
+    """Return a report whose shares lie between the fit and the end."""
+    return lambda share, what: report(FIT_SHARE + (1.0 - FIT_SHARE) * share, what)
 
 
 def _diagnosis(data: TrainingData, prepared: Prepared, judged: JudgedFit) -> Diagnosis:
-    """Measure what is named on the validation runs."""
+    """Put the result together: intervals, parameters, simulation errors, reversals."""
     baseline, before, after = data.baseline, judged.before, judged.after
     validate = before.runs
     known = uncertainty(after.fit, prepared.runs, baseline, imperfection(prepared.runs))
@@ -91,7 +95,7 @@ def _diagnosis(data: TrainingData, prepared: Prepared, judged: JudgedFit) -> Dia
     residuals = {"baseline": before.residuals, "extended": after.residuals}
     reversals = [] if data.spoilt else built_up(after.fit, baseline, prepared.runs, validate)
     return Diagnosis(
-        data, prepared, judged.selected, before, after, judged.without, noise_floor(validate, after.residuals), known,
+        data, prepared, judged.selected, before, after, judged.without, after.floor, known,
         parameters, covariance, parameter_rows.residual_table(validate, residuals), tuple(reversals),
         {"baseline": drift, "extended": after_drift},
     )  # fmt: skip

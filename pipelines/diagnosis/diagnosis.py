@@ -84,8 +84,7 @@ class Diagnosis:
         if self.data.spoilt:
             return "unknown_cause"
         if not self.named:
-            missing = 1.0 - self.selected.answer.nothing >= CRITERIA.likely
-            return "unknown_cause" if missing else "nothing_missing"
+            return "unknown_cause" if self.selected.shows_something else "nothing_missing"
         left = [share for share in self.unexplained if share is not None]
         is_gone = all(share <= CRITERIA.left_of_explained for share in left)
         more = any(one.level != "cause" for one in self.selected.findings)

@@ -6,8 +6,7 @@ import numpy as np
 
 from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.criteria import CRITERIA
-from pipelines.diagnosis.evidence.baseline import like_trained, with_load
-from pipelines.diagnosis.evidence.noise_model import NoiseModel
+from pipelines.diagnosis.evidence.baseline import with_load
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
 from pipelines.diagnosis.fit.joint_refinement import Refinement
 from pipelines.diagnosis.fit.validation import Validated, log_likelihoods, without_each
@@ -18,8 +17,7 @@ from pipelines.diagnosis.training_data import TrainingData
 
 def baseline_alone(data: TrainingData, prepared: Prepared) -> Validated:
     """Return the baseline without causes, fitted, and measured on the validation runs."""
-    validate = (like_trained(run, data.baseline) for run in data.validate)
-    laden = tuple(with_load(run, data.baseline, prepared.values) for run in validate)
+    laden = tuple(with_load(run, data.baseline, prepared.values) for run in data.validate)
     return Validated.of(_refinement(prepared)(()), laden, data.baseline)
 
 
@@ -29,7 +27,7 @@ def _refinement(prepared: Prepared) -> Refinement:
 
 @dataclass(frozen=True)
 class JudgedFit:
-    """What training and validation runs leave named, fitted to the training runs."""
+    """The named causes after judging, fitted to the training runs."""
 
     selected: Selected
     before: Validated
@@ -38,14 +36,12 @@ class JudgedFit:
     """The baseline with the named causes."""
     without: dict[str, Validated]
     """The named causes less one, by that cause's label."""
-
-    def log_likelihood(self, noise: NoiseModel) -> float:
-        """Return the log likelihood of the validation runs, up to a constant."""
-        return float(log_likelihoods(self.after, noise).sum())
+    log_likelihood: float
+    """Of the validation runs, up to a constant."""
 
 
 def judged_fit(selected: Selected, prepared: Prepared, before: Validated) -> JudgedFit:
-    """Judge the named causes on the validation runs, until those that are left stand.
+    """Fit the named causes, and judge them on the validation runs until no charge is left.
 
     The most harmful cause is charged first: beside it, what others do may seem to harm too. Of causes
     that the training runs cannot tell apart, those are charged that predict the validation runs worse
@@ -66,7 +62,7 @@ def judged_fit(selected: Selected, prepared: Prepared, before: Validated) -> Jud
         elif shortfalls := _shortfalls(selected, after, refine, prepared, before):
             selected = selected.judged(shortfalls)
         else:
-            return JudgedFit(selected, before, after, without)
+            return JudgedFit(selected, before, after, without, float(whole.sum()))
 
 
 def _shortfalls(

@@ -7,7 +7,7 @@ import numpy as np
 
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.data_faults import Fault, excluding, find_faults
-from pipelines.diagnosis.evidence.baseline import Baseline, baseline_of
+from pipelines.diagnosis.evidence.baseline import Baseline, baseline_of, like_trained
 from pipelines.diagnosis.evidence.downsampling import thinned
 from pipelines.diagnosis.evidence.eligibility import refuse_unfit
 from pipelines.diagnosis.evidence.known_effects import known_effects
@@ -67,7 +67,8 @@ def training_data(motions: Sequence[Motion], known: Sequence[str] = ()) -> Train
     train, validate = (_of(runs, purpose) for purpose in WHY)
     if not any(fault.spoils for fault in faults):
         _refuse_unknown_noise(validate, faults)
-    return TrainingData(train, validate, baseline_of(train, effects), faults, noisy)
+    baseline = baseline_of(train, effects)
+    return TrainingData(train, tuple(like_trained(run, baseline) for run in validate), baseline, faults, noisy)
 
 
 def _of(runs: Sequence[Run], purpose: str) -> tuple[Run, ...]:

@@ -13,9 +13,10 @@ WINDOW_S = 10.0
 NOISE_BAND = (0.6, 0.96)
 """Share of the Nyquist frequency where an angle holds nothing but noise."""
 HIGHEST_HZ = 12.5
-"""Above it there is only what sticking joints do at reversals, which no fit uses."""
+"""Highest cut-off, within the limits of ``HIGHEST_SHARE``: above it there is only what sticking joints do at reversals,
+which no fit uses."""
 HIGHEST_SHARE = (0.125, 0.25)
-"""Of the Nyquist frequency: the highest cut-off is between the two, whatever its frequency in Hz."""
+"""Limits of the highest cut-off, shares of the Nyquist frequency; they act above 200 Hz and below 100 Hz."""
 SLOW_SHARE = 0.9999
 """Of the signal's power: the motion itself, which the filter must leave alone."""
 BEFORE_NOISE = 0.7

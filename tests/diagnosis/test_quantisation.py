@@ -1,4 +1,4 @@
-"""A torque told in coarse steps: the step is found below noise, and told as something in the sensor."""
+"""A torque reported in coarse steps: the step is found below noise, and called something in the sensor."""
 
 from dataclasses import replace
 
@@ -13,17 +13,17 @@ from tests.diagnosis.sessions import session
 LABEL = "law:quantisation@hip"
 
 
-def told_in_steps(step, seed):
+def reported_in_steps(step, seed, noise=0.5):
     """Return a session whose hip's torque is rounded before its noise comes, as a drive's coarse current loop does."""
     motions = session(seed=seed)
     rng = np.random.default_rng(seed)
-    told = []
+    reported = []
     for motion in motions:
         torque = motion.torque.copy()
         torque[:, 0] += rounding(torque[:, 0], step)
-        torque[:, 0] += rng.normal(0.0, 0.5, len(torque))
-        told.append(replace(motion, torque=torque))
-    return told
+        torque[:, 0] += rng.normal(0.0, noise, len(torque))
+        reported.append(replace(motion, torque=torque))
+    return reported
 
 
 def test_rounding_takes_a_torque_to_the_nearest_multiple():
@@ -41,21 +41,40 @@ def test_the_step_is_found_below_noise_that_came_after_it(step):
     assert found == pytest.approx(step, rel=0.02)
 
 
-def test_a_residual_that_goes_against_every_rounding_has_no_step():
+def test_a_residual_that_is_always_zero_has_no_step():
     torque = np.linspace(-10.0, 10.0, 5000)
     assert coarse_step([torque], [np.zeros(5000)], 5.0) is None
+    assert coarse_step([np.zeros(5000)], [np.ones(5000)], 0.0) is None
+
+
+def test_the_step_of_a_torque_that_never_comes_near_zero_is_found():
+    """A lift holds its weight all along."""
+    torque = 80.0 + 5.0 * np.sin(np.linspace(0.0, 90.0, 8000))
+    assert coarse_step([torque], [rounding(torque, 3.0)], 3.5) == pytest.approx(3.0, rel=0.02)
+
+
+def test_samples_that_do_not_count_have_no_say():
+    """Spikes in a tenth of a session's samples, all of them marked as invalid."""
+    spoilt = []
+    for motion in reported_in_steps(4.0, seed=11):
+        torque, valid = motion.torque.copy(), motion.valid.copy()
+        bad = np.arange(len(torque)) % 200 < 20
+        torque[bad, 0] += 300.0 * np.sign(torque[bad, 0])
+        spoilt.append(replace(motion, torque=torque, valid=valid & ~bad))
+    assert verdict(diagnose(spoilt))["posterior"]["laws"].get(LABEL, 0.0) > 0.95
 
 
 def test_a_torque_in_coarse_steps_is_something_in_the_sensor():
-    said = verdict(diagnose(told_in_steps(4.0, seed=11)))
+    said = verdict(diagnose(reported_in_steps(4.0, seed=11)))
     assert said["status"] == "unknown_cause"
     (finding,) = said["findings"]
     assert (finding["joint"], finding["family"]) == ("hip", "sensor")
-    assert finding["laws"][0]["words"] == "a torque of the hip that is told in coarse steps"
+    assert finding["laws"][0]["words"] == "a torque of the hip that is reported in coarse steps"
     assert said["posterior"]["laws"][LABEL] > 0.95
 
 
-def test_steps_finer_than_the_noise_are_nothing():
-    said = verdict(diagnose(told_in_steps(0.4, seed=11)))
+def test_steps_that_the_noise_covers_are_nothing():
+    """1.5 N·m are within those that are sought; noise of 3 N·m is seven times what their rounding adds."""
+    said = verdict(diagnose(reported_in_steps(1.5, seed=11, noise=3.0)))
     assert said["status"] == "nothing_missing"
     assert said["posterior"]["laws"].get(LABEL, 0.0) < 0.05

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.contracts.verdict import Verdict
 from pipelines.diagnosis.candidates.smooth_laws import ACROSS, Spans, smooth_laws
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.verdict.verdict import verdict
@@ -60,6 +61,7 @@ def test_a_band_across_both_joints_is_one_unlisted_law_of_no_single_joint():
     (finding,) = said["findings"]
     assert (finding["joint"], finding["family"]) == (None, "angle")
     assert finding["laws"][0]["words"] == "an elastic torque across both joints"
+    assert Verdict.model_validate(said).findings[0].laws[0].joint is None
     assert said["posterior"]["laws"][LABEL] > 0.9
 
 

@@ -35,7 +35,7 @@ def test_more_noise_hides_more_of_the_signal():
     assert meets[0] > meets[1] > meets[2]
 
 
-def test_the_cutoff_lies_above_the_highest_harmonic_and_below_a_sixteenth_of_the_rate():
+def test_at_200_hz_the_cutoff_lies_above_the_highest_harmonic_and_below_a_sixteenth_of_the_rate():
     noise = 1e-5 * np.random.default_rng(0).standard_normal(len(TIME))
     chosen = choose_cutoff((moving() + noise)[:, None], RATE_HZ, ("hip",))
     assert 2.0 <= chosen.hz <= RATE_HZ / 16
@@ -43,7 +43,7 @@ def test_the_cutoff_lies_above_the_highest_harmonic_and_below_a_sixteenth_of_the
 
 
 @pytest.mark.parametrize(("rate_hz", "highest"), [(50.0, 6.25), (100.0, 12.5), (200.0, 12.5), (500.0, 31.25)])
-def test_slow_recordings_keep_what_fast_ones_keep_up_to_an_eighth_of_their_rate(rate_hz, highest):
+def test_the_highest_cutoff_is_12_5_hz_between_100_and_200_hz(rate_hz, highest):
     """At 100 Hz a cut-off of 6 Hz would smear the steps of friction beyond the samples that are left out."""
     time = np.arange(0.0, 60.0, 1.0 / rate_hz)
     corners = np.abs(np.sin(2 * np.pi * 0.5 * time)) ** 1.5

@@ -21,6 +21,7 @@ from pipelines.diagnosis.evidence.decision_band import LENGTH_S
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
+from pipelines.estimation.regression import away_from_reversals
 
 
 def law_rows(prepared: Prepared, regression: DecisionRegression) -> tuple[list[LawColumn], NDArray]:
@@ -64,16 +65,19 @@ def _hums(prepared: Prepared, joints: int) -> Iterator[tuple[list[LawColumn], li
 
 
 def _coarse_steps(prepared: Prepared, joints: int) -> Iterator[tuple[list[LawColumn], list[NDArray]]]:
-    """Yield the law and the column of each joint whose torque may be told in coarse steps."""
-    pairs = list(zip(prepared.runs, prepared.predicted, strict=True))
+    """Yield the law and the column of each joint whose torque may be reported in coarse steps."""
+    runs = prepared.runs
+    predicted = [run.slow(x) for run, x in zip(runs, prepared.predicted, strict=True)]
+    residual = [run.slow(np.nan_to_num(run.motion.torque)) - x for run, x in zip(runs, predicted, strict=True)]
+    usable = [run.motion.valid[:, np.newaxis] & away_from_reversals(run.motion) for run in runs]
     for j in range(joints):
         rms = float(prepared.torque[j])
-        left = [run.motion.torque[:, j] - x[:, j] for run, x in pairs]
-        step = coarse_step([x[:, j] for _, x in pairs], left, rms)
+        torque, left = ([x[u[:, j], j] for x, u in zip(one, usable, strict=True)] for one in (predicted, residual))
+        step = coarse_step(torque, left, rms)
         if step is None:
             continue
-        columns = [np.zeros((*run.measured.shape, 1)) for run in prepared.runs]
-        for column, (run, x) in zip(columns, pairs, strict=True):
+        columns = [np.zeros((*run.measured.shape, 1)) for run in runs]
+        for column, run, x in zip(columns, runs, predicted, strict=True):
             column[:, j, 0] = run.average(rounding(x[:, j], step)) * np.sqrt(12.0) / step * rms
         yield [LawColumn(QUANTISATION, j, "all", 1.0)], columns
 

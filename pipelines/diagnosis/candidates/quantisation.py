@@ -1,8 +1,9 @@
-"""A torque that is told in coarse steps: the step that a residual shows, and what rounding to it adds.
+"""A torque that is reported in coarse steps: the step that a residual shows, and what rounding to it adds.
 
-Rounding to multiples of a step h adds h round(x / h) - x to a torque x: a sawtooth over x. Its first harmonic,
--(h / pi) sin(2 pi x / h), is a line of known phase in the spectrum of the residual over the torque. So the step is
-found also where noise came after the rounding, and no value in the file lies on a grid.
+Rounding to multiples of a step h adds h round(x / h) - x to a torque x: a sawtooth over x, whose first harmonic is
+-(h / pi) sin(2 pi x / h) (Widrow and Kollar, 2008, Quantization Noise, chapter 4). So a step is a line of known phase
+in the spectrum of the residual over the torque. It is found also where noise came after the rounding, so that no value
+in the file lies on a grid.
 """
 
 from collections.abc import Sequence
@@ -13,9 +14,9 @@ from numpy.typing import NDArray
 FINEST, COARSEST = 0.1, 2.0
 """Steps that are sought, in units of the joint's rms torque. A finer one adds less than three percent of it."""
 REACH = 3.0
-"""Torque on either side of zero in which the step is sought, in the same unit."""
+"""Torque on either side of its median in which the step is sought, in the same unit."""
 BINS = 1024
-"""Of torque within that reach: over thirty in the finest step."""
+"""Of torque within that reach: 17 in the finest step."""
 PEAKS = 4
 """Steps tried within the width of a line."""
 TRIED = 2.0 * REACH * (1.0 / FINEST - 1.0 / COARSEST)
@@ -28,7 +29,7 @@ def rounding(torque: NDArray, step: float) -> NDArray:
 
 
 def coarse_step(torque: Sequence[NDArray], residual: Sequence[NDArray], rms: float) -> float | None:
-    """Return the step, N·m, by whose rounding a residual goes with the torque most; None where by none.
+    """Return the step whose rounding goes with the residual most, N·m; None where none does.
 
     Parameters
     ----------
@@ -38,9 +39,14 @@ def coarse_step(torque: Sequence[NDArray], residual: Sequence[NDArray], rms: flo
         The joint's torque, N·m.
     """
     x, left = np.concatenate(torque), np.concatenate(residual)
-    edges = np.linspace(-REACH * rms, REACH * rms, BINS + 1)
+    if not len(x) or not rms > 0.0:
+        return None
+    middle = float(np.median(x))
+    edges = middle + rms * np.linspace(-REACH, REACH, BINS + 1)
     counts, totals = np.histogram(x, edges)[0], np.histogram(x, edges, weights=left)[0]
-    per_step = np.linspace(1.0 / COARSEST, 1.0 / FINEST, round(PEAKS * TRIED)) / rms
+    # Far from zero the phase of a line turns faster with its step.
+    count = round(PEAKS * TRIED * (1.0 + abs(middle) / (REACH * rms)))
+    per_step = np.linspace(1.0 / COARSEST, 1.0 / FINEST, count) / rms
     waves = -np.sin(2.0 * np.pi * np.outer(per_step, 0.5 * (edges[1:] + edges[:-1])))
     along, size = waves @ totals, waves**2 @ counts
     explained = np.where(along > 0.0, along**2 / np.maximum(size, 1.0), 0.0)

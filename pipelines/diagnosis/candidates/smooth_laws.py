@@ -42,7 +42,7 @@ IN_WORDS = {
     "time": "a torque of {joint} that wanders in time and does not repeat",
     "hum": "a tone at {joint} that does not follow the motion",
     "across_joints": "an elastic torque across both joints",
-    "quantisation": "a torque of {joint} that is told in coarse steps",
+    "quantisation": "a torque of {joint} that is reported in coarse steps",
 }
 IN_CUFFS = ("angle", "both_angles", "speed", "inertia_by_angle", "load", "other_load")
 """Laws by which cuff forces may be a little wrong on their own."""
@@ -59,7 +59,7 @@ TIME = "time"
 HUM = "hum"
 """The law whose columns are tones with a phase in each run."""
 QUANTISATION = "quantisation"
-"""The law whose column is what rounding to the step that the residual shows adds to the torque."""
+"""The law of a torque that is reported in coarse steps: its column is what rounding adds."""
 ACROSS = "across_joints"
 """The law of an elastic energy of both angles, as of a muscle or a band over two joints."""
 ACROSS_DEGREE = 4

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.baseline import Baseline
 from pipelines.diagnosis.evidence.decision_band import LENGTH_S, DecisionBand
-from pipelines.diagnosis.evidence.noise_floor import noise_floor
+from pipelines.diagnosis.evidence.noise_floor import Floor, noise_floor
 from pipelines.diagnosis.evidence.noise_model import NoiseModel
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.fit.held_out import evaluate
@@ -33,10 +34,15 @@ class Validated:
         residuals = tuple(evaluate(made, validate, baseline))
         return cls(made, validate, residuals, errors_of(validate, residuals))
 
+    @cached_property
+    def floor(self) -> Floor:
+        """The noise floor of these runs."""
+        return noise_floor(self.runs, self.residuals)
+
     @property
     def leaves_more_than_noise(self) -> bool:
         """Whether the error of some joint is above the noise floor."""
-        floor = noise_floor(self.runs, self.residuals).rms[: len(self.errors.rms)]
+        floor = self.floor.rms[: len(self.errors.rms)]
         return bool(np.any(self.errors.rms > CRITERIA.at_floor * floor))
 
 

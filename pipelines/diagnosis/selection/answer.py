@@ -44,6 +44,11 @@ class Answer:
         return tuple(one.element.label for one in self.named)
 
     @property
+    def variants(self) -> frozenset[str]:
+        """Variants of all that is named."""
+        return frozenset(one.element.variant for one in self.named)
+
+    @property
     def members(self) -> frozenset[str]:
         """Labels of all that is named, and of the ties."""
         return frozenset(label for one in self.named for label in one.members)

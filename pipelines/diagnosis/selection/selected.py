@@ -1,4 +1,4 @@
-"""What the evidence of the training runs says: the library, the posterior, and the answer read off it."""
+"""What the evidence of the runs that are searched says: the library, the posterior, the answer read off it."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -28,18 +28,18 @@ Report = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
-class ByAll:
+class AllRunsSearch:
     """That causes were sought on all runs, and why."""
 
-    trained: int
+    train_count: int
     """How many runs are to train on: the first ones."""
     named_before: tuple[str, ...]
-    """Labels that these alone name."""
+    """Labels that these alone name, before validation."""
 
 
 @dataclass(frozen=True)
 class Selected:
-    """What the evidence says: of the training runs at first, then after what the validation runs charge.
+    """What the evidence says: of the runs that are searched at first, then after what the validation runs charge.
 
     Where what the training runs name leaves more than noise on the validation runs, the evidence is of all runs.
     """
@@ -48,7 +48,7 @@ class Selected:
     """None where faults of acquisition keep physics from being looked at."""
     evidence: Evidence | None
     trained: Posterior | None
-    """How probable each set is by the training runs."""
+    """How probable each set is by the runs that are searched."""
     posterior: Posterior | None
     """The same after what the validation runs charge; ``trained`` before them."""
     answer: Answer
@@ -61,7 +61,7 @@ class Selected:
     """What the validation runs take from log odds, by variant of a cause: its harm, or how far it falls behind the best
     of its ties, which has zero."""
 
-    by_all: "ByAll | None" = None
+    by_all: AllRunsSearch | None = None
     """None where the evidence is of the training runs."""
 
     @property
@@ -70,13 +70,15 @@ class Selected:
         return 1.0 - self.answer.nothing >= CRITERIA.likely
 
     @property
-    def is_listed(self) -> bool:
+    def names_all(self) -> bool:
         """Whether causes are named, and nothing unlisted is likely beside them."""
         return bool(self.answer.named) and self.answer.unlisted < CRITERIA.likely
 
-    def instead_of(self, first: "Selected", trained: int) -> "Selected":
-        """Return what all runs show, the ``trained`` first of them to fit to, after what these alone showed."""
-        return replace(self, by_all=ByAll(trained, first.answer.labels), router=first.router)
+    def as_all_runs_search(self, first: "Selected", train_count: int) -> "Selected":
+        """Return what all runs show, after what the first ``train_count`` of them, to train on, showed alone."""
+        assert first.trained is not None
+        by_all = AllRunsSearch(train_count, answer_of(first.trained).labels)
+        return replace(self, by_all=by_all, router=first.router)
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
@@ -86,7 +88,7 @@ class Selected:
     def _candidate(self, element: Element) -> Candidate:
         assert self.library is not None
         candidate = self.library.causes[element.place].candidate
-        return replace(candidate, shapes=candidate.shapes[: self.by_all.trained]) if self.by_all else candidate
+        return replace(candidate, shapes=candidate.shapes[: self.by_all.train_count]) if self.by_all else candidate
 
     @property
     def doubted(self) -> frozenset[str]:

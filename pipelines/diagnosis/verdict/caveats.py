@@ -111,16 +111,13 @@ def _by_all_runs(d: Diagnosis) -> list[str]:
     by_all = d.selected.by_all
     if by_all is None:
         return []
-    before = " and ".join(label_in_words(label, d.baseline.machine) for label in by_all.named_before)
+    named = " and ".join(label_in_words(label, d.baseline.machine) for label in by_all.named_before)
     said = (
-        f"by the training runs alone {f'{before} would be named' if before else 'no cause would be named'}, which "
-        "leaves an error above the noise on the validation runs. What is said here is by all runs together"
+        f"causes were sought on all runs: the training runs alone name {named or 'no cause'}, and that leaves an "
+        "error above the noise on the validation runs"
     )
     if d.causes:
-        said += (
-            ". The causes are fitted to the training runs, but their gain is measured on runs that helped to find "
-            "them: record another run to validate on"
-        )
+        said += ". The gain is therefore a little too good: record another run to validate on"
     return [said]
 
 

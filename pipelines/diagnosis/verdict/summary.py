@@ -144,8 +144,9 @@ def _dropped(d: Diagnosis) -> str:
         return ""
     words = " and ".join(label_in_words(label, d.baseline.machine) for label in labels)
     plural = len(labels) > 1
+    searched = "all runs" if d.selected.by_all else "the training runs"
     return (
-        f" {words[:1].upper()}{words[1:]} would explain the training runs, but "
+        f" {words[:1].upper()}{words[1:]} would explain {searched}, but "
         f"{'raise' if plural else 'raises'} the error on the validation runs."
     )
 
