@@ -11,7 +11,6 @@
 from collections.abc import Sequence
 
 from pipelines.diagnosis.candidates.library import silent
-from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.evidence.model_error import imperfection
 from pipelines.diagnosis.evidence.prepared_runs import Prepared, prepare
@@ -75,8 +74,7 @@ def _by_all_runs(data: TrainingData, prepared: Prepared, judged: JudgedFit, repo
         return judged if first.shows_something or not now.shows_something else by_all
     others = now.answer.variants != first.answer.variants
     shows_more = others and now.names_all if first.shows_something else True
-    predicts_better = by_all.log_likelihood > judged.log_likelihood + CRITERIA.predicted_better
-    return by_all if shows_more and predicts_better else judged
+    return by_all if shows_more and by_all.predicts_better_than(judged) else judged
 
 
 def _in_the_rest(report: Report) -> Report:

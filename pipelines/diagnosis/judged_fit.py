@@ -10,6 +10,7 @@ from pipelines.diagnosis.evidence.baseline import with_load
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
 from pipelines.diagnosis.fit.joint_refinement import Refinement
 from pipelines.diagnosis.fit.validation import Validated, log_likelihoods, without_each
+from pipelines.diagnosis.fit.validation_error import gain
 from pipelines.diagnosis.selection.marginal_likelihood import power
 from pipelines.diagnosis.selection.selected import Selected
 from pipelines.diagnosis.training_data import TrainingData
@@ -38,6 +39,11 @@ class JudgedFit:
     """The named causes less one, by that cause's label."""
     log_likelihood: float
     """Of the validation runs, up to a constant."""
+
+    def predicts_better_than(self, other: "JudgedFit") -> bool:
+        """Tell whether it predicts the validation runs better than another, and not by chance."""
+        gained = self.log_likelihood - other.log_likelihood
+        return gained > CRITERIA.predicted_better and gain(other.after.errors, self.after.errors).low > 0.0
 
 
 def judged_fit(selected: Selected, prepared: Prepared, before: Validated) -> JudgedFit:
