@@ -9,6 +9,7 @@
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from pipelines.diagnosis.candidates.library import silent
 from pipelines.diagnosis.diagnosis import Diagnosis
@@ -71,10 +72,12 @@ def _by_all_runs(data: TrainingData, prepared: Prepared, judged: JudgedFit, repo
     by_all = judged_fit(found.as_all_runs_search(first, len(data.train)), prepared, judged.before)
     now = by_all.selected
     if not now.answer.named:
-        return judged if first.shows_something or not now.shows_something else by_all
-    others = now.answer.variants != first.answer.variants
-    shows_more = others and now.names_all if first.shows_something else True
-    return by_all if shows_more and by_all.predicts_better_than(judged) else judged
+        taken = now.shows_something and not first.shows_something
+    else:
+        others = now.answer.variants != first.answer.variants
+        taken = (others and now.names_all) or not first.shows_something
+        taken &= by_all.predicts_better_than(judged)
+    return by_all if taken else replace(judged, selected=replace(first, refused=found.answer.labels))
 
 
 def _in_the_rest(report: Report) -> Report:

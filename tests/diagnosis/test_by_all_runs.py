@@ -48,6 +48,7 @@ def test_a_payload_that_only_a_validation_run_carries_is_not_named():
     loaded = session("payload_change", "knee", seed=7, mass_moment=0.5, time=0.0)
     said = verdict(diagnose([*runs[:3], loaded[3]]))
     assert not any(cause["effect"] == "payload_change" for cause in said["causes"])
+    assert any("all runs together do show something missing: they name payload change" in c for c in said["caveats"])
 
 
 def test_what_the_training_runs_show_is_sought_on_them():

@@ -63,6 +63,8 @@ class Selected:
 
     by_all: AllRunsSearch | None = None
     """None where the evidence is of the training runs."""
+    refused: tuple[str, ...] = ()
+    """Labels that all runs together name, where their answer was not taken."""
 
     @property
     def shows_something(self) -> bool:
