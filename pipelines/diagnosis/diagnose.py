@@ -65,19 +65,20 @@ def _by_all_runs(data: TrainingData, prepared: Prepared, judged: JudgedFit, repo
     """Return what all runs together show, fitted to the training runs, where they show more than these alone.
 
     Its causes must predict the validation runs better. Where the training runs show something, all runs must name
-    other listed causes, and leave nothing unlisted.
+    other listed causes, and leave nothing unlisted. Where they show nothing, what all runs show is told, unnamed.
     """
     first = judged.selected
-    found = select(prepare((*data.train, *data.validate), data.baseline), _in_the_rest(report))
-    by_all = judged_fit(found.as_all_runs_search(first, len(data.train)), prepared, judged.before)
+    runs = (*data.train, *data.validate)
+    searched = select(prepare(runs, data.baseline), _in_the_rest(report)).as_all_runs_search(first, len(data.train))
+    by_all = judged_fit(searched, prepared, judged.before)
     now = by_all.selected
-    if not now.answer.named:
-        taken = now.shows_something and not first.shows_something
-    else:
-        others = now.answer.variants != first.answer.variants
-        taken = (others and now.names_all) or not first.shows_something
-        taken &= by_all.predicts_better_than(judged)
-    return by_all if taken else replace(judged, selected=replace(first, refused=found.answer.labels))
+    if now.answer.named and by_all.predicts_better_than(judged):
+        others = now.names_all and now.answer.variants != first.answer.variants
+        if others or not first.shows_something:
+            return by_all
+    if searched.shows_something and not first.shows_something:
+        return replace(judged, selected=searched.without_names)
+    return judged
 
 
 def _in_the_rest(report: Report) -> Report:

@@ -133,7 +133,8 @@ class Posterior:
         for labels, p in self.by_labels.items():
             for label in labels:
                 found[label] = found.get(label, 0.0) + p
-        return dict(sorted(found.items(), key=lambda item: -item[1]))
+        # Rounding may carry a sum of probabilities a little beyond one.
+        return {label: min(p, 1.0) for label, p in sorted(found.items(), key=lambda item: -item[1])}
 
 
 def posterior(evidence: Evidence, criteria: Criteria = CRITERIA) -> Posterior:

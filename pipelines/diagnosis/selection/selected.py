@@ -63,8 +63,6 @@ class Selected:
 
     by_all: AllRunsSearch | None = None
     """None where the evidence is of the training runs."""
-    refused: tuple[str, ...] = ()
-    """Labels that all runs together name, where their answer was not taken."""
 
     @property
     def shows_something(self) -> bool:
@@ -75,6 +73,14 @@ class Selected:
     def names_all(self) -> bool:
         """Whether causes are named, and nothing unlisted is likely beside them."""
         return bool(self.answer.named) and self.answer.unlisted < CRITERIA.likely
+
+    @property
+    def without_names(self) -> "Selected":
+        """What is missing, without the causes that are named: the validation runs speak against them."""
+        assert self.posterior is not None
+        answer = replace(self.answer, named=())
+        found = tuple(findings(self.posterior, answer))
+        return replace(self, answer=answer, findings=found, dropped=frozenset(self.answer.labels))
 
     def as_all_runs_search(self, first: "Selected", train_count: int) -> "Selected":
         """Return what all runs show, after what the first ``train_count`` of them, to train on, showed alone."""

@@ -110,7 +110,7 @@ def _by_all_runs(d: Diagnosis) -> list[str]:
     """Say that the validation runs helped to find what is missing, and why."""
     by_all = d.selected.by_all
     if by_all is None:
-        return _refused(d)
+        return []
     named = " and ".join(label_in_words(label, d.baseline.machine) for label in by_all.named_before)
     said = (
         f"causes were sought on all runs: the training runs alone name {named or 'no cause'}, and that leaves an "
@@ -119,19 +119,6 @@ def _by_all_runs(d: Diagnosis) -> list[str]:
     if d.causes:
         said += ". The gain is therefore a little too good: record another run to validate on"
     return [said]
-
-
-def _refused(d: Diagnosis) -> list[str]:
-    """Say what all runs together would name where nothing is named, though an error above the noise is left."""
-    if not d.selected.refused or d.selected.shows_something:
-        return []
-    named = " and ".join(label_in_words(label, d.baseline.machine) for label in d.selected.refused)
-    return [
-        "the error on the validation runs is above the noise, and all runs together do show something missing: they "
-        f"name {named}, which fitted to the training runs predicts the validation runs no better. So nothing is "
-        "missing only as far as the training runs tell: train on a motion as rich as the one you validate on, and "
-        "look for what changed between the runs"
-    ]
 
 
 def _differing(d: Diagnosis) -> dict[str, tuple[float, float]]:

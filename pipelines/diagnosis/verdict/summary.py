@@ -144,11 +144,11 @@ def _dropped(d: Diagnosis) -> str:
         return ""
     words = " and ".join(label_in_words(label, d.baseline.machine) for label in labels)
     plural = len(labels) > 1
-    but = f"{'raise' if plural else 'raises'} the error on the validation runs"
     said = f" {words[:1].upper()}{words[1:]} would explain"
     if d.selected.by_all:
-        return f"{said} all runs, but fitted to the training runs {but}."
-    return f"{said} the training runs, but {but}."
+        verb = "predict" if plural else "predicts"
+        return f"{said} all runs, but fitted to the training runs {verb} the validation runs no better."
+    return f"{said} the training runs, but {'raise' if plural else 'raises'} the error on the validation runs."
 
 
 def _named(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
