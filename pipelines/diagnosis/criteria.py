@@ -79,7 +79,7 @@ base rate. Under a larger model error a second cause beside a large one is lost,
 a factor of three. Nor does it over a factor of thirty in `lines`. Good drives ripple by a percent of their torque;
 too few sessions have such drives, and learned alone `background_line` called their ripple missing. Too few have
 sensors that are tared anew at each start, which labs have: `each_run` is of sessions that had more. The last five
-decide what is told of the probabilities and errors, and whether it is by all runs."""
+decide what is reported of the probabilities and errors, and whether all runs are searched."""
 
 LEARNED = """\
 They were learned from 335 sessions of seeds from 210000 on. Learned anew from 177 sessions whose evidence was stored by

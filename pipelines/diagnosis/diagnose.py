@@ -65,7 +65,8 @@ def _by_all_runs(data: TrainingData, prepared: Prepared, judged: JudgedFit, repo
     """Return what all runs together show, fitted to the training runs, where they show more than these alone.
 
     Its causes must predict the validation runs better. Where the training runs show something, all runs must name
-    other listed causes, and leave nothing unlisted. Where they show nothing, what all runs show is told, unnamed.
+    other listed causes, and leave nothing unlisted. Where they show nothing and the new
+    causes fail, what all runs show is reported without a name.
     """
     first = judged.selected
     runs = (*data.train, *data.validate)

@@ -88,7 +88,7 @@ class Diagnosis:
         left = [share for share in self.unexplained if share is not None]
         is_gone = all(share <= CRITERIA.left_of_explained for share in left)
         more = any(one.level != "cause" for one in self.selected.findings)
-        more |= self.selected.answer.unlisted >= CRITERIA.likely
+        more |= self.selected.shows_unlisted
         return "explained" if is_gone and not more else "partly_explained"
 
     @property
@@ -113,7 +113,7 @@ class Diagnosis:
         """Whether the extended model leaves more than noise at some joint."""
         if self.data.spoilt or self.status == "nothing_missing":
             return False
-        return self.status != "explained" or bool(np.any(self.after.errors.rms > CRITERIA.at_floor * self.floor_rms))
+        return self.status != "explained" or self.after.leaves_more_than_noise
 
     @cached_property
     def effects(self) -> dict[str, Effect]:

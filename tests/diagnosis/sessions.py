@@ -36,6 +36,15 @@ def recordings(effect=None, joint=None, seed=1, seconds=40.0, trained=RICH, **va
     return made
 
 
+def banded(motions):
+    """Return motions of a leg with a band from the pelvis to the shank that is slack in a part of its range."""
+    pulled = []
+    for motion in motions:
+        stretch = np.maximum(motion.q @ (0.8, -0.7) - 1.1, 0.0)
+        pulled.append(replace(motion, torque=motion.torque + 12.0 * np.outer(stretch, (0.8, -0.7))))
+    return pulled
+
+
 def session(*args, **values):
     """Return the motions of these recordings, files named by their place."""
     motions = [motion_from_table(motion_table(table, FilterSettings())) for table in recordings(*args, **values)]

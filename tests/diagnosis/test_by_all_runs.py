@@ -50,6 +50,8 @@ def test_a_payload_that_only_a_validation_run_carries_is_missing_and_not_named()
     assert (said["status"], said["causes"], said["sought_on"]) == ("unknown_cause", [], "all")
     refused = "would explain all runs, but fitted to the training runs predicts the validation runs no better."
     assert refused in said["summary"]
+    differs = [caveat for caveat in said["caveats"] if "no training run shows" in caveat]
+    assert any(caveat.startswith("the knee's torque error is 1.3") for caveat in differs)
 
 
 def test_what_the_training_runs_show_is_sought_on_them():

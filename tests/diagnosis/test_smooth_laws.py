@@ -10,7 +10,7 @@ from pipelines.diagnosis.candidates.smooth_laws import ACROSS, Spans, smooth_law
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.verdict.verdict import verdict
 from tests.diagnosis.screening import Screening
-from tests.diagnosis.sessions import session
+from tests.diagnosis.sessions import banded, session
 
 STEP = 1e-5
 LABEL = f"law:{ACROSS}"
@@ -52,11 +52,7 @@ def test_a_part_is_of_order_one_at_the_joint_where_it_is_larger(prepared):
 
 def test_a_band_across_both_joints_is_one_unlisted_law_of_no_single_joint():
     """A band from the pelvis to the shank that is slack in a part of its range: no spring of either joint."""
-    pulled = []
-    for motion in session(seed=5):
-        stretch = np.maximum(motion.q @ (0.8, -0.7) - 1.1, 0.0)
-        pulled.append(replace(motion, torque=motion.torque + 12.0 * np.outer(stretch, (0.8, -0.7))))
-    said = verdict(diagnose(pulled))
+    said = verdict(diagnose(banded(session(seed=5))))
     assert said["status"] == "unknown_cause"
     (finding,) = said["findings"]
     assert (finding["joint"], finding["family"]) == (None, "angle")

@@ -11,7 +11,7 @@ import pytest
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.label import cause_label
-from tests.diagnosis.sessions import session
+from tests.diagnosis.sessions import banded, session
 from tests.diagnosis.test_each_run import zeroed
 
 HIDDEN = {"run_0.parquet": 1.1, "run_1.parquet": -0.8, "run_2.parquet": -0.9, "run_3.parquet": 0.7}
@@ -122,11 +122,6 @@ def test_of_two_runs_one_offset_in_both_is_one():
 
 
 def test_where_one_training_run_shows_something_unlisted_it_is_said_what_it_cannot_show():
-    """A band over both joints that is slack in a part of its range."""
-    pulled = []
-    for motion in session(seed=5)[2:]:
-        stretch = np.maximum(motion.q @ (0.8, -0.7) - 1.1, 0.0)
-        pulled.append(replace(motion, torque=motion.torque + 12.0 * np.outer(stretch, (0.8, -0.7))))
-    told = verdict(diagnose(pulled))
+    told = verdict(diagnose(banded(session(seed=5)[2:])))
     assert (told["status"], told["causes"]) == ("unknown_cause", [])
     assert len(set_at_each_start(told)) == 1

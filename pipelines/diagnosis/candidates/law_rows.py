@@ -78,6 +78,7 @@ def _coarse_steps(prepared: Prepared, joints: int) -> Iterator[tuple[list[LawCol
             continue
         columns = [np.zeros((*run.measured.shape, 1)) for run in runs]
         for column, run, x in zip(columns, runs, predicted, strict=True):
+            # Rounding has an rms of the step over the root of twelve, the column one of the joint's torque.
             column[:, j, 0] = run.average(rounding(x[:, j], step)) * np.sqrt(12.0) / step * rms
         yield [LawColumn(QUANTISATION, j, "all", 1.0)], columns
 

@@ -19,8 +19,8 @@ BINS = 1024
 """Of torque within that reach: 17 in the finest step."""
 PEAKS = 4
 """Steps tried within the width of a line."""
-TRIED = 2.0 * REACH * (1.0 / FINEST - 1.0 / COARSEST)
-"""Steps that can be told from one another within the reach."""
+STEPS_TRIED = 2.0 * REACH * (1.0 / FINEST - 1.0 / COARSEST)
+"""Number of steps that can be told from one another within the reach."""
 
 
 def rounding(torque: NDArray, step: float) -> NDArray:
@@ -29,7 +29,7 @@ def rounding(torque: NDArray, step: float) -> NDArray:
 
 
 def coarse_step(torque: Sequence[NDArray], residual: Sequence[NDArray], rms: float) -> float | None:
-    """Return the step whose rounding goes with the residual most, N·m; None where none does.
+    """Return the step whose rounding error correlates most with the residual, N·m; None where none does.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def coarse_step(torque: Sequence[NDArray], residual: Sequence[NDArray], rms: flo
     edges = middle + rms * np.linspace(-REACH, REACH, BINS + 1)
     counts, totals = np.histogram(x, edges)[0], np.histogram(x, edges, weights=left)[0]
     # Far from zero the phase of a line turns faster with its step.
-    count = round(PEAKS * TRIED * (1.0 + abs(middle) / (REACH * rms)))
+    count = round(PEAKS * STEPS_TRIED * (1.0 + abs(middle) / (REACH * rms)))
     per_step = np.linspace(1.0 / COARSEST, 1.0 / FINEST, count) / rms
     waves = -np.sin(2.0 * np.pi * np.outer(per_step, 0.5 * (edges[1:] + edges[:-1])))
     along, size = waves @ totals, waves**2 @ counts

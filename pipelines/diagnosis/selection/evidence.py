@@ -15,7 +15,7 @@ from scipy.linalg.lapack import dtrtri
 
 from pipelines.diagnosis.candidates.cause import Cause
 from pipelines.diagnosis.candidates.library import Library, orders_of
-from pipelines.diagnosis.candidates.quantisation import TRIED
+from pipelines.diagnosis.candidates.quantisation import STEPS_TRIED
 from pipelines.diagnosis.candidates.shape_refinement import log_searched
 from pipelines.diagnosis.candidates.smooth_laws import FAMILIES, HUM, QUANTISATION, TIME, LawColumn, law_label
 from pipelines.diagnosis.criteria import CRITERIA
@@ -222,7 +222,7 @@ def _elements(library: Library, at: _Places) -> list[Element]:
             variance=_normalised([v for _, v in own]),
             repeats=FAMILIES[kind] != Family.TIME,
             wearer=wearer,
-            log_searched=float(np.log(TRIED)) if kind == QUANTISATION else 0.0,
+            log_searched=float(np.log(STEPS_TRIED)) if kind == QUANTISATION else 0.0,
             shown=_shown(Kind.TIME, j, library.prepared) if kind == HUM and j is not None else [],
         )
         for (kind, j, wearer), own in laws.items()

@@ -70,9 +70,14 @@ class Selected:
         return 1.0 - self.answer.nothing >= CRITERIA.likely
 
     @property
+    def shows_unlisted(self) -> bool:
+        """Whether it is more likely than not that something unlisted is missing."""
+        return self.answer.unlisted >= CRITERIA.likely
+
+    @property
     def names_all(self) -> bool:
-        """Whether causes are named, and nothing unlisted is likely beside them."""
-        return bool(self.answer.named) and self.answer.unlisted < CRITERIA.likely
+        """Whether causes are named, and it is likely that nothing unlisted is missing as well."""
+        return bool(self.answer.named) and not self.shows_unlisted
 
     @property
     def without_names(self) -> "Selected":

@@ -119,8 +119,11 @@ def _unlisted(d: Diagnosis) -> str:
         return "Something is missing, and no listed cause is likely."
     first, *more = found
     also = "".join(f"; and {one['words']} ({one['probability']:.2f})" for one in more)
-    unlisted = d.selected.answer.unlisted >= CRITERIA.likely
-    which = "that no listed cause explains" if unlisted else "and these data do not tell which listed cause it is"
+    which = (
+        "that no listed cause explains"
+        if d.selected.shows_unlisted
+        else "and these data do not tell which listed cause it is"
+    )
     said = f"Something is missing {which}: {first['words']} (probability {first['probability']:.2f}){also}."
     laws = [law for law in first["laws"] if law["probability"] >= CRITERIA.likely]
     if laws and laws[0]["words"] != first["words"]:
