@@ -25,7 +25,7 @@ CANDIDATES = Contract(
         Column("probability", "", "how likely the causes are the true ones, 0 to 1", nullable=True),
         Column(
             "verdict", "", "what became of it", dtype=TEXT,
-            choices=("named", "indistinguishable", "absorbed", "rejected"),
+            choices=("named", "indistinguishable", "unlisted", "absorbed", "rejected"),
         ),
         Column("reason", "", "one sentence", dtype=TEXT),
     ),

@@ -62,7 +62,7 @@ HEADLINES = {
     "unknown_cause": "Something is missing that no listed cause explains",
     "nothing_missing": "Nothing is missing that these data could show",
 }
-TONES = {"named": "good", "indistinguishable": "warn", "absorbed": "", "rejected": ""}
+TONES = {"named": "good", "indistinguishable": "warn", "unlisted": "warn", "absorbed": "", "rejected": ""}
 
 
 @dataclass(frozen=True)

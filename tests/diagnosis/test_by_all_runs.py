@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.evidence.residual_shares import residual_shares
 from pipelines.diagnosis.fit.joint_refinement import Refinement
 from pipelines.diagnosis.verdict.verdict import verdict
 from tests.diagnosis.sessions import RICH, session
@@ -25,6 +26,13 @@ def test_a_drag_that_slow_training_runs_do_not_show_is_named_by_all_runs(found):
     assert said["sought_on"] == "all"
     assert ("quadratic_drag", "hip") in labels(said["causes"][0])
     assert any("the training runs alone name no cause" in caveat for caveat in said["caveats"])
+
+
+def test_the_residual_is_split_by_the_runs_that_were_searched(found):
+    """In the slow training runs all of it is noise."""
+    alone = residual_shares(found.prepared.runs, found.prepared.residuals, found.prepared.noise)[0]
+    told = verdict(found)["router"]["hip"]
+    assert told["repeats"] > 0.04 > alone.as_json()["repeats"]
 
 
 def test_its_amplitudes_are_fitted_to_the_training_runs_alone(found):

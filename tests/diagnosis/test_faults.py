@@ -240,6 +240,28 @@ def test_a_clipped_torque_is_saturated_at_its_limit(session):
     assert (frame["hip_torque_nm"].abs()[fault.samples] == limit).all()
 
 
+def rounded(session, step):
+    for frame, _ in session:
+        for name in ("hip_torque_nm", "knee_torque_nm"):
+            frame[name] = np.round(frame[name] / step) * step
+
+
+@pytest.mark.parametrize("step", [0.5, 2.0, 6.0])
+def test_a_torque_that_is_rounded_to_coarse_steps_is_no_fault(session, step):
+    """It stands still for up to a second, comes back to its extremes, and often repeats while the angle does."""
+    rounded(session, step)
+    assert faults_of(session) == []
+
+
+def test_a_torque_in_coarse_steps_that_stops_is_stuck(session):
+    rounded(session, 2.0)
+    frame, _ = session[SPOILED]
+    frame.loc[2000:3400, "knee_torque_nm"] = frame.loc[2000, "knee_torque_nm"]
+    fault = only_fault(session)
+    assert fault.channel == "knee_torque_nm" and "stuck: constant for 7" in fault.what
+    assert fault.samples[2000:3401].all() and fault.samples.sum() < 1500
+
+
 @pytest.mark.parametrize("joint", ["hip", "knee"])
 @pytest.mark.parametrize("quantity", ["torque_nm", "angle_rad"])
 def test_a_reversed_sign_is_named_at_its_channel(session, joint, quantity):

@@ -7,6 +7,7 @@ import pytest
 
 from pipelines.diagnosis.candidates.quantisation import coarse_step, rounding
 from pipelines.diagnosis.diagnose import diagnose
+from pipelines.diagnosis.verdict.candidate_table import candidates
 from pipelines.diagnosis.verdict.verdict import verdict
 from tests.diagnosis.sessions import session
 
@@ -65,8 +66,10 @@ def test_samples_that_do_not_count_have_no_say():
 
 
 def test_a_torque_in_coarse_steps_is_something_in_the_sensor():
-    said = verdict(diagnose(reported_in_steps(4.0, seed=11)))
+    found = diagnose(reported_in_steps(4.0, seed=11))
+    said, first = verdict(found), candidates(found).iloc[0]
     assert said["status"] == "unknown_cause"
+    assert (first["causes"], first["verdict"]) == ([LABEL], "unlisted")
     (finding,) = said["findings"]
     assert (finding["joint"], finding["family"]) == ("hip", "sensor")
     assert finding["laws"][0]["words"] == "a torque of the hip that is reported in coarse steps"

@@ -5,6 +5,7 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import median_abs_deviation
 
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.data_faults.fault import (
@@ -22,8 +23,9 @@ from pipelines.signals.blocks import dilate
 
 STALE = 3
 """Rows that repeat the last one while the joint moves, before it is more than an accident."""
-COUNTS = 2.0
-"""Encoder counts a sample: a joint as fast as that cannot show the same count twice."""
+COUNTS, NOISES = 2.0, 4.0
+"""Encoder counts, and standard deviations of the change a sample: a joint that goes as far in a sample as both together
+cannot show the same count twice."""
 STUCK_ANGLE_S = 0.25
 JUMP = 3.0
 """Times the largest step of the moving joint: no joint catches up like that."""
@@ -36,6 +38,9 @@ STUCK_TORQUE_S = 0.15
 STUCK_FORCE_S = 1.0
 FLAT_TOP, SATURATED = 3, 10
 """Samples in a row at the extreme, and samples in such rows: noise never returns to the same number."""
+IN_STEPS = 0.5
+"""Share of samples that repeat the one before, from which a torque is taken as rounded to coarse steps. A fine one is
+hardly ever the same twice."""
 
 
 def channel_faults(motion: Motion) -> Iterator[Fault]:
@@ -58,8 +63,10 @@ def _repeated(motion: Motion) -> Iterator[Fault]:
     for j, torque in enumerate(motion.torque.T):
         # A torque that stands for longer is stuck, whatever the angle does.
         same[:, j] &= ~mask_of(constant_stretches(torque, round(STUCK_TORQUE_S * motion.sample_rate_hz)), len(torque))
-    step = np.abs(motion.dq) / motion.sample_rate_hz
-    sure = same & (step > COUNTS * np.array([_count_of(angle) for angle in motion.measured_angle.T]))
+    step, change = motion.dq / motion.sample_rate_hz, np.diff(motion.measured_angle, axis=0)
+    count = np.array([_count_of(angle) for angle in motion.measured_angle.T])
+    noise = median_abs_deviation(change - step[1:], axis=0, scale="normal")
+    sure = same & (np.abs(step) > COUNTS * count + NOISES * noise)
     stale = [j for j in range(len(motion.joints)) if sure[:, j].sum() >= STALE]
     if not stale:
         return
@@ -145,13 +152,18 @@ def _held(motion: Motion, joint: int) -> float:
 
 
 def _torque(motion: Motion, joint: int) -> Iterator[Fault]:
-    """Report torque that stands still: at its extreme it is saturated, elsewhere stuck."""
+    """Report torque that stands still: at its extreme it is saturated, elsewhere stuck.
+
+    Rounding to coarse steps makes torque stand still as well. There only what lasts much longer than the rest is told.
+    """
     torque = motion.torque[:, joint]
     name, channel = motion.joints[joint], column(motion, joint, "torque")
     flat = constant_stretches(torque, FLAT_TOP)
     at_top = (torque[flat[:, 0]] == torque.max()) | (torque[flat[:, 0]] == torque.min())
     lasts = flat[:, 1] - flat[:, 0] >= STUCK_TORQUE_S * motion.sample_rate_hz
     moving = np.array([np.abs(motion.dq[a:b, joint]).max() > 0.1 * np.ptp(motion.q[:, joint]) for a, b in flat], bool)
+    if _is_in_steps(torque, flat[at_top | lasts]):
+        at_top[:], lasts = False, lasts & _outlasts(flat)
     tops, stuck = flat[at_top], flat[~at_top & lasts & moving]
     samples = mask_of(tops, len(torque))
     if len(tops) > 1 and samples.sum() >= SATURATED:
@@ -176,6 +188,19 @@ def _torque(motion: Motion, joint: int) -> Iterator[Fault]:
             f"{when(motion, stuck)}, while the joint moved; check the current sensor and the drive's status",
             samples,
         )
+
+
+def _is_in_steps(torque: NDArray, apart: NDArray) -> bool:
+    """Tell whether a torque (n,) mostly repeats its last value outside the stretches ``apart`` (runs, 2)."""
+    rest = ~mask_of(apart, len(torque))[1:]
+    return bool(rest.any()) and float(np.mean(torque[1:][rest] == torque[:-1][rest])) > IN_STEPS
+
+
+def _outlasts(found: NDArray) -> NDArray:
+    """Tell which of the stretches (runs, 2) lasts ``ALONE`` times as long as any other, (runs,) bool."""
+    lasting = found[:, 1] - found[:, 0]
+    second = np.partition(lasting, -2)[-2] if len(lasting) > 1 else 0
+    return np.asarray(lasting > ALONE * second, dtype=bool)
 
 
 def has_silent_cuffs(motion: Motion) -> bool:

@@ -54,7 +54,7 @@ class Selected:
     answer: Answer
     findings: tuple[Finding, ...]
     router: tuple[ResidualShares, ...]
-    """Of each joint: how its residual repeats."""
+    """Of each joint: how its residual repeats, in the runs that are searched."""
     dropped: frozenset[str] = frozenset()
     """Labels that were named until the validation runs spoke against them."""
     charged: Mapping[str, float] = field(default_factory=dict)
@@ -91,7 +91,7 @@ class Selected:
         """Return what all runs show, after what the first ``train_count`` of them, to train on, showed alone."""
         assert first.trained is not None
         by_all = AllRunsSearch(train_count, answer_of(first.trained).labels)
-        return replace(self, by_all=by_all, router=first.router)
+        return replace(self, by_all=by_all)
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fit.validation import Validated
 from pipelines.diagnosis.fit.validation_error import gain
@@ -13,7 +14,7 @@ from pipelines.diagnosis.verdict.findings_in_words import LAW
 from pipelines.effects import EFFECTS, Effect
 from pipelines.mechanics.machine import Machine
 
-ORDER = {"named": 0, "indistinguishable": 1, "rejected": 2, "absorbed": 3}
+ORDER = {"named": 0, "indistinguishable": 1, "unlisted": 2, "rejected": 3, "absorbed": 4}
 
 
 def candidates(d: Diagnosis) -> pd.DataFrame:
@@ -99,7 +100,8 @@ def _judged(d: Diagnosis, labels: frozenset[str], probability: float) -> tuple[s
         rivals = labels - rest
         if rest <= labels and len(rivals) == 1 and next(iter(rivals)) in dict(one.ties):
             return "indistinguishable", f"these data cannot tell it from {one.element.label}"
-    return "rejected", "; ".join(_against(d, labels, probability))
+    is_likely = probability >= CRITERIA.likely and any(label.startswith(LAW) for label in labels)
+    return "unlisted" if is_likely else "rejected", "; ".join(_against(d, labels, probability))
 
 
 def _against(d: Diagnosis, labels: frozenset[str], probability: float) -> Iterator[str]:
