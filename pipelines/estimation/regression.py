@@ -20,8 +20,6 @@ TURN_S = 0.075
 """Beside a turn, where measured forces and the filtered acceleration are not of the same moment."""
 REVERSAL_PADDING_S = 0.08
 """What a joint that stuck still does after it has come free."""
-SMEARED_PERIODS = 0.75
-"""Periods of the cut-off after which a low-passed step is within 2 % of its end: friction at a reversal is a step."""
 
 
 @dataclass(frozen=True)
@@ -81,14 +79,13 @@ def reversal_speeds(machine: Machine) -> NDArray:
     return np.array([REVERSAL_SPEED * machine.scale(joint).speed for joint in machine.names])
 
 
-def mask_in_words(run: Run) -> str:
-    """Say which samples of a run are left out for being near a reversal."""
-    machine = run.machine
+def mask_in_words(machine: Machine) -> str:
+    """Say which samples are left out for being near a reversal."""
     speeds = reversal_speeds(machine)
     units = [joint.unit("velocity") for joint in machine.joints]
     said = [f"{v:.2g} {unit}" for v, unit in zip(speeds, units, strict=True)]
     alike = said[:1] if len(set(said)) == 1 else [f"{s} ({name})" for s, name in zip(said, machine.names, strict=True)]
-    return f"|v| < {', '.join(alike)}, padded {_padding_s(run):.2g} s"
+    return f"|v| < {', '.join(alike)}, padded {REVERSAL_PADDING_S:g} s"
 
 
 def away_from_reversals(motion: Motion) -> NDArray:
@@ -99,11 +96,7 @@ def away_from_reversals(motion: Motion) -> NDArray:
 
 def padding(run: Run) -> int:
     """Return how many samples beside a reversal are left out."""
-    return round(_padding_s(run) * run.sample_rate_hz)
-
-
-def _padding_s(run: Run) -> float:
-    return max(REVERSAL_PADDING_S, SMEARED_PERIODS / run.cutoff_hz)
+    return round(REVERSAL_PADDING_S * run.sample_rate_hz)
 
 
 def away_from_turns(motion: Motion) -> NDArray:

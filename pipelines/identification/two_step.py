@@ -258,7 +258,7 @@ def _values(steps: Mapping[str, Step[Any]]) -> NDArray:
 
 
 def _method(estimator: Estimator, steps: Mapping[str, Step[Estimate]], training: Training) -> dict[str, Any]:
-    away = f"all but {mask_in_words(training.runs[0])}"
+    away = f"all but {mask_in_words(training.runs[0].machine)}"
     return {
         "name": f"two-step {estimator.title}",
         "estimator": estimator.name,

@@ -33,8 +33,6 @@ class Run(Protocol):
     @property
     def sample_rate_hz(self) -> float: ...  # noqa: D102
     @property
-    def cutoff_hz(self) -> float: ...  # noqa: D102
-    @property
     def joints(self) -> tuple[str, ...]: ...  # noqa: D102
     @property
     def machine(self) -> Machine: ...  # noqa: D102
@@ -93,11 +91,6 @@ class StoredRun:
     def sample_rate_hz(self) -> float:
         """Nominal."""
         return self._facts.sample_rate_hz
-
-    @property
-    def cutoff_hz(self) -> float:
-        """Of the low-pass."""
-        return self._facts.cutoff_hz
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -43,7 +43,7 @@ def verdict(d: Diagnosis) -> dict[str, Any]:
         "caveats": caveats(d),
         "scoring": {
             "bandwidth_hz": first.bandwidth_hz,
-            "mask": mask_in_words(d.train[0].motion) + low_pass * d.data.noisy_angles,
+            "mask": mask_in_words(d.baseline.machine) + low_pass * d.data.noisy_angles,
             "samples": int(d.after.errors.counts.sum()),
         },
         **_numbers(d),
