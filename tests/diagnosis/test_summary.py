@@ -15,7 +15,7 @@ from pipelines.diagnosis.evidence.noise_floor import Floor
 from pipelines.diagnosis.fit.validation_error import Errors, scored
 from pipelines.diagnosis.selection.posterior import Posterior
 from pipelines.diagnosis.verdict.cause_evidence import cause_evidence
-from pipelines.diagnosis.verdict.caveats import _at_ends, _default_length
+from pipelines.diagnosis.verdict.caveats import _at_ends, _default_length, caveats
 from pipelines.diagnosis.verdict.summary import _in_words, finding_in_words
 from pipelines.diagnosis.verdict.verdict import verdict
 from pipelines.effects.passive_joint_torque import PassiveJointTorque
@@ -266,6 +266,14 @@ def test_a_shape_that_ended_where_its_search_ends_is_told_with_its_value():
     assert told(0.2) == []
     (caveat,) = told(least)
     assert f"passive_joint_torque@knee ended at the limit of its search, onset_angle = {least:.3g} rad" in caveat
+
+
+@pytest.mark.parametrize(("times", "is_told"), [(1.0, False), (1e6, True)])
+def test_a_size_that_may_be_zero_is_said_to_be_hardly_known(stuck, times, is_told):
+    wide = replace(stuck.uncertainty, covariance=times * stuck.uncertainty.covariance)
+    told = [caveat for caveat in caveats(replace(stuck, uncertainty=wide)) if "hardly tell" in caveat]
+    said = "how large parallel spring at the knee is, the training runs hardly tell: the 95 % interval of its size "
+    assert told == [said + "includes zero"] * is_told
 
 
 @pytest.mark.parametrize(("unlisted", "status"), [(0.4, "explained"), (0.6, "partly_explained")])

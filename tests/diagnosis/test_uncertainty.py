@@ -7,7 +7,7 @@ from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.evidence.baseline import baseline_of
 from pipelines.diagnosis.evidence.observed_run import observe
 from pipelines.diagnosis.fit.joint_fit import fit
-from pipelines.diagnosis.fit.uncertainty import uncertainty
+from pipelines.diagnosis.fit.uncertainty import Uncertainty, uncertainty
 from pipelines.effects import ParallelSpring
 from tests.diagnosis.sessions import session
 
@@ -31,3 +31,15 @@ def error_of_stiffness(seconds: float, imperfect: float) -> float:
 @pytest.mark.parametrize(("imperfect", "ratio"), [(0.0, 0.5), (3.0, 1.0)])
 def test_four_times_as_many_periods_halve_what_noise_leaves_in_doubt_and_no_misfit(imperfect, ratio):
     assert error_of_stiffness(80.0, imperfect) / error_of_stiffness(20.0, imperfect) == pytest.approx(ratio, rel=0.2)
+
+
+@pytest.mark.parametrize("critical", [1.96, 2.6])
+def test_a_joint_region_includes_zero_95_times_in_100_where_the_truth_is_zero(critical):
+    """Two correlated amplitudes; few independent samples, a larger ``critical``, make it wider by as much."""
+    covariance = np.array([[4.0, 1.9, 0.0], [1.9, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    known = Uncertainty((1.96 / critical) ** 2 * covariance, critical, (), np.eye(3))
+    values = np.random.default_rng(5).multivariate_normal(np.zeros(3), covariance, 2000)
+    share = np.mean([known.includes_zero(one, slice(0, 2)) for one in values])
+    assert share == pytest.approx(0.95, abs=0.012)
+    assert not known.includes_zero(np.array([0.0, 0.0, 9.0]), slice(2, 3))
+    assert not known.includes_zero(values[0], slice(1, 1))

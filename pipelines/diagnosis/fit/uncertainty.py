@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
+from scipy.stats import chi2, norm
 
 from pipelines.diagnosis.candidates.candidate import Candidate
 from pipelines.diagnosis.evidence.baseline import Baseline
@@ -32,6 +33,13 @@ class Uncertainty:
     """Weighted normal matrix of the same parameters in the same order: what collinearity is read from."""
     onsets: Mapping[tuple[int, int, int], tuple[float, float]] = field(default_factory=dict)
     """Of those shapes that are instants at which a cause begins, the ends of the 95 % interval, s."""
+
+    def includes_zero(self, values: NDArray, amplitudes: slice) -> bool:
+        """Tell whether the joint 95 % region of some amplitudes among the fit's ``values`` includes zero (Wald)."""
+        size, covariance = values[amplitudes], self.covariance[amplitudes, amplitudes]
+        statistic = float(size @ np.linalg.pinv(covariance, hermitian=True) @ size)
+        wide = (self.critical / norm.ppf(0.975)) ** 2
+        return len(size) > 0 and statistic <= wide * float(chi2.ppf(0.95, len(size)))
 
 
 def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: NDArray) -> Uncertainty:

@@ -33,8 +33,9 @@ def caveats(d: Diagnosis) -> list[str]:
     ]
     doubtful = [] if d.data.spoilt else [*_high_floor(d), *d.upside_down]
     return [
-        *known, *_at_ends(d), *_default_length(d), *[noisy] * d.data.noisy_angles, *_unrealizable(d), *doubtful,
-        *(_reversal(d, one) for one in d.reversals), *_by_all_runs(d), *_differs(d), *_one_run(d), *_one_kind(d),
+        *known, *_at_ends(d), *_unknown_size(d), *_default_length(d), *[noisy] * d.data.noisy_angles,
+        *_unrealizable(d), *doubtful, *(_reversal(d, one) for one in d.reversals), *_by_all_runs(d), *_differs(d),
+        *_one_run(d), *_one_kind(d),
     ]  # fmt: skip
 
 
@@ -68,6 +69,17 @@ def _at_ends(d: Diagnosis) -> list[str]:
         if cause.is_free(i) and i != cause.onset
         for value in {shape[i] for shape in cause.shapes}
         if any(np.isclose(value, end, rtol=1e-6) for end in reach(parameter))
+    ]
+
+
+def _unknown_size(d: Diagnosis) -> list[str]:
+    """Say which named cause may be of either sign, for all that the training runs tell."""
+    return [
+        f"how large {label_in_words(cause.label, d.baseline.machine)} is, the training runs hardly tell: the 95 % "
+        "interval of its size includes zero"
+        for number, cause in enumerate(d.after.fit.causes)
+        if not cause.effect.per_run
+        and d.uncertainty.includes_zero(d.after.fit.values, d.after.fit.columns_of(number).slice)
     ]
 
 
