@@ -149,6 +149,7 @@ class Posterior(_Object):
     unlisted: Probability
     causes: dict[str, Probability]
     laws: dict[str, Probability]
+    systematic_error_removed: dict[str, Number] = {}
 
 
 class Loop(_Object):

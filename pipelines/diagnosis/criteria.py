@@ -59,6 +59,9 @@ class Criteria:
     """Least probability at which a cause, alone or with its ties, is named, and at which a finding is reported."""
     tied: float = 0.1
     """Share of the named cause's probability from which another cause is its tie."""
+    look_alike: tuple[float, float] = (2.6, 3.0)
+    """Log odds that a named cause is no unlisted effect that resembles it, where it removes all systematic error of the
+    validation runs; and how much they change with the logarithm of the share that it removes."""
     at_floor: float = 1.03
     """RMSE over noise floor up to which a joint has no systematic error (contracts.md)."""
     predicted_better: float = 1.0
@@ -72,14 +75,15 @@ BEFORE_EVIDENCE = ("explained_share", "form_misfit", "shape_freedom")
 """Criteria that act before the evidence of a session is stored."""
 HELD = (
     *BEFORE_EVIDENCE, "model_error", "background_line", "each_run", "lines", "base_rate",
-    "likely", "tied", "at_floor", "predicted_better", "left_of_explained",
+    "likely", "tied", "look_alike", "at_floor", "predicted_better", "left_of_explained",
 )  # fmt: skip
 """What is not learned. The first three act before the evidence is stored. The mixture of the sessions decides the
 base rate. Under a larger model error a second cause beside a large one is lost, and learning tells no difference over
 a factor of three. Nor does it over a factor of thirty in `lines`. Good drives ripple by a percent of their torque;
 too few sessions have such drives, and learned alone `background_line` called their ripple missing. Too few have
-sensors that are tared anew at each start, which labs have: `each_run` is of sessions that had more. The last five
-decide what is reported of the probabilities and errors, and whether all runs are searched."""
+sensors that are tared anew at each start, which labs have: `each_run` is of sessions that had more. `look_alike` is learned from the verdicts of a blind examination, by
+`python -m tests.learn look-alikes`. The other five of the last six decide what is reported of the probabilities and
+errors, and whether all runs are searched."""
 
 LEARNED = """\
 They were learned from 335 sessions of seeds from 210000 on. Learned anew from 177 sessions whose evidence was stored by

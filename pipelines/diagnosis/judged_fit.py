@@ -9,7 +9,7 @@ from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.baseline import with_load
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
 from pipelines.diagnosis.fit.joint_refinement import Refinement
-from pipelines.diagnosis.fit.validation import Validated, log_likelihoods, without_each
+from pipelines.diagnosis.fit.validation import Validated, log_likelihoods, removed_share, without_each
 from pipelines.diagnosis.fit.validation_error import gain
 from pipelines.diagnosis.selection.marginal_likelihood import power
 from pipelines.diagnosis.selection.selected import Selected
@@ -51,7 +51,7 @@ def judged_fit(selected: Selected, prepared: Prepared, before: Validated) -> Jud
 
     The most harmful cause is charged first: beside it, what others do may seem to harm too. Of causes
     that the training runs cannot tell apart, those are charged that predict the validation runs worse
-    than the best of them.
+    than the best of them. At last each may be an unlisted effect that resembles it.
     """
     refine = _refinement(prepared)
     fitted: tuple[Candidate, ...] | None = None
@@ -68,7 +68,18 @@ def judged_fit(selected: Selected, prepared: Prepared, before: Validated) -> Jud
         elif shortfalls := _shortfalls(selected, after, refine, prepared, before):
             selected = selected.judged(shortfalls)
         else:
-            return JudgedFit(selected, before, after, without, float(whole.sum()))
+            break
+    selected = selected.with_look_alikes(_removed(after, without))
+    if selected.candidates != fitted:
+        after, without = _fitted(selected, refine, prepared, before)
+        whole = log_likelihoods(after, prepared.noise)
+    return JudgedFit(selected, before, after, without, float(whole.sum()))
+
+
+def _removed(after: Validated, without: dict[str, Validated]) -> dict[str, float]:
+    """Return the share of the systematic error that each cause removes; none of a cause without which there is none."""
+    shares = {label: removed_share(less, after) for label, less in without.items()}
+    return {label: share for label, share in shares.items() if share is not None}
 
 
 def _shortfalls(

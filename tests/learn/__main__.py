@@ -122,6 +122,19 @@ def sensitivity(
     typer.echo(f"written to {MEASURED}")
 
 
+@app.command("look-alikes")
+def look_alikes(
+    examined: Annotated[Path, typer.Option(help="Folder of a blind examination on tuning seeds.")] = Path("build/blind"),
+) -> None:
+    """Learn from a blind examination how likely a named cause is an unlisted effect that resembles it."""
+    from tests.learn.look_alikes import judged_causes, learn_look_alike
+
+    judged = list(judged_causes(examined))
+    if not judged:
+        raise typer.BadParameter(f"{examined} has no answer that names a cause; run `make blind`")
+    typer.echo(json.dumps(learn_look_alike(judged), indent=1))
+
+
 @app.command()
 def show(out: OUT = HERE) -> None:
     """Count the stored evidence."""

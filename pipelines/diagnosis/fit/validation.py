@@ -68,6 +68,17 @@ def gains_of(without: Mapping[str, Validated], whole: Validated) -> dict[str, Ga
     return {label: gain(less.errors, whole.errors) for label, less in without.items()}
 
 
+def removed_share(less: Validated, whole: Validated) -> float | None:
+    """Return the share of the systematic error without a cause that it removes, 0 to 1; None where there is none.
+
+    Of the mean square above the noise floor, at the joint where the cause gains most.
+    """
+    joint = gain(less.errors, whole.errors).joint
+    floor, without, with_it = (float(rms[joint]) for rms in (whole.floor.rms, less.errors.rms, whole.errors.rms))
+    power = without**2 - floor**2
+    return float(np.clip((without**2 - with_it**2) / power, 0.0, 1.0)) if power > 0.0 else None
+
+
 def log_likelihoods(made: Validated, noise: NoiseModel) -> NDArray:
     """Return the log likelihood of the validation runs, for each drive (J,), up to a constant.
 

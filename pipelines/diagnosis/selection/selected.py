@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from scipy.special import expit, logit
 
@@ -14,6 +15,7 @@ from pipelines.diagnosis.evidence.residual_shares import ResidualShares, residua
 from pipelines.diagnosis.selection.answer import Answer, Named, answer_of
 from pipelines.diagnosis.selection.evidence import Element, Evidence
 from pipelines.diagnosis.selection.findings import Finding, findings
+from pipelines.diagnosis.selection.look_alikes import with_look_alikes
 from pipelines.diagnosis.selection.posterior import SURE, Posterior, likely_contexts, posterior, strongest
 from pipelines.diagnosis.training_data import training_data
 from pipelines.mechanics.motion import Motion
@@ -60,6 +62,10 @@ class Selected:
     charged: Mapping[str, float] = field(default_factory=dict)
     """What the validation runs take from log odds, by variant of a cause: its harm, or how far it falls behind the best
     of its ties, which has zero."""
+
+    removed: Mapping[str, float] = field(default_factory=dict)
+    """Share of the systematic error of the validation runs that a cause removes, by label, of all that were asked
+    whether they are look-alikes."""
 
     by_all: AllRunsSearch | None = None
     """None where the evidence is of the training runs."""
@@ -159,14 +165,36 @@ class Selected:
         charged = {**self.charged, **charges}
         floors = {one.members: _lowered(one, charges, self._elements) for one in self.answer.named}
         weighed = _with_floors(self.trained.judged(charged), floors)
+        again = self._reweighed(weighed, charged=charged)
+        doubted = {one.element.label for one in self.answer.named if harms and one.element.variant in charges}
+        return replace(again, dropped=(self.dropped | doubted) - set(again.answer.labels))
+
+    def _reweighed(self, weighed: Posterior, **judged: Any) -> "Selected":
+        """Return the answer by another posterior, and what was ``judged`` to come to it."""
         likely = answer_of(weighed, [one.members for one in self.answer.named])
         # Anything else that becomes likely is a finding: refuting one cause is no evidence for another.
         named = tuple(one for one in likely.named if one.element.label in self.answer.members)
         answer = replace(likely, named=named)
-        doubted = {one.element.label for one in self.answer.named if harms and one.element.variant in charges}
-        dropped = (self.dropped | doubted) - {one.element.label for one in named}
-        found = tuple(findings(weighed, answer))
-        return replace(self, posterior=weighed, answer=answer, findings=found, charged=charged, dropped=dropped)
+        return replace(self, posterior=weighed, answer=answer, findings=tuple(findings(weighed, answer)), **judged)
+
+    def with_look_alikes(self, removed: Mapping[str, float]) -> "Selected":
+        """Return the answer in which named causes may be unlisted effects that resemble them.
+
+        Parameters
+        ----------
+        removed : mapping of str to float
+            Share of the systematic error of the validation runs that each named cause removes, by label.
+        """
+        if self.posterior is None or not removed:
+            return self
+        shares = {
+            label: removed[one.element.label]
+            for one in self.answer.named
+            for label in one.members
+            if one.element.label in removed
+        }
+        weighed = with_look_alikes(self.posterior, shares)
+        return self._reweighed(weighed, removed=dict(removed))
 
     @property
     def _elements(self) -> tuple[Element, ...]:

@@ -6,6 +6,7 @@ from typing import Any
 from pipelines.contracts.joints import the
 from pipelines.diagnosis.candidates.smooth_laws import IN_WORDS
 from pipelines.diagnosis.diagnosis import Diagnosis
+from pipelines.diagnosis.selection import look_alikes
 from pipelines.diagnosis.selection.findings import Finding
 from pipelines.diagnosis.selection.posterior import Posterior
 from pipelines.label import effect_labelled, in_words
@@ -41,7 +42,7 @@ def label_in_words(label: str, machine: Machine) -> str:
     if not label.startswith(LAW):
         return in_words(effect_labelled(label))
     kind, joint = _law_of(label)
-    return _said_of(IN_WORDS[kind], joint, machine)
+    return _said_of({**IN_WORDS, **look_alikes.IN_WORDS}[kind], joint, machine)
 
 
 def _said_of(words: str, joint: str, machine: Machine) -> str:

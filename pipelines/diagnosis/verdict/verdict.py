@@ -8,6 +8,7 @@ import pandas as pd
 from pipelines.diagnosis.dependence.explained_share import Dependence, dependences
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fit.presliding_test import BuildUp
+from pipelines.diagnosis.fit.validation import removed_share
 from pipelines.diagnosis.selection.answer import Named
 from pipelines.diagnosis.verdict.cause_evidence import cause_evidence
 from pipelines.diagnosis.verdict.caveats import caveats
@@ -96,6 +97,7 @@ def _posterior(d: Diagnosis) -> dict[str, Any] | None:
         "unlisted": d.selected.answer.unlisted,
         "causes": {label: p for label, p in weighed.marginals.items() if label in listed},
         "laws": {label: p for label, p in weighed.marginals.items() if label not in listed},
+        "systematic_error_removed": dict(d.selected.removed),
     }
 
 
@@ -132,9 +134,6 @@ def _depends_on(before: Sequence[Dependence], after: Sequence[Dependence]) -> di
 def _cause(d: Diagnosis, named: Named) -> dict[str, Any]:
     label = named.element.label
     effect, gained = d.effects[label], d.gains[label]
-    floor, without = d.floor_rms[gained.joint], d.without[label].errors.rms[gained.joint]
-    power = without**2 - floor**2
-    removed = without**2 - d.after.errors.rms[gained.joint] ** 2
     return {
         "effect": effect.name,
         "joint": effect.joint,
@@ -144,7 +143,7 @@ def _cause(d: Diagnosis, named: Named) -> dict[str, Any]:
         "gain": {
             "rmse_reduction_nm": gained.value,
             "ci95": [gained.low, gained.high],
-            "systematic_error_removed": _clipped(removed / power) if power > 0 else None,
+            "systematic_error_removed": removed_share(d.without[label], d.after),
             "joint": d.baseline.joints[gained.joint],
         },
         "indistinguishable_from": [_tie(effect, d.effect_of(tie), p) for tie, p in named.ties],
@@ -152,10 +151,6 @@ def _cause(d: Diagnosis, named: Named) -> dict[str, Any]:
         "fitted_on_validate": [p.name for p in effect.parameters if p.per_run],
         "each_run": d.each_run.get(label, []),
     }
-
-
-def _clipped(share: float) -> float:
-    return float(min(max(share, 0.0), 1.0))
 
 
 def _rows(frame: pd.DataFrame, effect: Effect) -> list[dict[str, Any]]:

@@ -1,0 +1,89 @@
+"""How probable it is that a named cause is an unlisted effect that only resembles it.
+
+No catalogue is complete. The posterior explains an effect that nobody listed by whichever listed cause resembles it
+most, and is as sure of it as of a true cause. The validation runs tell them apart: a true cause removes nearly all of
+the systematic error that the model leaves without it there, a mere resemblance a part.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from scipy.special import expit
+
+from pipelines.diagnosis.criteria import CRITERIA, Criteria
+from pipelines.diagnosis.selection.evidence import Element
+from pipelines.diagnosis.selection.posterior import Posterior
+
+IN_WORDS = {
+    "unlisted_angle": "an unlisted law of {joint}'s angle",
+    "unlisted_speed": "an unlisted law of {joint}'s speed",
+    "unlisted_reversal": "unlisted friction of {joint} that remembers its reversals",
+    "unlisted_load": "an unlisted law of {joint}'s load",
+    "unlisted_time": "an unlisted torque at {joint} that changes with time",
+    "unlisted_transmission": "something unlisted in {joint}'s transmission",
+    "unlisted_sensor": "something unlisted in {joint}'s sensors",
+    "unlisted_person": "something unlisted of the person at {joint}",
+}
+"""The law that a look-alike is taken for, by its kind: a cause's family is hardly ever mistaken."""
+LEAST = 0.01
+"""Share of the systematic error below which what a cause removes is rounded up."""
+
+
+def listed_probability(removed: float, criteria: Criteria = CRITERIA) -> float:
+    """Return the probability that a named cause is what it is called, and no look-alike.
+
+    Parameters
+    ----------
+    removed : float
+        Share of the systematic error of the validation runs that it removes, 0 to 1.
+    """
+    certain, slope = criteria.look_alike
+    return float(expit(certain + slope * np.log(max(removed, LEAST))))
+
+
+def with_look_alikes(posterior: Posterior, removed: Mapping[str, float]) -> Posterior:
+    """Return the posterior in which each named cause may be an unlisted effect of its family and joint.
+
+    Every set with the cause gives a share of its probability to the same set with an unlisted law in its place.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        Of listed causes and smooth laws.
+    removed : mapping of str to float
+        Share of the systematic error that a cause removes, by label; of ties what the one that was fitted does.
+    """
+    listed = {label: listed_probability(share) for label, share in removed.items()}
+    elements = list(posterior.elements)
+    instead: dict[int, int] = {}
+    for i, element in enumerate(posterior.elements):
+        if element.label in listed:
+            instead[i] = len(elements)
+            elements.append(_unlisted(element))
+    sets, log_odds = [], []
+    for chosen, odds in zip(posterior.sets, posterior.log_odds, strict=True):
+        for other, weight in _split(chosen, instead, [listed.get(elements[i].label, 1.0) for i in chosen]):
+            sets.append(other)
+            log_odds.append(odds + np.log(weight))
+    order = np.argsort(-np.array(log_odds), kind="stable")
+    return Posterior(tuple(elements), tuple(sets[k] for k in order), np.array(log_odds)[order])
+
+
+def _split(
+    chosen: Sequence[int], instead: Mapping[int, int], listed: Sequence[float]
+) -> list[tuple[tuple[int, ...], float]]:
+    """Return a set with each choice of its look-alikes, and the share of its probability that each has."""
+    ways = [
+        [(i, p), (instead[i], 1.0 - p)] if i in instead else [(i, 1.0)]
+        for i, p in zip(chosen, listed, strict=True)
+    ]  # fmt: skip
+    return [(tuple(i for i, _ in way), float(np.prod([p for _, p in way]))) for way in product(*ways)]
+
+
+def _unlisted(element: Element) -> Element:
+    """Return the unlisted law that a cause is a look-alike of."""
+    kind = f"unlisted_{element.family}"
+    at = f"@{element.joint}" if element.joint else ""
+    return replace(element, label=f"law:{kind}{at}", name=kind, is_law=True, each_run=False, worn=False)
