@@ -91,7 +91,7 @@ def _broken(words: str, depth: int) -> list[str]:
 
 def _show_router(said: Mapping[str, Any]) -> None:
     """Print what the residual of each joint is made of, and what it depends on."""
-    from pipelines.findings import shares
+    from pipelines.findings import searched_runs, shares
 
     joints = shares(said)
     if not joints or said.get("acquisition_at_fault"):
@@ -113,7 +113,7 @@ def _show_router(said: Mapping[str, Any]) -> None:
         numbers=", ".join(headings[1:]),
     )  # fmt: skip
     console.note(
-        f"{_listed(parts.values())}: parts of the mean square, training runs. "
+        f"{_listed(parts.values())}: parts of the mean square, {searched_runs(said)}. "
         f"{_listed(variables)}: what a curve of it alone predicts, validation runs."
     )
 

@@ -95,6 +95,11 @@ def rows(verdict: Mapping[str, Any]) -> list[Row]:
     return [row for node in root.below.values() for row in _rows_of(node, 0)]
 
 
+def searched_runs(verdict: Mapping[str, Any]) -> str:
+    """Return which runs causes were sought on, whose residual is split."""
+    return "all runs" if verdict.get("sought_on") == "all" else "training runs"
+
+
 def shares(verdict: Mapping[str, Any]) -> list[Shares]:
     """Return how each joint's residual splits."""
     found = []

@@ -77,13 +77,13 @@ HELD = (
     *BEFORE_EVIDENCE, "model_error", "background_line", "each_run", "lines", "base_rate",
     "likely", "tied", "look_alike", "at_floor", "predicted_better", "left_of_explained",
 )  # fmt: skip
-"""What is not learned. The first three act before the evidence is stored. The mixture of the sessions decides the
-base rate. Under a larger model error a second cause beside a large one is lost, and learning tells no difference over
-a factor of three. Nor does it over a factor of thirty in `lines`. Good drives ripple by a percent of their torque;
-too few sessions have such drives, and learned alone `background_line` called their ripple missing. Too few have
-sensors that are tared anew at each start, which labs have: `each_run` is of sessions that had more. `look_alike` is learned from the verdicts of a blind examination, by
-`python -m tests.learn look-alikes`. The other five of the last six decide what is reported of the probabilities and
-errors, and whether all runs are searched."""
+"""What `make learn` does not learn. The first three act before the evidence is stored. The mixture of the sessions
+decides the base rate. Under a larger model error a second cause beside a large one is lost, and learning tells no
+difference over a factor of three. Nor does it over a factor of thirty in `lines`. Good drives ripple by a percent of
+their torque; too few sessions have such drives, and learned alone `background_line` called their ripple missing. Too
+few have sensors that are tared anew at each start, which labs have: `each_run` is of sessions that had more.
+`look_alike` is learned from the verdicts of a blind examination, by `python -m tests.learn look-alikes`. The other
+five of the last six decide what is reported of the probabilities and errors, and whether all runs are searched."""
 
 LEARNED = """\
 They were learned from 335 sessions of seeds from 210000 on. Learned anew from 177 sessions whose evidence was stored by

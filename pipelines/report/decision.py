@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pipelines.findings import PARTS, Row, Shares, outcomes, rows, shares
+from pipelines.findings import PARTS, Row, Shares, outcomes, rows, searched_runs, shares
 from pipelines.report.bars import torque_unit
 
 OUTCOMES = {"nothing": "noise", "listed": "cause1", "unlisted": "unlisted"}
@@ -47,6 +47,8 @@ class Decision:
     """Nothing missing, listed causes only, something unlisted."""
     rows: tuple[Row, ...]
     splits: tuple[Split, ...]
+    searched: str
+    """The runs whose residual is split."""
 
 
 def decision(verdict: Mapping[str, Any]) -> Decision | None:
@@ -58,6 +60,7 @@ def decision(verdict: Mapping[str, Any]) -> Decision | None:
         _end_to_end([(case.words, OUTCOMES[case.key], case.probability) for case in cases]),
         tuple(rows(verdict)),
         tuple(_split(verdict, one) for one in shares(verdict)),
+        searched_runs(verdict),
     )
 
 

@@ -124,7 +124,9 @@ def sensitivity(
 
 @app.command("look-alikes")
 def look_alikes(
-    examined: Annotated[Path, typer.Option(help="Folder of a blind examination on tuning seeds.")] = Path("build/blind"),
+    examined: Annotated[Path, typer.Option(help="Folder of a blind examination on tuning seeds.")] = Path(
+        "build/blind"
+    ),
 ) -> None:
     """Learn from a blind examination how likely a named cause is an unlisted effect that resembles it."""
     from tests.learn.look_alikes import judged_causes, learn_look_alike

@@ -188,3 +188,10 @@ def test_no_row_of_tiles_is_left_half_empty(opened, tmp_path, causes, width):
             rows = page.evaluate(RIGHT_EDGES)
             assert len({row["right"] for row in rows}) == 1
             assert all(row["tiles"] > 1 or width == 390 for row in rows)
+
+
+@pytest.mark.parametrize(("sought_on", "runs"), [("all", "all runs"), ("train", "training runs")])
+def test_the_split_of_the_error_says_which_runs_it_is_of(tmp_path, sought_on, runs):
+    folder = write_session(tmp_path / "leg")
+    write_verdict(folder, sought_on=sought_on, **decision_of())
+    assert f"Shares of its mean square, {runs}." in top(folder)

@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.verdict.findings_in_words import LAW, family_of, label_in_words
-from pipelines.findings import PARTS, VARIABLES
+from pipelines.findings import PARTS, VARIABLES, searched_runs
 from pipelines.plots import BLUE, GREY, NOISE, WANDERS
 
 COLOURS = {
@@ -61,15 +61,15 @@ def figure(d: Diagnosis, said: dict[str, Any]) -> Figure:
     lines = sum(_height(bar) for bar in bars)
     drawn = plt.figure(figsize=(11, max(SMALLEST_IN, LINE_IN * lines + 1.3)), layout="constrained")
     grid = drawn.add_gridspec(2, 2, width_ratios=[1, 1.1], height_ratios=[1.25, 1])
-    _shares(drawn.add_subplot(grid[0, 0]), said, "training runs" if d.selected.by_all is None else "all runs")
+    _shares(drawn.add_subplot(grid[0, 0]), said)
     _dependence(drawn.add_subplot(grid[1, 0]), said)
     _sets(drawn.add_subplot(grid[:, 1]), bars)
     drawn.draw_without_rendering()  # lays out, which whoever measures the figure relies on
     return drawn
 
 
-def _shares(axis: Axes, said: Mapping[str, Any], runs: str) -> None:
-    """Draw a bar for each joint, cut into what its residual is made of in some runs."""
+def _shares(axis: Axes, said: Mapping[str, Any]) -> None:
+    """Draw a bar for each joint, cut into what its residual is made of."""
     seen: dict[str, Patch] = {}
     router = said["router"]
     for row, told in enumerate(router.values()):
@@ -96,7 +96,7 @@ def _shares(axis: Axes, said: Mapping[str, Any], runs: str) -> None:
     axis.set_xlim(0.0, 1.0)
     axis.grid(visible=False)
     axis.xaxis.set_major_formatter(lambda x, _: f"{x:.0%}")
-    axis.set_xlabel(f"share of the mean square, 0.1 s averages, {runs}", fontsize=8)
+    axis.set_xlabel(f"share of the mean square, 0.1 s averages, {searched_runs(said)}", fontsize=8)
     words = [one for one in (*map(PARTS.get, ORDER), PERSON) if one in seen]
     axis.legend(
         [seen[one] for one in words], words, loc="upper left", bbox_to_anchor=(-0.02, -0.32),
