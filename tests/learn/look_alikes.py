@@ -1,4 +1,4 @@
-"""``Criteria.look_alike`` learned from a blind examination on tuning seeds: which named causes are what they are called."""
+"""``Criteria.look_alike`` learned from a blind examination on seeds for tuning."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -78,5 +78,7 @@ def _worth(told: NDArray, is_right: NDArray) -> dict[str, float | None]:
     pairs = [(float(p), bool(right)) for p, right in zip(told, is_right, strict=True)]
     likely = np.where(is_right > 0.0, np.clip(told, 1e-9, 1.0), np.clip(1.0 - told, 1e-9, 1.0))
     return {
-        "mean_log": float(np.mean(np.log(likely))), "brier": brier(pairs), "calibration_error": calibration_error(pairs),
-    }  # fmt: skip
+        "mean_log": float(np.mean(np.log(likely))),
+        "brier": brier(pairs),
+        "calibration_error": calibration_error(pairs),
+    }
