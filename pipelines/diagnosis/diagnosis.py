@@ -85,7 +85,8 @@ class Diagnosis:
             return "unknown_cause"
         if not self.named:
             return "unknown_cause" if self.selected.shows_something else "nothing_missing"
-        left = [share for share in self.unexplained if share is not None]
+        ends_above = self.after.errors.rms > CRITERIA.at_floor * self.floor_rms
+        left = [share for share, above in zip(self.unexplained, ends_above, strict=True) if share and above]
         is_gone = all(share <= CRITERIA.left_of_explained for share in left)
         more = any(one.level != "cause" for one in self.selected.findings)
         more |= self.selected.shows_unlisted

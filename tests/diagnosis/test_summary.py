@@ -276,6 +276,12 @@ def test_a_size_that_may_be_zero_is_said_to_be_hardly_known(stuck, times, is_tol
     assert told == [said + "includes zero"] * is_told
 
 
+@pytest.mark.parametrize(("extended", "status"), [(0.514, "explained"), (0.525, "partly_explained")])
+def test_an_error_that_ends_as_noise_is_explained_however_little_there_was(stuck, extended, status):
+    """Of a hip's error of 1.06 times its floor, 45 % or 83 % of what was systematic is left."""
+    assert with_errors(stuck, [0.5, 0.3], [0.53, 2.4], [extended, 0.3]).status == status
+
+
 @pytest.mark.parametrize(("unlisted", "status"), [(0.4, "explained"), (0.6, "partly_explained")])
 def test_beside_a_likely_unlisted_law_named_causes_explain_a_part(stuck, unlisted, status):
     """Even where they leave little: what is left need not show in the validation runs' error."""
