@@ -17,14 +17,14 @@ from pipelines.diagnosis.selection.evidence import Element
 from pipelines.diagnosis.selection.posterior import Posterior
 
 IN_WORDS = {
-    "unlisted_angle": "an unlisted law of {joint}'s angle",
-    "unlisted_speed": "an unlisted law of {joint}'s speed",
-    "unlisted_reversal": "unlisted friction of {joint} that remembers its reversals",
-    "unlisted_load": "an unlisted law of {joint}'s load",
-    "unlisted_time": "an unlisted torque at {joint} that changes with time",
-    "unlisted_transmission": "something unlisted in {joint}'s transmission",
-    "unlisted_sensor": "something unlisted in {joint}'s sensors",
-    "unlisted_person": "something unlisted of the person at {joint}",
+    "unlisted_angle": "another law of {joint}'s angle",
+    "unlisted_speed": "another law of {joint}'s speed",
+    "unlisted_reversal": "other friction of {joint} that remembers its reversals",
+    "unlisted_load": "another law of {joint}'s load",
+    "unlisted_time": "another torque at {joint} that changes with time",
+    "unlisted_transmission": "something else in {joint}'s transmission",
+    "unlisted_sensor": "something else in {joint}'s sensors",
+    "unlisted_person": "something else of the person at {joint}",
 }
 """The law that a look-alike is taken for, by its kind: a cause's family is hardly ever mistaken."""
 LEAST = 0.01
