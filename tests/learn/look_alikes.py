@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.special import expit
 
+from pipelines.diagnosis.candidates.smooth_laws import FAMILIES
 from pipelines.diagnosis.criteria import CRITERIA
-from pipelines.diagnosis.selection.look_alikes import LEAST, listed_probability
+from pipelines.diagnosis.selection.look_alikes import IN_WORDS, listed_share
+from pipelines.model import effect_named
 from tests.blind.scoring import names_of
 from tests.blind.statistics import brier, calibration_error
 
@@ -26,6 +27,8 @@ class Judged(NamedTuple):
     """Before it was asked."""
     removed: float
     """Share of the systematic error that it removes."""
+    instead: float
+    """Probability of smooth laws of its family and joint in its place, beside its own."""
     is_right: bool
 
 
@@ -41,12 +44,25 @@ def judged_causes(root: Path) -> Iterator[Judged]:
 
 def _judged(truth: dict[str, Any], verdict: dict[str, Any]) -> Iterator[Judged]:
     there = {(name, h["joint"]) for h in truth["hidden"] for name in (h["effect"], *h["kin"])}
-    named = {_label(cause): cause for cause in verdict["causes"]}
-    for label, removed in verdict["posterior"]["systematic_error_removed"].items():
+    named, posterior = {_label(cause): cause for cause in verdict["causes"]}, verdict["posterior"]
+    for label, removed in posterior["systematic_error_removed"].items():
         effect, _, joint = label.partition("@")
-        cause = named.get(label, {"effect": effect, "joint": joint or None, "probability": None})
-        now = cause["probability"] or verdict["posterior"]["causes"][label]
-        yield Judged(min(now / listed_probability(removed), 1.0), removed, bool(there & names_of(cause)))
+        cause = named.get(label, {"effect": effect, "joint": joint or None, "probability": posterior["causes"][label]})
+        places = {(str(effect_named(name).family), at) for name, at in names_of(cause)}
+        given, instead = (_unlisted(posterior["laws"], places, is_look_alike) for is_look_alike in (True, False))
+        before = min(cause["probability"] + given, 1.0)
+        yield Judged(before, removed, instead / before, bool(there & names_of(cause)))
+
+
+def _unlisted(laws: dict[str, float], places: set[tuple[str, str | None]], is_look_alike: bool) -> float:
+    """Return the probability of unlisted laws of families and joints: of look-alikes, or of smooth laws."""
+    kinds = {kind: kind.removeprefix("unlisted_") for kind in IN_WORDS} if is_look_alike else FAMILIES
+    found = 0.0
+    for label, p in laws.items():
+        kind, _, joint = label.removeprefix("law:").partition("@")
+        if (kinds.get(kind), joint or None) in places:
+            found += p
+    return found
 
 
 def _label(cause: dict[str, Any]) -> str:
@@ -55,11 +71,10 @@ def _label(cause: dict[str, Any]) -> str:
 
 def learn_look_alike(judged: Sequence[Judged]) -> dict[str, Any]:
     """Return the criteria that give the truth of judged causes most probability, and what they are worth."""
-    p, removed, is_right = (np.array(column, dtype=float) for column in zip(*judged, strict=True))
-    logs = np.log(np.maximum(removed, LEAST))
+    p, removed, instead, is_right = (np.array(column, dtype=float) for column in zip(*judged, strict=True))
 
     def likely(criteria: NDArray) -> NDArray:
-        return np.clip(p * expit(criteria[0] + criteria[1] * logs), 1e-9, 1.0 - 1e-9)
+        return np.clip(p * listed_share(removed, instead, criteria), 1e-9, 1.0 - 1e-9)
 
     def loss(criteria: NDArray) -> float:
         told = likely(criteria)

@@ -12,7 +12,8 @@ def drawn(count, certain, slope, seed=3):
     removed = rng.uniform(0.02, 1.0, count)
     probability = rng.uniform(0.5, 1.0, count)
     is_right = rng.random(count) < probability * expit(certain + slope * np.log(removed))
-    return [Judged(*one) for one in zip(probability.tolist(), removed.tolist(), is_right.tolist(), strict=True)]
+    columns = probability.tolist(), removed.tolist(), [0.0] * count, is_right.tolist()
+    return [Judged(*one) for one in zip(*columns, strict=True)]
 
 
 def test_the_criteria_that_causes_were_drawn_by_are_recovered_and_calibrated():
@@ -23,5 +24,5 @@ def test_the_criteria_that_causes_were_drawn_by_are_recovered_and_calibrated():
 
 
 def test_causes_that_are_all_right_give_finite_criteria():
-    learned = learn_look_alike([Judged(0.99, 0.9, True)] * 20)
+    learned = learn_look_alike([Judged(0.99, 0.9, 0.0, True)] * 20)
     assert np.isfinite(learned["look_alike"]).all()

@@ -35,7 +35,15 @@ class Uncertainty:
     """Of those shapes that are instants at which a cause begins, the ends of the 95 % interval, s."""
 
     def includes_zero(self, values: NDArray, amplitudes: slice) -> bool:
-        """Tell whether the joint 95 % region of some amplitudes among the fit's ``values`` includes zero (Wald)."""
+        """Tell whether the joint 95 % region of some amplitudes includes zero (Wald's test).
+
+        Parameters
+        ----------
+        values : NDArray
+            (p,) linear values of the fit.
+        amplitudes : slice
+            Places of the amplitudes among them.
+        """
         size, covariance = values[amplitudes], self.covariance[amplitudes, amplitudes]
         statistic = float(size @ np.linalg.pinv(covariance, hermitian=True) @ size)
         wide = (self.critical / norm.ppf(0.975)) ** 2

@@ -10,9 +10,10 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from scipy.special import expit
 
-from pipelines.diagnosis.criteria import CRITERIA, Criteria
+from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.selection.evidence import Element
 from pipelines.diagnosis.selection.posterior import Posterior
 
@@ -29,33 +30,44 @@ IN_WORDS = {
 """The law that a look-alike is taken for, by its kind: a cause's family is hardly ever mistaken."""
 LEAST = 0.01
 """Share of the systematic error below which what a cause removes is rounded up."""
+TINY = 1e-12
+"""Probability that is hardly any."""
 
 
-def listed_probability(removed: float, criteria: Criteria = CRITERIA) -> float:
-    """Return the probability that a named cause is what it is called, and no look-alike.
+def listed_share(removed: ArrayLike, instead: ArrayLike = 0.0, look_alike: ArrayLike = CRITERIA.look_alike) -> NDArray:
+    """Return the share of its probability that a named cause keeps, (...): that it is no look-alike.
 
     Parameters
     ----------
-    removed : float
-        Share of the systematic error of the validation runs that it removes, 0 to 1.
+    removed : ArrayLike
+        (...) share of the systematic error of the validation runs that it removes, 0 to 1.
+    instead : ArrayLike
+        (...) probability of smooth laws of its family and joint in its place, beside its own: an unlisted effect has
+        that already.
+    look_alike : ArrayLike
+        (2,) the criterion.
     """
-    certain, slope = criteria.look_alike
-    return float(expit(certain + slope * np.log(max(removed, LEAST))))
+    certain, slope = np.asarray(look_alike)
+    resembles = expit(-certain - slope * np.log(np.maximum(removed, LEAST)))
+    return np.asarray(1.0 - np.maximum(resembles - np.asarray(instead), 0.0))
 
 
-def with_look_alikes(posterior: Posterior, removed: Mapping[str, float]) -> Posterior:
+def with_look_alikes(posterior: Posterior, removed: Mapping[frozenset[str], float]) -> Posterior:
     """Return the posterior in which each named cause may be an unlisted effect of its family and joint.
 
-    Every set with the cause gives a share of its probability to the same set with an unlisted law in its place.
+    Every set with the cause gives a share of its probability to the same set with an unlisted law in its place. What
+    smooth laws of that family and joint have in its place already is no part of that share.
 
     Parameters
     ----------
     posterior : Posterior
         Of listed causes and smooth laws.
-    removed : mapping of str to float
-        Share of the systematic error that a cause removes, by label; of ties what the one that was fitted does.
+    removed : mapping of frozenset to float
+        Share of the systematic error that a cause removes, by its label and those of its ties.
     """
-    listed = {label: listed_probability(share) for label, share in removed.items()}
+    listed: dict[str, float] = {}
+    for labels, share in removed.items():
+        listed |= dict.fromkeys(labels, float(listed_share(share, _unlisted_instead(posterior, labels))))
     elements = list(posterior.elements)
     instead: dict[int, int] = {}
     for i, element in enumerate(posterior.elements):
@@ -65,10 +77,19 @@ def with_look_alikes(posterior: Posterior, removed: Mapping[str, float]) -> Post
     sets, log_odds = [], []
     for chosen, odds in zip(posterior.sets, posterior.log_odds, strict=True):
         for other, weight in _split(chosen, instead, [listed.get(elements[i].label, 1.0) for i in chosen]):
-            sets.append(other)
-            log_odds.append(odds + np.log(weight))
+            if weight > 0.0:
+                sets.append(other)
+                log_odds.append(odds + np.log(weight))
     order = np.argsort(-np.array(log_odds), kind="stable")
     return Posterior(tuple(elements), tuple(sets[k] for k in order), np.array(log_odds)[order])
+
+
+def _unlisted_instead(posterior: Posterior, labels: frozenset[str]) -> float:
+    """Return the probability of smooth laws of the family and joint of tied causes, in their place, beside theirs."""
+    places = {(e.family, e.joint) for e in posterior.elements if e.label in labels}
+    laws = {e.label for e in posterior.elements if e.is_law and (e.family, e.joint) in places}
+    instead = sum(p for own, p in posterior.by_labels.items() if own & laws and not own & labels)
+    return instead / max(posterior.any_of(labels), TINY)
 
 
 def _split(

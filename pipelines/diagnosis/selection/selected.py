@@ -187,12 +187,8 @@ class Selected:
         """
         if self.posterior is None or not removed:
             return self
-        shares = {
-            label: removed[one.element.label]
-            for one in self.answer.named
-            for label in one.members
-            if one.element.label in removed
-        }
+        named = [one for one in self.answer.named if one.element.label in removed]
+        shares = {one.members: removed[one.element.label] for one in named}
         weighed = with_look_alikes(self.posterior, shares)
         return self._reweighed(weighed, removed=dict(removed))
 
