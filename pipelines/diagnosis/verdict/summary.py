@@ -149,8 +149,8 @@ def _dropped(d: Diagnosis) -> str:
     plural = len(labels) > 1
     said = f" {words[:1].upper()}{words[1:]} would explain"
     if d.selected.by_all:
-        verb = "predict" if plural else "predicts"
-        return f"{said} all runs, but fitted to the training runs {verb} the validation runs no better."
+        verb = "explain" if plural else "explains"
+        return f"{said} all runs, but fitted to the training runs {verb} too little of the validation runs' error."
     return f"{said} the training runs, but {'raise' if plural else 'raises'} the error on the validation runs."
 
 
