@@ -1,5 +1,7 @@
 """The diagnosis' bench runs, and tells what it is asked."""
 
+import pytest
+
 from tests.bench.bench_diagnose import (
     catalogue_rows,
     length_rows,
@@ -25,6 +27,7 @@ def test_a_smaller_catalogue_offers_fewer_shapes():
     assert 0 < shapes[0] < shapes[1]
 
 
+@pytest.mark.slow
 def test_every_length_is_compared_with_the_first():
     first, second = length_rows((12.0, 24.0))
     assert first.value.endswith("1.0 times the first's")

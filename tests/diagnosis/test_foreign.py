@@ -64,7 +64,7 @@ def test_what_a_cause_of_another_form_leaves_is_told_with_what_it_goes_with(kind
 
 
 @pytest.mark.xfail(strict=True, reason="a wide Stribeck peak is named where friction falls away from nought")
-@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+@pytest.mark.parametrize("kind", ["revolute", pytest.param("prismatic", marks=pytest.mark.slow)])
 def test_no_friction_is_an_excess_over_one_that_gives_energy(kind):
     said = told(kind, gripped_beyond_a_speed)
     named = {cause["effect"] for cause in said["causes"]}

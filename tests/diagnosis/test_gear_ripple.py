@@ -48,7 +48,7 @@ def motion(time, angle, torque, purpose):
     return replace(motion_from_table(motion_table(recording, FilterSettings())), file=f"{purpose}.parquet")
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_ripple_of_several_lines_and_friction_that_builds_up_are_both_named(seed):
     found = diagnose(level_joint(seed))
     assert {"cogging@joint", "presliding_hysteresis@joint"} <= set(found.causes)
