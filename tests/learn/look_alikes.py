@@ -28,7 +28,7 @@ class Judged(NamedTuple):
     removed: float
     """Share of the systematic error that it removes."""
     instead: float
-    """Probability of smooth laws of its family and joint in its place, beside its own."""
+    """Probability of smooth laws of its family and joint in its place, over its own."""
     is_right: bool
 
 

@@ -29,9 +29,9 @@ IN_WORDS = {
 }
 """The law that a look-alike is taken for, by its kind: a cause's family is hardly ever mistaken."""
 LEAST = 0.01
-"""Share of the systematic error below which what a cause removes is rounded up."""
+"""Smallest share of the systematic error whose logarithm is taken."""
 TINY = 1e-12
-"""Probability that is hardly any."""
+"""Smallest probability that another is divided by."""
 
 
 def listed_share(removed: ArrayLike, instead: ArrayLike = 0.0, look_alike: ArrayLike = CRITERIA.look_alike) -> NDArray:
@@ -42,8 +42,8 @@ def listed_share(removed: ArrayLike, instead: ArrayLike = 0.0, look_alike: Array
     removed : ArrayLike
         (...) share of the systematic error of the validation runs that it removes, 0 to 1.
     instead : ArrayLike
-        (...) probability of smooth laws of its family and joint in its place, beside its own: an unlisted effect has
-        that already.
+        (...) probability of smooth laws of its family and joint in its place, over its own. An unlisted effect has that
+        already.
     look_alike : ArrayLike
         (2,) the criterion.
     """
@@ -85,7 +85,7 @@ def with_look_alikes(posterior: Posterior, removed: Mapping[frozenset[str], floa
 
 
 def _unlisted_instead(posterior: Posterior, labels: frozenset[str]) -> float:
-    """Return the probability of smooth laws of the family and joint of tied causes, in their place, beside theirs."""
+    """Return the probability of smooth laws in the place of tied causes, of their family and joint, over their own."""
     places = {(e.family, e.joint) for e in posterior.elements if e.label in labels}
     laws = {e.label for e in posterior.elements if e.is_law and (e.family, e.joint) in places}
     instead = sum(p for own, p in posterior.by_labels.items() if own & laws and not own & labels)
