@@ -1,14 +1,16 @@
-"""The page docs/criteria.md: the hyper-parameters of the decision, written from ``criteria.py`` itself.
+"""The page docs/criteria.md: every number of the diagnosis, written from the code itself.
 
 ``python -m pipelines.diagnosis.reference docs/criteria.md`` brings it up to date; what was measured
-with them (``make sensitivity``, ``make cross-validation``) stands in ``criteria_measured.json`` beside this file.
+with the hyper-parameters (``make sensitivity``, ``make cross-validation``) stands in ``criteria_measured.json`` beside
+this file.
 """
 
 import ast
+import importlib
 import inspect
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import fields
 from itertools import pairwise
 from pathlib import Path
@@ -17,7 +19,8 @@ from typing import Any
 from pipelines.diagnosis import criteria
 from pipelines.diagnosis.criteria import CRITERIA, HELD, LEARNED, Criteria
 
-MEASURED = Path(__file__).with_name("criteria_measured.json")
+PACKAGE = Path(__file__).parent
+MEASURED = PACKAGE / "criteria_measured.json"
 INTRODUCTION = f"""\
 # Criteria: the hyper-parameters of the decision
 
@@ -26,7 +29,26 @@ Written by `make docs` from `pipelines/diagnosis/criteria.py`. All but {", ".joi
 are learned (`make learn`): they maximise the log probability that the posterior gives to the truth, over
 simulated sessions. {LEARNED}
 [science.md](science.md#9-the-decision) has the equations in which they stand.
+The [other numbers](#other-numbers) of a diagnosis, of its noise model, its search and its checks of the data, stand
+at the end.
 """
+OTHERS = """\
+## Other numbers
+
+No session teaches these: they are of physics, of how a machine is recorded, of how exactly something is computed, or of
+how much is told. Each stands at the head of its file in `pipelines/diagnosis`.
+"""
+NAMES = {
+    "data_faults": "Faults of acquisition",
+    "evidence": "Noise and evidence",
+    "candidates": "Candidates and their shapes",
+    "selection": "Selection",
+    "fit": "Fit and validation",
+    "dependence": "What the error goes with",
+    "detectability": "Detectability",
+    "verdict": "Words of the verdict",
+}
+"""The heading of each folder's numbers; how figures are drawn is left out."""
 
 
 def meanings() -> dict[str, str]:
@@ -41,18 +63,54 @@ def meanings() -> dict[str, str]:
     return found
 
 
+def numbers_of(folder: Path) -> Iterator[tuple[str, dict[str, Any], str]]:
+    """Yield the file, values by name, and meaning of the numbers at the head of a folder's files; it may lack."""
+    for path in sorted(folder.glob("*.py")):
+        body = ast.parse(path.read_text(encoding="utf-8")).body
+        module = importlib.import_module(f"{__package__}.{folder.name}.{path.stem}")
+        for statement, below in pairwise([*body, ast.Pass()]):
+            values = {name: value for name in _assigned(statement) if _is_number(value := getattr(module, name))}
+            if values:
+                meaning = below.value if isinstance(below, ast.Expr) else None
+                told = str(meaning.value) if isinstance(meaning, ast.Constant) else ""
+                yield path.name, values, " ".join(told.split())
+
+
+def _assigned(statement: ast.stmt) -> list[str]:
+    """Return the names of constants that a statement assigns."""
+    targets = statement.targets if isinstance(statement, ast.Assign) else [getattr(statement, "target", None)]
+    return [node.id for t in targets if t for node in ast.walk(t) if isinstance(node, ast.Name) and node.id.isupper()]
+
+
+def _is_number(value: Any) -> bool:
+    values = value if isinstance(value, tuple) else (value,)
+    return bool(values) and all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
+
+
 def reference() -> str:
     """Return the page as Markdown."""
     told = meanings()
     rows = [
         [f"`{field.name}`", _written(getattr(CRITERIA, field.name)), told[field.name]] for field in fields(Criteria)
     ]
-    return "\n".join([INTRODUCTION, _table(["name", "value", "meaning"], rows), *_measured()])
+    return "\n".join([INTRODUCTION, _table(["name", "value", "meaning"], rows), *_measured(), OTHERS, *_others()])
 
 
-def _written(value: float | tuple[float, ...]) -> str:
-    values = value if isinstance(value, tuple) else (value,)
-    return ", ".join(f"{v:.3g}" for v in values)
+def _others() -> Iterator[str]:
+    """Yield the numbers beside the criteria, a section for each folder."""
+    for folder, heading in NAMES.items():
+        rows = [
+            [f"`{file}`", ", ".join(f"`{name}`" for name in values), _written(tuple(values.values())), meaning]
+            for file, values, meaning in numbers_of(PACKAGE / folder)
+        ]
+        yield f"### {heading}\n\n{_table(['file', 'name', 'value', 'meaning'], rows)}"
+
+
+def _written(value: Any) -> str:
+    if isinstance(value, tuple):
+        return ", ".join(map(_written, value))
+    short = f"{value:.4g}"
+    return short if float(short) != 1.0 else f"{value:.14g}"  # just short of one is not one
 
 
 def _measured() -> list[str]:

@@ -27,6 +27,7 @@ COUNTS, NOISES = 2.0, 4.0
 """Encoder counts, and standard deviations of the change a sample: a joint that goes as far in a sample as both together
 cannot show the same count twice."""
 STUCK_ANGLE_S = 0.25
+"""Least length of a stretch in which an angle is stuck, while its joint moves on either side, s."""
 JUMP = 3.0
 """Times the largest step of the moving joint: no joint catches up like that."""
 HELD_S, HELD_RAD = 1.0, 0.1
@@ -35,7 +36,9 @@ prismatic joint the way is in proportion to the joint's."""
 ALONE_S, ALONE = 2.0, 3.0
 """Without a set-point: this long, and so many times the longest other standstill."""
 STUCK_TORQUE_S = 0.15
+"""Least length of a stretch of one and the same torque that is stuck, s."""
 STUCK_FORCE_S = 1.0
+"""Least length of a stretch of one and the same cuff force that is stuck, s."""
 FLAT_TOP, SATURATED = 3, 10
 """Samples in a row at the extreme, and samples in such rows: noise never returns to the same number."""
 IN_STEPS = 0.5

@@ -36,7 +36,9 @@ SIGN, SWAP = "reversed", "exchanged"
 Wiring = tuple[Reading, tuple[int, int], tuple[float, float], tuple[tuple[int, str], ...], str]
 """How angles are read; which torques are hip's and knee's; their signs; what is wrong then, and in which way."""
 HIP, KNEE = 0, 1
+"""Columns of the joints."""
 STRAIGHT, CROSSED = (HIP, KNEE), (KNEE, HIP)
+"""Columns of the torques of hip and knee."""
 BOTH_TORQUES = ((HIP, "torque"), (KNEE, "torque"))
 BOTH_ANGLES = ((HIP, "angle"), (KNEE, "angle"))
 WIRINGS: tuple[Wiring, ...] = (

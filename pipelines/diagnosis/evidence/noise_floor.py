@@ -10,6 +10,7 @@ from scipy.ndimage import uniform_filter1d
 from pipelines.diagnosis.evidence.observed_run import Run
 
 LONGEST_LAG_S = 1.0
+"""Without periods noise is what changes faster than averages of this length, s, on an exoskeleton's scale."""
 
 
 @dataclass(frozen=True)

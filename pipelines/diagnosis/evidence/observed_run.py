@@ -18,6 +18,7 @@ from pipelines.signals.blocks import BlockAverage
 FOLD_S = 10.0
 """Length of a fold where the excitation does not repeat, s."""
 FOLDS = 4
+"""Folds of a run whose excitation does not repeat."""
 
 
 @dataclass(frozen=True)

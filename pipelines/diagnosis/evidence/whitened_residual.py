@@ -23,6 +23,7 @@ SMOOTHED = 9
 SPEEDS = 64
 """Speeds that stand for all of a joint's: a line's frequency follows them."""
 TINY = 1e-300
+"""Keeps the division by a spectrum without power finite."""
 
 
 @dataclass(frozen=True)

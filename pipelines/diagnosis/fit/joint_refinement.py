@@ -24,6 +24,7 @@ SETTLING = 5
 STEPS = 3
 """Steps of a round."""
 HALVINGS = 3
+"""Times that a step is halved until one gains."""
 ENOUGH = 1e-4
 """Relative fall of the cost below which a round has converged."""
 

@@ -32,11 +32,13 @@ SHORTEST, LONGEST = 2e-5, 0.01
 """rad of travel, on an exoskeleton's scale: over less is at once, and what builds up over more shows away from
 reversals too."""
 TRAVELS = 16
+"""Travels between these two that are tried."""
 SPEEDS = (0.02, 0.04, 0.08, 0.16, 0.32)
 """rad/s, on an exoskeleton's scale, within which friction that goes with speed turns round."""
 LATE_S = (0.02, 0.04, 0.06)
 """After the reversal, as far as ``time_delay`` goes: friction does so where a torque is read late, and nobody knows."""
 ROUNDING = 1e-9
+"""Share of the largest angle below which a step between two readings is rounding."""
 TAKEN = 0.2
 """Share of the error's power about reversals that a travel must take beyond what speed or a delay takes."""
 NEEDED = 6.0

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pipelines.diagnosis.evidence.observed_run import Run
 
 RESAMPLES = 500
+"""Bootstrap samples of an interval."""
 STRETCH_S = 5.0
 """Length of a bootstrap block where the excitation does not repeat."""
 

@@ -27,6 +27,7 @@ WIDEST = 12
 WIDTHS = (3, 6, WIDEST)
 """Widths by which elements are screened together."""
 CHUNK = 4000
+"""Sets that are screened at once: bounds the memory."""
 LEAST_SIZE = 1e-4
 """Share that an element's size is at least: its logarithm is asked for."""
 

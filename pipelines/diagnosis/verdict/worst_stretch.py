@@ -14,7 +14,9 @@ from pipelines.dynamics.replay import WINDOW_S, replay
 from pipelines.errors import ExoidError
 
 STRETCH_S = 6.0
+"""Length of the stretch, s."""
 STEP_S = 0.5
+"""From the begin of one stretch that is looked at to that of the next, s."""
 
 
 @dataclass(frozen=True)
