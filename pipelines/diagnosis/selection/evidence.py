@@ -23,6 +23,8 @@ from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
 from pipelines.effects import Cogging, Family
 
+LEAST_VARIANCE = 1e-10
+"""Of slow noise's coefficients, squared shares of the torque: keeps their precision finite."""
 Shown = tuple[float, float, int]
 """A line's log likelihood ratio, its share of the torque, and the phases that it has."""
 
@@ -113,7 +115,8 @@ class Evidence:
     auxiliary: Mapping[str, float]
     """Log likelihood of causes besides what they do to the mean torque, by label."""
     explained: NDArray
-    """(O,) what all columns together explain of each output's rows, squared and in units of the noise."""
+    """(O,) what all columns together explain of each output's rows beyond slow noise, squared and in units of the
+    noise."""
     nonnegative: Nonnegative | None = None
     contexts: tuple[tuple[int, ...], ...] = ()
     """Sets of elements whose causes were refined beside one another."""
@@ -128,9 +131,10 @@ class Evidence:
         outputs = [regression.output == o for o in range(len(regression.torque))]
         parts = [(X[rows], regression.measured[rows]) for rows in outputs]
         gram, right = np.array([x.T @ x for x, _ in parts]), np.array([x.T @ y for x, y in parts])
+        slow = at.curves, np.array([curve.noise for curve in library.curves])
         return cls(
             gram, right, (elements := tuple(_elements(library, at))), tuple(_background(library, at)),
-            dict(auxiliary), np.array([explained(g, r) for g, r in zip(gram, right, strict=True)]),
+            dict(auxiliary), np.array([explained(g, r, *slow) for g, r in zip(gram, right, strict=True)]),
             Nonnegative.of(library, at, X.shape[1]), tuple(_contexts(library, elements)), _about(library),
         )  # fmt: skip
 
@@ -166,13 +170,27 @@ class Evidence:
         )  # fmt: skip
 
 
-def explained(gram: NDArray, right: NDArray) -> float:
-    """Return what columns, of products (n, n), explain together beyond what they explain of noise."""
+def explained(gram: NDArray, right: NDArray, slow: NDArray, variance: NDArray) -> float:
+    """Return what columns, of products (n, n), explain together beyond what they explain of noise.
+
+    Parameters
+    ----------
+    slow : NDArray
+        (s,) places of the curves of time: what they follow is slow noise as far as it has such coefficients.
+    variance : NDArray
+        (s,) of slow noise's coefficients.
+    """
     precision = 1.0 / CRITERIA.explained_share**2
-    inverse, _ = dtrtri(np.linalg.cholesky(gram + precision * np.eye(len(gram))), lower=1)
+    order = np.concatenate([slow, np.setdiff1d(np.arange(len(gram)), slow)]).astype(int)
+    first = np.full(len(gram), precision)
+    first[: len(slow)] = 1.0 / np.maximum(variance, LEAST_VARIANCE)
+    lower = np.linalg.cholesky(gram[np.ix_(order, order)] + np.diag(first))
+    # Below the curves' rows stands what is left for the others beside slow noise.
+    inverse = dtrtri(lower, lower=1)[0][len(slow) :]
+    others = inverse[:, len(slow) :]
     # The trace of S^-1 G where S = G + precision I.
-    of_noise = len(gram) - precision * np.sum(inverse**2)
-    return max(float(np.sum((inverse @ right) ** 2) - of_noise), 0.0)
+    of_noise = len(others) - precision * np.sum(others**2)
+    return max(float(np.sum((inverse @ right[order]) ** 2) - of_noise), 0.0)
 
 
 def _symmetric(packed: bytes, shape: tuple[int, int]) -> NDArray:
