@@ -149,7 +149,7 @@ class Posterior(_Object):
     unlisted: Probability
     causes: dict[str, Probability]
     laws: dict[str, Probability]
-    systematic_error_removed: dict[str, Number] = {}
+    systematic_error_removed: dict[str, Probability] = {}
 
 
 class Loop(_Object):

@@ -18,7 +18,7 @@ class Criteria:
     """The same of a cuff row."""
     model_error: float = 0.0075
     """An output counts with weight / (1 + model error x weight x what all causes and laws explain there): no form is
-    exact. Held: the score of learning hardly tells values three times as large, under which a second cause is lost."""
+    exact. Held: the score of learning hardly tells it from twice as much, under which second causes are lost."""
     cuff_model_error: float = 0.0138
     """The same of a cuff's output."""
     explained_share: float = 0.3
@@ -60,8 +60,8 @@ class Criteria:
     tied: float = 0.1
     """Share of the named cause's probability from which another cause is its tie."""
     look_alike: tuple[float, float] = (4.44, 2.42)
-    """Log odds that a named cause is no unlisted effect that resembles it, where it removes all systematic error of the
-    validation runs; and how much they change with the logarithm of the share that it removes."""
+    """Intercept and slope of the log odds that a named cause is what it is called, over the logarithm of the share of
+    the systematic error that it removes on the validation runs."""
     at_floor: float = 1.03
     """RMSE over noise floor up to which a joint has no systematic error (contracts.md)."""
     predicted_better: float = 1.0
@@ -77,21 +77,26 @@ HELD = (
     *BEFORE_EVIDENCE, "model_error", "background_line", "each_run", "lines", "base_rate",
     "likely", "tied", "look_alike", "at_floor", "predicted_better", "left_of_explained",
 )  # fmt: skip
-"""What `make learn` does not learn. The first three act before the evidence is stored. The mixture of the sessions
-decides the base rate. Under a larger model error a second cause beside a large one is lost, and learning tells no
-difference over a factor of three. Nor does it over a factor of thirty in `lines`. Good drives ripple by a percent of
-their torque; too few sessions have such drives, and learned alone `background_line` called their ripple missing. Too
-few have sensors that are tared anew at each start, which labs have: `each_run` is of sessions that had more.
-`look_alike` is learned from the verdicts of a blind examination, by `python -m tests.learn look-alikes`. The other
-five of the last six decide what is reported of the probabilities and errors, and whether all runs are searched."""
+"""What `make learn` does not learn.
+
+- ``BEFORE_EVIDENCE``: they act before the evidence is stored.
+- ``base_rate``: the mixture of the sessions decides it.
+- ``model_error``: learning hardly tells it from twice as much, under which a second cause beside a large one is lost.
+- ``lines``: learning tells no difference over a factor of thirty.
+- ``background_line``: good drives ripple by a percent of their torque. Too few sessions have such drives; learned alone
+  it called their ripple missing.
+- ``each_run``: too few sessions have sensors that are tared anew at each start. It is of sessions that had more.
+- ``look_alike``: learned from the verdicts of a blind examination, by ``python -m tests.learn look-alikes``.
+- The others decide what is reported of probabilities and errors, and whether all runs are searched.
+"""
 
 LEARNED = """\
 They were learned from 335 sessions of seeds from 210000 on. Learned anew from 177 sessions whose evidence was stored by
 revision 1b85b45 (`python -m tests.learn fit --most 60`), they gave the truth of these a mean log probability of -1.29
 instead of -1.48, and that of 356 others -1.56 instead of -1.57: they were left as they are. But `cause` is lower by
 ln(3/2): a cause chooses among two prior sizes now, and chose among three before. `look_alike` was learned from the 97
-causes that were named in 155 sessions of seeds from 505000 and 508000 on: with it the log probability of what they are
-is -0.20 on average instead of -0.54, and their Brier score 0.060 instead of 0.079, on these causes themselves."""
+causes that were named in 155 sessions of seeds from 505000 and 508000 on. On these same causes it raises the mean log
+probability of the truth from -0.54 to -0.20, and lowers the Brier score from 0.079 to 0.060."""
 """What the criteria were learned from, for docs/criteria.md."""
 
 CRITERIA = Criteria()

@@ -85,12 +85,9 @@ class Diagnosis:
             return "unknown_cause"
         if not self.named:
             return "unknown_cause" if self.selected.shows_something else "nothing_missing"
-        ends_above = self.after.errors.rms > CRITERIA.at_floor * self.floor_rms
-        left = [share for share, above in zip(self.unexplained, ends_above, strict=True) if share and above]
-        is_gone = all(share <= CRITERIA.left_of_explained for share in left)
         more = any(one.level != "cause" for one in self.selected.findings)
         more |= self.selected.shows_unlisted
-        return "explained" if is_gone and not more else "partly_explained"
+        return "partly_explained" if more or any(self.left_over) else "explained"
 
     @property
     def floor_rms(self) -> NDArray:
@@ -100,14 +97,21 @@ class Diagnosis:
     @property
     def unexplained(self) -> list[float | None]:
         """Share of each joint's systematic power that is left; None where there was none."""
-        shares: list[float | None] = []
-        errors = self.before.errors.rms, self.after.errors.rms
-        for floor, before, after in zip(self.floor_rms, *errors, strict=True):
-            if not before > CRITERIA.at_floor * floor:
-                shares.append(None)
-            else:
-                shares.append(float(max(after**2 - floor**2, 0.0) / (before**2 - floor**2)))
-        return shares
+        floor, before, after = self.floor_rms**2, self.before.errors.rms**2, self.after.errors.rms**2
+        left = np.maximum(after - floor, 0.0)
+        was = self._above_floor(self.before)
+        shares = left / np.where(was, before - floor, 1.0)
+        return [float(share) if there else None for share, there in zip(shares, was, strict=True)]
+
+    @property
+    def left_over(self) -> list[bool]:
+        """Joints that end above the floor, with more than ``left_of_explained`` of their systematic power."""
+        shares = zip(self.unexplained, self._above_floor(self.after), strict=True)
+        return [above and share is not None and share > CRITERIA.left_of_explained for share, above in shares]
+
+    def _above_floor(self, made: Validated) -> list[bool]:
+        """Return at which joints a model leaves more than noise."""
+        return (made.errors.rms > CRITERIA.at_floor * self.floor_rms).tolist()
 
     @property
     def leaves_something(self) -> bool:

@@ -50,8 +50,9 @@ def judged_fit(selected: Selected, prepared: Prepared, before: Validated) -> Jud
     """Fit the named causes, and judge them on the validation runs until no charge is left.
 
     The most harmful cause is charged first: beside it, what others do may seem to harm too. Of causes
-    that the training runs cannot tell apart, those are charged that predict the validation runs worse
-    than the best of them. At last each may be an unlisted effect that resembles it.
+    that the searched runs cannot tell apart, those are charged that predict the validation runs worse
+    than the best of them. Last, each named cause is tested for being a look-alike (``selection/look_alikes.py``);
+    those that remain are fitted again, and not judged again.
     """
     refine = _refinement(prepared)
     fitted: tuple[Candidate, ...] | None = None
@@ -72,12 +73,15 @@ def judged_fit(selected: Selected, prepared: Prepared, before: Validated) -> Jud
     selected = selected.with_look_alikes(_removed(after, without))
     if selected.candidates != fitted:
         after, without = _fitted(selected, refine, prepared, before)
-        whole = log_likelihoods(after, prepared.noise)
-    return JudgedFit(selected, before, after, without, float(whole.sum()))
+    log_likelihood = float(log_likelihoods(after, prepared.noise).sum())
+    return JudgedFit(selected, before, after, without, log_likelihood)
 
 
 def _removed(after: Validated, without: dict[str, Validated]) -> dict[str, float]:
-    """Return the share of the systematic error that each cause removes; none of a cause without which there is none."""
+    """Return the share that each cause removes, by label.
+
+    A cause without which the error is at the noise floor is left out.
+    """
     shares = {label: removed_share(less, after) for label, less in without.items()}
     return {label: share for label, share in shares.items() if share is not None}
 

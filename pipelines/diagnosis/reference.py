@@ -1,4 +1,4 @@
-"""The page docs/criteria.md: every number of the diagnosis, written from the code itself.
+"""The page docs/criteria.md: the numbers of the diagnosis, written from the code itself.
 
 ``python -m pipelines.diagnosis.reference docs/criteria.md`` brings it up to date; what was measured
 with the hyper-parameters (``make sensitivity``, ``make cross-validation``) stands in ``criteria_measured.json`` beside
@@ -22,12 +22,13 @@ from pipelines.diagnosis.criteria import CRITERIA, HELD, LEARNED, Criteria
 PACKAGE = Path(__file__).parent
 MEASURED = PACKAGE / "criteria_measured.json"
 INTRODUCTION = f"""\
-# Criteria: the hyper-parameters of the decision
+# Criteria: the numbers of a diagnosis
 
 For those who want to know why a verdict came out as it did, or who change the decision.
-Written by `make docs` from `pipelines/diagnosis/criteria.py`. All but {", ".join(f"`{name}`" for name in HELD)}
-are learned (`make learn`): they maximise the log probability that the posterior gives to the truth, over
-simulated sessions. {LEARNED}
+Written by `make docs` from the code. The first table has the hyper-parameters of the decision, of
+`pipelines/diagnosis/criteria.py`. `make learn` learns all of them except
+{", ".join(f"`{name}`" for name in HELD)}: it maximises the log probability that the posterior gives to
+the truth, over simulated sessions. {LEARNED}
 [science.md](science.md#9-the-decision) has the equations in which they stand.
 The [other numbers](#other-numbers) of a diagnosis, of its noise model, its search and its checks of the data, stand
 at the end.
@@ -35,16 +36,16 @@ at the end.
 OTHERS = """\
 ## Other numbers
 
-No session teaches these: they are of physics, of how a machine is recorded, of how exactly something is computed, or of
-how much is told. Each stands at the head of its file in `pipelines/diagnosis`.
+These are not learned. They concern physics, recording, numerical precision, or how much is reported. Each is defined at
+the head of its file in `pipelines/diagnosis`. Those by which figures are drawn are left out.
 """
-NAMES = {
+HEADINGS = {
     "data_faults": "Faults of acquisition",
     "evidence": "Noise and evidence",
     "candidates": "Candidates and their shapes",
     "selection": "Selection",
     "fit": "Fit and validation",
-    "dependence": "What the error goes with",
+    "dependence": "What the error depends on",
     "detectability": "Detectability",
     "verdict": "Words of the verdict",
 }
@@ -64,7 +65,7 @@ def meanings() -> dict[str, str]:
 
 
 def numbers_of(folder: Path) -> Iterator[tuple[str, dict[str, Any], str]]:
-    """Yield the file, values by name, and meaning of the numbers at the head of a folder's files; it may lack."""
+    """Yield file, values by name, and meaning (empty without one) of the numbers that a folder's files define."""
     for path in sorted(folder.glob("*.py")):
         body = ast.parse(path.read_text(encoding="utf-8")).body
         module = importlib.import_module(f"{__package__}.{folder.name}.{path.stem}")
@@ -98,7 +99,7 @@ def reference() -> str:
 
 def _others() -> Iterator[str]:
     """Yield the numbers beside the criteria, a section for each folder."""
-    for folder, heading in NAMES.items():
+    for folder, heading in HEADINGS.items():
         rows = [
             [f"`{file}`", ", ".join(f"`{name}`" for name in values), _written(tuple(values.values())), meaning]
             for file, values, meaning in numbers_of(PACKAGE / folder)

@@ -19,7 +19,7 @@ from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.origin import giving
 from pipelines.mechanics.scale import on_one_scale
 
-WHY = {"train": "causes are searched there", "validate": "the gain is measured there"}
+WHY = {"train": "the model is fitted there", "validate": "the gain is measured there"}
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,12 @@ import numpy as np
 from pipelines.contracts.joints import the
 from pipelines.errors import InputError
 from pipelines.label import SHARES, cause_label, effect_labelled, effect_told, in_words
+from pipelines.law import LAW, law_in_words
 
 TONES = {"noise_floor": "noise", "repeatable_unexplained": "left", "not_repeatable": "wanders", "unexplained": "left"}
 """Names of the colours of what is no cause."""
 CAUSES = 3
 """Colours that there are for causes."""
-LAW = "law:"
-"""What the label of an unlisted law begins with."""
 
 
 @dataclass(frozen=True)
@@ -134,11 +133,9 @@ def label_in_words(label: str) -> str:
     """Return ``cogging@knee`` as a sentence says it; an effect that is not known here by its name."""
     name, _, joint = label.partition("@")
     at = f" at {the(joint)}" if joint else ""
-    if name.startswith(LAW):
-        return f"unlisted law{at}: {name.removeprefix(LAW).replace('_', ' ')}"
     try:
-        return in_words(effect_labelled(label))
-    except InputError:
+        return law_in_words(label) if label.startswith(LAW) else in_words(effect_labelled(label))
+    except (InputError, KeyError):
         return name.replace("_", " ") + at
 
 

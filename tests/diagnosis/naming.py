@@ -33,7 +33,7 @@ def naming(d: Diagnosis, *labels: str, ties: tuple[tuple[str, float], ...] = ())
     compared = {element.variant: 0.0 for element in elements}  # the ties that were asked for stay
     given = replace(
         selected,
-        trained=weighed,
+        searched=weighed,
         posterior=weighed,
         charged=compared,
         answer=answer,

@@ -9,7 +9,7 @@ from tests.diagnosis.sessions import session
 BUMPER = {"stiffness": 12.0, "contact_angle": -0.75, "exponent": 1.75}
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_intervals_hold_a_truth_between_two_forms_and_are_not_wide_open(seed):
     told = verdict(diagnose(session("end_stop", "knee", seed=seed, seconds=30.0, direction=1.0, **BUMPER)))
     (cause,) = told["causes"]

@@ -41,10 +41,12 @@ def test_the_floor_is_the_noise_that_was_put_in(faultless):
     ("effect", "joint", "values", "parameter"),
     [
         ("stribeck_friction", "knee", {"stribeck_torque": 2.0, "stribeck_velocity": 0.15}, "stribeck_torque"),
-        ("load_dependent_friction", "hip", {"load_coefficient": 0.06}, "load_coefficient"),
+        pytest.param(
+            "load_dependent_friction", "hip", {"load_coefficient": 0.06}, "load_coefficient", marks=pytest.mark.slow
+        ),
         ("cogging", "knee", {"amplitude": 1.0, "cycles_per_turn": 24.0, "phase": 0.3}, "amplitude"),
-        ("mass_off_axis", "knee", {"mass_moment": 0.15}, "mass_moment"),
-        ("torque_gain", "hip", {"gain": 1.08}, "gain"),
+        pytest.param("mass_off_axis", "knee", {"mass_moment": 0.15}, "mass_moment", marks=pytest.mark.slow),
+        pytest.param("torque_gain", "hip", {"gain": 1.08}, "gain", marks=pytest.mark.slow),
         ("voluntary_torque", "hip", {"amplitude": 2.2, "frequency": 0.43, "phase": 0.4}, "frequency"),
     ],
 )
@@ -77,7 +79,7 @@ def test_a_drag_that_slow_training_hardly_shows_is_found_among_laws_of_its_joint
     ("effect", "joint", "values", "tied"),
     [
         ("torque_offset", "knee", {"offset": 1.0}, ("coulomb_asymmetry", "knee")),
-        ("base_tilt", None, {"tilt": 0.04}, ("encoder_offset", "hip")),
+        pytest.param("base_tilt", None, {"tilt": 0.04}, ("encoder_offset", "hip"), marks=pytest.mark.slow),
     ],
 )
 def test_what_no_data_of_a_kind_can_part_is_said_to_be_one_or_the_other(effect, joint, values, tied):

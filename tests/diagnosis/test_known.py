@@ -12,7 +12,10 @@ from tests.diagnosis.sessions import session
 
 @pytest.mark.parametrize(
     ("label", "values"),
-    [("rotor_inertia@knee", {"inertia": 0.12}), ("parallel_spring@knee", {"stiffness": 6.0, "rest_angle": -0.5})],
+    [
+        ("rotor_inertia@knee", {"inertia": 0.12}),
+        pytest.param("parallel_spring@knee", {"stiffness": 6.0, "rest_angle": -0.5}, marks=pytest.mark.slow),
+    ],
 )
 def test_what_is_known_is_fitted_to_its_truth_and_missed_no_more(label, values):
     motions = session(*label.split("@"), seed=5, **values)

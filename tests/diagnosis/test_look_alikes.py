@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.selection.evidence import Element
-from pipelines.diagnosis.selection.look_alikes import listed_share, with_look_alikes
+from pipelines.diagnosis.selection.look_alikes import kept_share, with_look_alikes
 from pipelines.diagnosis.selection.posterior import Posterior, posterior
 from tests.diagnosis.naming import naming
 from tests.diagnosis.test_posterior import CRITERIA as OF_PROBLEM
@@ -14,17 +14,17 @@ from tests.diagnosis.test_summary import LABEL, stuck  # noqa: F401 - a fixture
 
 def test_the_more_of_the_error_a_cause_removes_the_more_likely_it_is_what_it_is_called():
     shares = np.linspace(0.0, 1.0, 21)
-    told = listed_share(shares)
+    told = kept_share(shares)
     assert (np.diff(told) >= 0.0).all() and told[-1] > 0.9 and told[2] < 0.5
-    assert listed_share(0.3, look_alike=(0.0, 0.0)) == 0.5
-    assert listed_share(0.3, 0.2, look_alike=(0.0, 0.0)) == 0.7
+    assert kept_share(0.3, look_alike=(0.0, 0.0)) == 0.5
+    assert kept_share(0.3, 0.2, look_alike=(0.0, 0.0)) == 0.7
 
 
 @pytest.mark.parametrize("removed", [0.1, 0.6, 1.0])
 def test_a_look_alike_takes_from_the_cause_for_an_unlisted_law_of_its_family_and_joint(removed):
     before = posterior(problem(strength=0.1), OF_PROBLEM)
     after = with_look_alikes(before, {frozenset({"spring@hip"}): removed})
-    kept = before.marginals["spring@hip"] * listed_share(removed)
+    kept = before.marginals["spring@hip"] * kept_share(removed)
     assert sum(after.by_labels.values()) == pytest.approx(1.0)
     assert after.nothing == pytest.approx(before.nothing)
     assert after.marginals["spring@hip"] == pytest.approx(kept)
@@ -42,12 +42,12 @@ def test_what_a_smooth_law_has_in_its_place_already_is_not_taken_from_the_cause_
     elements = (cause("spring", [0]), Element("law:angle@hip", "angle", "hip", "angle", True, [1], [1.0]))
     even = Posterior(elements, ((0,), (1,), ()), np.array([5.0, 5.0, 0.0]))
     removed = {frozenset({"spring@hip"}): 0.2}
-    assert listed_share(0.2) < 0.7
+    assert kept_share(0.2) < 0.7
     assert with_look_alikes(even, removed).marginals == pytest.approx(even.marginals)
     rare = Posterior(elements, ((0,), (1,), ()), np.array([5.0, 3.0, 0.0]))
     after = with_look_alikes(rare, removed)
     unlisted = after.marginals["law:unlisted_angle@hip"] + after.marginals["law:angle@hip"]
-    assert unlisted == pytest.approx((1.0 - listed_share(0.2)) * rare.marginals["spring@hip"])
+    assert unlisted == pytest.approx((1.0 - kept_share(0.2)) * rare.marginals["spring@hip"])
 
 
 @pytest.mark.parametrize(("removed", "named"), [(1.0, [LABEL]), (0.05, [])])

@@ -65,7 +65,7 @@ def test_a_spring_at_a_small_servo_is_named_or_tied_and_fitted_to_its_size():
 def test_of_ties_the_one_that_predicts_the_validation_run_is_named():
     """A weak spring and a torque offset explain one training run about alike, and not another motion."""
     found = diagnose(motions(pendulum, spring=0.4))
-    (trained,) = answer_of(found.selected.trained).named
+    (trained,) = answer_of(found.selected.searched).named
     assert {"torque_offset@arm", "parallel_spring@arm"} <= trained.members
     (named,) = found.named
     assert named.element.label == "parallel_spring@arm"

@@ -64,7 +64,9 @@ def test_one_offset_in_all_runs_is_one_and_no_run_has_another():
     assert cause["each_run"] == [] and "per-run" not in told["summary"]
 
 
-@pytest.mark.parametrize("levels", [HIDDEN, dict.fromkeys(HIDDEN, 0.0)], ids=["tared", "settled"])
+@pytest.mark.parametrize(
+    "levels", [HIDDEN, pytest.param(dict.fromkeys(HIDDEN, 0.0), marks=pytest.mark.slow)], ids=["tared", "settled"]
+)
 def test_what_grows_within_runs_is_a_drift_whatever_its_level(levels):
     told = found(levels, rate=0.03)
     (cause,) = told["causes"]
@@ -95,7 +97,7 @@ def set_at_each_start(told):
     ("spoil", "offsets", "names"),
     [
         (misread, (1.1, -0.8), {"torque_offset", "torque_drift"}),
-        (misread, (0.0, 1.2), {"torque_offset", "torque_drift"}),
+        pytest.param(misread, (0.0, 1.2), {"torque_offset", "torque_drift"}, marks=pytest.mark.slow),
         (zeroed, (0.07, -0.06), {"encoder_offset"}),
     ],
     ids=["tared", "validation run only", "zeroed"],

@@ -28,7 +28,7 @@ def error_of_stiffness(seconds: float, imperfect: float) -> float:
     return float(np.sqrt(known.covariance[place, place]))
 
 
-@pytest.mark.parametrize(("imperfect", "ratio"), [(0.0, 0.5), (3.0, 1.0)])
+@pytest.mark.parametrize(("imperfect", "ratio"), [pytest.param(0.0, 0.5, marks=pytest.mark.slow), (3.0, 1.0)])
 def test_four_times_as_many_periods_halve_what_noise_leaves_in_doubt_and_no_misfit(imperfect, ratio):
     assert error_of_stiffness(80.0, imperfect) / error_of_stiffness(20.0, imperfect) == pytest.approx(ratio, rel=0.2)
 

@@ -278,8 +278,16 @@ SMALL = {"joint_elasticity": 0.12, "backlash": 0.12, "cuff_compliance": 0.06}
 """How far the rigid bodies may be off behind what is undone approximately; all others are within 1.5 %."""
 
 
-@pytest.mark.parametrize("term", [t for t in TERMS if t.effect.joint == (t.effect.joints or ("hip",))[-1]],
-                         ids=lambda term: term.effect.label)  # fmt: skip
+OF_LAST_JOINT = [t for t in TERMS if t.effect.joint == (t.effect.joints or ("hip",))[-1]]
+
+
+@pytest.mark.parametrize(
+    "term",
+    [
+        pytest.param(t, id=t.effect.label, marks=[] if n % 3 == 0 else pytest.mark.slow)
+        for n, t in enumerate(OF_LAST_JOINT)
+    ],
+)
 def test_behind_every_effect_of_known_shape_body_and_amplitudes_are_the_true_ones(term, truth):
     """Those too whose torque goes with the load, which is not measured: the drive's own friction is in what is."""
     effect = term.effect

@@ -17,7 +17,7 @@ from tests.learn.evidence import ONE_THREAD, write_evidence
 
 app = typer.Typer(add_completion=False, no_args_is_help=True)
 OUT = Annotated[Path, typer.Option(help="Folder of evidence and results.")]
-HERE = Path("build/learn")
+HERE, EXAMINED = Path("build/learn"), Path("build/blind")
 MIX = {"single": 0.55, "pair": 0.15, "outside": 0.12, "none": 0.09, "imperfect": 0.09}
 """Shares of what is hidden: faults of acquisition teach the decision nothing."""
 
@@ -124,9 +124,7 @@ def sensitivity(
 
 @app.command("look-alikes")
 def look_alikes(
-    examined: Annotated[Path, typer.Option(help="Folder of a blind examination on tuning seeds.")] = Path(
-        "build/blind"
-    ),
+    examined: Annotated[Path, typer.Option(help="Folder of a blind examination on tuning seeds.")] = EXAMINED,
 ) -> None:
     """Learn from a blind examination how likely a named cause is an unlisted effect that resembles it."""
     from tests.learn.look_alikes import judged_causes, learn_look_alike

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from pipelines.diagnosis.candidates.smooth_laws import FAMILIES
+from pipelines.law import FAMILIES, family_of_kind, kind_and_joint
 
 ALIKE = (
     {"torque_offset", "coulomb_asymmetry"},
@@ -73,4 +73,4 @@ def _outside(truth: Mapping[str, Any]) -> Right:
 
 
 def _family(law: str) -> str:
-    return FAMILIES[law.removeprefix("law:").partition("@")[0]]
+    return family_of_kind(kind_and_joint(law)[0])

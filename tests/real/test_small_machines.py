@@ -9,7 +9,11 @@ from tests.real.machines import LOGS, diagnosed, motions, recordings
 
 @pytest.mark.parametrize(
     ("machine", "status"),
-    [("simple", "nothing_missing"), ("xl330", "partly_explained"), ("modexo", "unknown_cause")],
+    [
+        ("simple", "nothing_missing"),
+        pytest.param("xl330", "partly_explained", marks=pytest.mark.slow),
+        ("modexo", "unknown_cause"),
+    ],
 )
 def test_of_small_or_dirty_logs_only_what_foretells_unseen_runs_is_named(real_data, tmp_path, machine, status):
     said = diagnosed(LOGS[machine], real_data, tmp_path).verdict

@@ -374,6 +374,6 @@ def test_an_unlisted_law_among_the_sets_is_called_so_and_a_set_has_its_probabili
     tried.frame["reason"] = ["its causes are likely", "its probability is 0.0012; it holds a law"]
     CANDIDATES.write(folder / "diagnosed" / "candidates.parquet", tried.frame, tried.metadata)
     page = report(find([folder]))
-    assert "unlisted law at the hip: friction by angle" in page
+    assert "friction of the hip that depends on its angle" in page
     assert '<td class="n">&lt; 0.01</td>' in page
     assert '<td class="reason">it holds a law</td>' in page

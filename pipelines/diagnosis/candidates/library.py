@@ -17,12 +17,13 @@ from pipelines.diagnosis.candidates.cause import Cause, towards
 from pipelines.diagnosis.candidates.law_rows import curve_rows, law_rows
 from pipelines.diagnosis.candidates.shape_grid import others_of, screened
 from pipelines.diagnosis.candidates.shape_refinement import Fitted, ShapeRefinement, has_shapes
-from pipelines.diagnosis.candidates.smooth_laws import TIME, Curve, LawColumn, law_label
+from pipelines.diagnosis.candidates.smooth_laws import TIME, Curve, LawColumn
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
 from pipelines.effects import Cogging, Effect
+from pipelines.law import law_label
 
 ALTERNATIVES = 2
 """Shapes of a cause besides its best one."""
@@ -127,7 +128,7 @@ class Library:
         own = [law.variant(names) == variant for law in self.laws]
         if any(own):
             return self.law_columns[:, own]
-        joint = [law_label(TIME, curve.joint, names) == variant for curve in self.curves]
+        joint = [law_label(TIME, names[curve.joint]) == variant for curve in self.curves]
         return self.curve_columns[:, joint]
 
 

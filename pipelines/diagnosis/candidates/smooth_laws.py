@@ -15,35 +15,8 @@ from numpy.polynomial.legendre import legder, legval, legvander
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.evidence.observed_run import Run
+from pipelines.law import law_label
 
-FAMILIES = {
-    "angle": "angle", "other_angle": "angle", "both_angles": "angle",
-    "friction_by_angle": "angle", "friction_by_other_angle": "angle",
-    "speed": "speed", "other_speed": "speed",
-    "load": "load", "other_load": "load",
-    "inertia_by_angle": "transmission",
-    "gain_over_time": "time", "friction_over_time": "time", "time": "time", "hum": "time",
-    "across_joints": "angle", "quantisation": "sensor",
-}  # fmt: skip
-"""The family that each law belongs to."""
-IN_WORDS = {
-    "angle": "a law of {joint}'s angle",
-    "other_angle": "a law of the other joint's angle at {joint}",
-    "both_angles": "a law of both joints' angles at {joint}",
-    "speed": "a law of {joint}'s speed",
-    "other_speed": "a law of the other joint's speed at {joint}",
-    "friction_by_angle": "friction of {joint} that depends on its angle",
-    "friction_by_other_angle": "friction of {joint} that depends on the other joint's angle",
-    "load": "a law of {joint}'s load",
-    "other_load": "a law of the other joint's load at {joint}",
-    "inertia_by_angle": "an inertia of {joint} that depends on its angle",
-    "gain_over_time": "a torque gain of {joint} that changes with time",
-    "friction_over_time": "friction of {joint} that changes with time",
-    "time": "a torque of {joint} that wanders in time and does not repeat",
-    "hum": "a tone at {joint} that does not follow the motion",
-    "across_joints": "an elastic torque across both joints",
-    "quantisation": "a torque of {joint} that is reported in coarse steps",
-}
 IN_CUFFS = ("angle", "both_angles", "speed", "inertia_by_angle", "load", "other_load")
 """Laws by which cuff forces may be a little wrong on their own."""
 WANDER_HZ = 0.5
@@ -66,12 +39,6 @@ ACROSS_DEGREE = 4
 """Highest degree of its elastic energy."""
 
 
-def law_label(kind: str, joint: int | None, joints: Sequence[str], wearer: str = "all") -> str:
-    """Return what a law is called, ``law:angle@hip``; with ``/human`` if it is the person's."""
-    at = "" if joint is None else f"@{joints[joint]}"
-    return f"law:{kind}{at}" + ("" if wearer == "all" else f"/{wearer}")
-
-
 @dataclass(frozen=True)
 class LawColumn:
     """One column of a smooth law."""
@@ -86,7 +53,7 @@ class LawColumn:
 
     def variant(self, joints: Sequence[str]) -> str:
         """Return the law's label, and whose share it is."""
-        return law_label(self.kind, self.joint, joints, self.wearer)
+        return law_label(self.kind, None if self.joint is None else joints[self.joint], self.wearer)
 
 
 class Curve(NamedTuple):
@@ -113,7 +80,7 @@ class Spans:
 
     @classmethod
     def of(cls, runs: Sequence[Run], torque: NDArray) -> "Spans":
-        """Read them off the training runs; ``torque`` (J,) N·m is the joints' rms torque."""
+        """Read them off the searched runs; ``torque`` (J,) N·m is the joints' rms torque."""
         low = np.min([run.state[0].min(axis=0) for run in runs], axis=0)
         high = np.max([run.state[0].max(axis=0) for run in runs], axis=0)
         speed, acceleration = (
@@ -153,7 +120,7 @@ def smooth_laws(run: Run, spans: Spans, load: NDArray) -> tuple[list[LawColumn],
 
 
 def _scaled_angle(run: Run, spans: Spans) -> NDArray:
-    """Return the angles (m, J), scaled to lie between -1 and 1 on the training runs."""
+    """Return the angles (m, J), scaled to lie between -1 and 1 on the searched runs."""
     return np.clip((run.state[0] - spans.middle) / spans.half_range, -1.5, 1.5)
 
 

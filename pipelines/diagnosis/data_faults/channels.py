@@ -23,9 +23,10 @@ from pipelines.signals.blocks import dilate
 
 STALE = 3
 """Rows that repeat the last one while the joint moves, before it is more than an accident."""
-COUNTS, NOISES = 2.0, 4.0
-"""Encoder counts, and standard deviations of the change a sample: a joint that goes as far in a sample as both together
-cannot show the same count twice."""
+COUNTS = 2.0
+"""Encoder counts that a joint moves in one sample before an equal reading is stale."""
+NOISES = 4.0
+"""Standard deviations of the angle's noise that it moves in addition."""
 STUCK_ANGLE_S = 0.25
 """Least length of a stretch in which an angle is stuck, while its joint moves on either side, s."""
 JUMP = 3.0
@@ -35,6 +36,8 @@ HELD_S, HELD_RAD = 1.0, 0.1
 prismatic joint the way is in proportion to the joint's."""
 ALONE_S, ALONE = 2.0, 3.0
 """Without a set-point: this long, and so many times the longest other standstill."""
+OUTLASTS = 3.0
+"""Times the next longest constant stretch that a stuck, coarsely rounded torque lasts."""
 STUCK_TORQUE_S = 0.15
 """Least length of a stretch of one and the same torque that is stuck, s."""
 STUCK_FORCE_S = 1.0
@@ -157,40 +160,49 @@ def _held(motion: Motion, joint: int) -> float:
 def _torque(motion: Motion, joint: int) -> Iterator[Fault]:
     """Report torque that stands still: at its extreme it is saturated, elsewhere stuck.
 
-    Rounding to coarse steps makes torque stand still as well. There only what lasts much longer than the rest is told.
+    A torque rounded to coarse steps also stays constant. Saturation cannot be told there, and only an exceptionally
+    long stretch counts as stuck.
     """
     torque = motion.torque[:, joint]
-    name, channel = motion.joints[joint], column(motion, joint, "torque")
     flat = constant_stretches(torque, FLAT_TOP)
     at_top = (torque[flat[:, 0]] == torque.max()) | (torque[flat[:, 0]] == torque.min())
     lasts = flat[:, 1] - flat[:, 0] >= STUCK_TORQUE_S * motion.sample_rate_hz
     moving = np.array([np.abs(motion.dq[a:b, joint]).max() > 0.1 * np.ptp(motion.q[:, joint]) for a, b in flat], bool)
     if _is_in_steps(torque, flat[at_top | lasts]):
-        at_top[:], lasts = False, lasts & _outlasts(flat)
+        at_top = np.zeros_like(at_top)
+        lasts &= _outlasts(flat)
     tops, stuck = flat[at_top], flat[~at_top & lasts & moving]
-    samples = mask_of(tops, len(torque))
-    if len(tops) > 1 and samples.sum() >= SATURATED:
-        unit = motion.machine.joints[joint].unit("torque")
-        limits = " and ".join(f"{value:.4g} {unit}" for value in sorted({torque[a] for a, _ in tops}))
-        yield Fault(
-            motion.file,
-            channel,
-            f"{the(name)}'s torque is saturated: clipped at {limits} in {samples.sum()} samples "
-            f"({100 * samples.mean():.2g} %), {when(motion, tops)}; "
-            "raise the sensor's range or the drive's limit, or move more gently",
-            samples,
-        )
+    if len(tops) > 1 and mask_of(tops, len(torque)).sum() >= SATURATED:
+        yield _saturated(motion, joint, tops)
     elif len(tops) and (lasts & moving & at_top).any():
         stuck = flat[lasts & moving]
     if len(stuck):
-        samples = mask_of(stuck, len(torque))
-        yield Fault(
-            motion.file,
-            channel,
-            f"{the(name)}'s torque is stuck: constant for {samples.sum() / motion.sample_rate_hz:.2f} s, "
-            f"{when(motion, stuck)}, while the joint moved; check the current sensor and the drive's status",
-            samples,
-        )
+        yield _stuck_torque(motion, joint, stuck)
+
+
+def _saturated(motion: Motion, joint: int, tops: NDArray) -> Fault:
+    torque, unit = motion.torque[:, joint], motion.machine.joints[joint].unit("torque")
+    samples = mask_of(tops, len(torque))
+    limits = " and ".join(f"{value:.4g} {unit}" for value in sorted({torque[a] for a, _ in tops}))
+    return Fault(
+        motion.file,
+        column(motion, joint, "torque"),
+        f"{the(motion.joints[joint])}'s torque is saturated: clipped at {limits} in {samples.sum()} samples "
+        f"({100 * samples.mean():.2g} %), {when(motion, tops)}; "
+        "raise the sensor's range or the drive's limit, or move more gently",
+        samples,
+    )
+
+
+def _stuck_torque(motion: Motion, joint: int, stuck: NDArray) -> Fault:
+    samples = mask_of(stuck, len(motion.torque))
+    return Fault(
+        motion.file,
+        column(motion, joint, "torque"),
+        f"{the(motion.joints[joint])}'s torque is stuck: constant for {samples.sum() / motion.sample_rate_hz:.2f} s, "
+        f"{when(motion, stuck)}, while the joint moved; check the current sensor and the drive's status",
+        samples,
+    )
 
 
 def _is_in_steps(torque: NDArray, apart: NDArray) -> bool:
@@ -200,10 +212,10 @@ def _is_in_steps(torque: NDArray, apart: NDArray) -> bool:
 
 
 def _outlasts(found: NDArray) -> NDArray:
-    """Tell which of the stretches (runs, 2) lasts ``ALONE`` times as long as any other, (runs,) bool."""
+    """Tell which of the stretches (runs, 2) lasts ``OUTLASTS`` times as long as any other, (runs,) bool."""
     lasting = found[:, 1] - found[:, 0]
     second = np.partition(lasting, -2)[-2] if len(lasting) > 1 else 0
-    return np.asarray(lasting > ALONE * second, dtype=bool)
+    return np.asarray(lasting > OUTLASTS * second, dtype=bool)
 
 
 def has_silent_cuffs(motion: Motion) -> bool:

@@ -36,7 +36,7 @@ TORQUE_UNITS = {
     "N·mm": 1e3, "N·cm": 1e2, "kgf·cm": 10.197, "lbf·in": 8.851, "ozf·in": 141.6, "kgf·m": 0.10197, "kN·m": 1e-3,
 }  # fmt: skip
 SAME_UNIT = 1.3
-"""Factor within which a measured ratio is that of a unit."""
+"""Largest factor between a measured ratio and a unit's."""
 FOLLOWS = 0.7
 """Correlation of an angle with its set-point below which it does not go after it, in whatever unit."""
 SMALLER_UNITS, NEAR = (1 / (2 * np.pi), np.pi / 180, 1 / 360), 1.25

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pipelines.diagnosis.dependence.explained_share import Variable
 
 DEGREE = 3
-"""Of the splines: cubic ones."""
+"""Degree of the splines."""
 FEWER = 4
 """Inner knots of each side of a surface."""
 RIDGES = (1e-3, 1e-2, 1e-1, 1.0)

@@ -1,4 +1,4 @@
-"""All training runs in the decision band as one weighted regression, the baseline projected out.
+"""All searched runs in the decision band as one weighted regression, the baseline projected out.
 
 Rows are averages over 0.1 s of every output of every run, divided by their noise and whitened as
 noise of first order; so the squared length of a residual is a chi-square. What the baseline can imitate is
@@ -64,7 +64,7 @@ class DecisionRegression:
         Parameters
         ----------
         runs : sequence of Run
-            The training runs.
+            The runs that are searched.
         baseline : sequence of (m, O, b) arrays
             The baseline's columns in each run.
         noise : NoiseModel

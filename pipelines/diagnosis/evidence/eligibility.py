@@ -15,7 +15,7 @@ from pipelines.mechanics.origin import settings_of
 from pipelines.mechanics.silence import silent_torque
 
 MOST_NM = 10_000.0
-"""Largest torque that is taken for one, N·m: more is another unit."""
+"""Largest plausible torque, N·m; a larger one is in another unit."""
 COPIED = 1e-12
 """Up to which a correlation falls short of 1 by rounding alone: two encoders differ by more than their last count."""
 LEAST_S = 5.0

@@ -1,4 +1,4 @@
-"""The training runs under the baseline alone: what it leaves, and the noise in that."""
+"""The searched runs under the baseline alone: what it leaves, and the noise in that."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from pipelines.model import Model
 
 @dataclass(frozen=True)
 class Prepared:
-    """The training runs under the baseline alone."""
+    """Runs under the baseline alone: the training runs, or all runs where all are searched."""
 
     runs: tuple[Run, ...]
     """With the loads that the baseline's rigid bodies make."""

@@ -32,7 +32,7 @@ SHORTEST, LONGEST = 2e-5, 0.01
 """rad of travel, on an exoskeleton's scale: over less is at once, and what builds up over more shows away from
 reversals too."""
 TRAVELS = 16
-"""Travels between these two that are tried."""
+"""Number of travels tried between ``SHORTEST`` and ``LONGEST``."""
 SPEEDS = (0.02, 0.04, 0.08, 0.16, 0.32)
 """rad/s, on an exoskeleton's scale, within which friction that goes with speed turns round."""
 LATE_S = (0.02, 0.04, 0.06)

@@ -43,11 +43,17 @@ class Uncertainty:
             (p,) linear values of the fit.
         amplitudes : slice
             Places of the amplitudes among them.
+
+        Returns
+        -------
+        bool
+            False without amplitudes.
         """
         size, covariance = values[amplitudes], self.covariance[amplitudes, amplitudes]
         statistic = float(size @ np.linalg.pinv(covariance, hermitian=True) @ size)
-        wide = (self.critical / norm.ppf(0.975)) ** 2
-        return len(size) > 0 and statistic <= wide * float(chi2.ppf(0.95, len(size)))
+        # Few effective samples widen the region as they widen each interval.
+        inflation = (self.critical / norm.ppf(0.975)) ** 2
+        return len(size) > 0 and statistic <= inflation * float(chi2.ppf(0.95, len(size)))
 
 
 def uncertainty(fit: Fit, runs: Sequence[Run], baseline: Baseline, imperfect: NDArray) -> Uncertainty:

@@ -69,11 +69,19 @@ def gains_of(without: Mapping[str, Validated], whole: Validated) -> dict[str, Ga
 
 
 def removed_share(less: Validated, whole: Validated) -> float | None:
-    """Return the share of the systematic error without a cause that it removes, 0 to 1; None where there is none.
+    """Return the share of a joint's systematic mean square that a cause removes, 0 to 1.
 
-    Of the mean square above the noise floor, at the joint where the cause gains most.
+    Parameters
+    ----------
+    less, whole : Validated
+        The model without the cause, and with it.
+
+    Returns
+    -------
+    float or None
+        At the joint where the cause gains most; None where the model without it is at the noise floor.
     """
-    joint = gain(less.errors, whole.errors).joint
+    joint = int(np.argmax(less.errors.rms - whole.errors.rms))
     floor, without, with_it = (float(rms[joint]) for rms in (whole.floor.rms, less.errors.rms, whole.errors.rms))
     power = without**2 - floor**2
     return float(np.clip((without**2 - with_it**2) / power, 0.0, 1.0)) if power > 0.0 else None

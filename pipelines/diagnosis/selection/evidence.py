@@ -4,7 +4,7 @@ Small enough to be kept for thousands of sessions, from which the criteria are l
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from itertools import pairwise
 from typing import Any
@@ -17,11 +17,12 @@ from pipelines.diagnosis.candidates.cause import Cause
 from pipelines.diagnosis.candidates.library import Library, orders_of
 from pipelines.diagnosis.candidates.quantisation import STEPS_TRIED
 from pipelines.diagnosis.candidates.shape_refinement import log_searched
-from pipelines.diagnosis.candidates.smooth_laws import FAMILIES, HUM, QUANTISATION, TIME, LawColumn, law_label
+from pipelines.diagnosis.candidates.smooth_laws import HUM, QUANTISATION, TIME, LawColumn
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
 from pipelines.effects import Cogging, Family
+from pipelines.law import FAMILIES, law_label
 
 LEAST_VARIANCE = 1e-10
 """Of slow noise's coefficients, squared shares of the torque: keeps their precision finite."""
@@ -103,7 +104,7 @@ class Nonnegative:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Products over the training runs' rows, of each output (O,) apart: drives first; n columns."""
+    """Products over the searched runs' rows, of each output (O,) apart: drives first; n columns."""
 
     gram: NDArray
     """(O, n, n) of the columns with one another."""
@@ -115,8 +116,7 @@ class Evidence:
     auxiliary: Mapping[str, float]
     """Log likelihood of causes besides what they do to the mean torque, by label."""
     explained: NDArray
-    """(O,) what all columns together explain of each output's rows beyond slow noise, squared and in units of the
-    noise."""
+    """(O,) what all columns together explain of each output's rows, squared and in units of the noise."""
     nonnegative: Nonnegative | None = None
     contexts: tuple[tuple[int, ...], ...] = ()
     """Sets of elements whose causes were refined beside one another."""
@@ -131,10 +131,10 @@ class Evidence:
         outputs = [regression.output == o for o in range(len(regression.torque))]
         parts = [(X[rows], regression.measured[rows]) for rows in outputs]
         gram, right = np.array([x.T @ x for x, _ in parts]), np.array([x.T @ y for x, y in parts])
-        slow = at.curves, np.array([curve.noise for curve in library.curves])
         return cls(
             gram, right, (elements := tuple(_elements(library, at))), tuple(_background(library, at)),
-            dict(auxiliary), np.array([explained(g, r, *slow) for g, r in zip(gram, right, strict=True)]),
+            dict(auxiliary), 
+            np.array(list(_explained(library, at, gram, right))),
             Nonnegative.of(library, at, X.shape[1]), tuple(_contexts(library, elements)), _about(library),
         )  # fmt: skip
 
@@ -170,27 +170,50 @@ class Evidence:
         )  # fmt: skip
 
 
-def explained(gram: NDArray, right: NDArray, slow: NDArray, variance: NDArray) -> float:
-    """Return what columns, of products (n, n), explain together beyond what they explain of noise.
+def _explained(library: Library, at: "_Places", gram: NDArray, right: NDArray) -> Iterator[float]:
+    """Yield what all columns together explain of each output's rows; curves of time are of drives."""
+    variance = np.array([curve.noise for curve in library.curves])
+    for output, (products, target) in enumerate(zip(gram, right, strict=True)):
+        own = sum(curve.joint == output for curve in library.curves)
+        yield explained(products, target, at.curves, variance, own)
+
+
+def explained(gram: NDArray, right: NDArray, slow: NDArray, variance: NDArray, most: int) -> float:
+    """Return what columns explain of one output's rows, squared and in units of the noise.
+
+    What they would explain of noise alone is subtracted. Slow noise has no form that could be wrong, but its variance
+    is an estimate: what it explains counts as far as one for each of its coefficients.
 
     Parameters
     ----------
+    gram, right : NDArray
+        (n, n) and (n,) products of the columns with one another and with the measured torque.
     slow : NDArray
-        (s,) places of the curves of time: what they follow is slow noise as far as it has such coefficients.
+        (s,) places of the curves of time, by which slow noise is described.
     variance : NDArray
         (s,) of slow noise's coefficients.
+    most : int
+        How many of these curves are of this output.
     """
-    precision = 1.0 / CRITERIA.explained_share**2
-    order = np.concatenate([slow, np.setdiff1d(np.arange(len(gram)), slow)]).astype(int)
-    first = np.full(len(gram), precision)
-    first[: len(slow)] = 1.0 / np.maximum(variance, LEAST_VARIANCE)
-    lower = np.linalg.cholesky(gram[np.ix_(order, order)] + np.diag(first))
-    # Below the curves' rows stands what is left for the others beside slow noise.
-    inverse = dtrtri(lower, lower=1)[0][len(slow) :]
-    others = inverse[:, len(slow) :]
-    # The trace of S^-1 G where S = G + precision I.
-    of_noise = len(others) - precision * np.sum(others**2)
-    return max(float(np.sum((inverse @ right[order]) ** 2) - of_noise), 0.0)
+    rest = np.setdiff1d(np.arange(len(gram)), slow)
+    order = np.concatenate([slow, rest]).astype(int)
+    free = np.full(len(gram), 1.0 / CRITERIA.explained_share**2)
+    as_noise = np.concatenate([1.0 / np.maximum(variance, LEAST_VARIANCE), free[: len(rest)]])
+    beside = _beyond_noise(gram[np.ix_(order, order)], right[order], as_noise, len(slow))
+    of_slow_noise = max(_beyond_noise(gram, right, free, 0) - beside, 0.0)
+    return beside + min(of_slow_noise, most)
+
+
+def _beyond_noise(gram: NDArray, right: NDArray, precision: NDArray, first: int) -> float:
+    """Return what columns from ``first`` on explain beside those before, less what they would explain of noise.
+
+    ``precision`` (n,) is that of the prior of each column's coefficient.
+    """
+    # Rows of the inverse factor from there on: what the columns before leave to explain.
+    inverse = dtrtri(np.linalg.cholesky(gram + np.diag(precision)), lower=1)[0][first:]
+    # The trace of S^-1 G where S = G + the precision.
+    of_noise = len(inverse) - np.sum(precision[first:] * inverse[:, first:] ** 2)
+    return max(float(np.sum((inverse @ right) ** 2) - of_noise), 0.0)
 
 
 def _symmetric(packed: bytes, shape: tuple[int, int]) -> NDArray:
@@ -231,7 +254,7 @@ def _elements(library: Library, at: _Places) -> list[Element]:
     elements = [_of_cause(number, cause, at, library.prepared) for number, cause in enumerate(library.causes)]
     elements += [
         Element(
-            label=law_label(kind, j, names),
+            label=law_label(kind, None if j is None else names[j]),
             name=kind,
             joint=None if j is None else names[j],
             family=FAMILIES[kind],

@@ -64,7 +64,7 @@ class Posterior:
     def judged(self, charged: Mapping[str, float]) -> "Posterior":
         """Return the posterior after validation: a cause that harms there is less probable.
 
-        A cause that helps there gains nothing: the training runs have counted what it explains.
+        A cause that helps there gains nothing: the searched runs have counted what it explains.
 
         Parameters
         ----------

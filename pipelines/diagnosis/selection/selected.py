@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from scipy.special import expit, logit
 
@@ -41,18 +40,18 @@ class AllRunsSearch:
 
 @dataclass(frozen=True)
 class Selected:
-    """What the evidence says: of the runs that are searched at first, then after what the validation runs charge.
+    """What the evidence of the searched runs says, before and after the validation runs judge it.
 
-    Where what the training runs name leaves more than noise on the validation runs, the evidence is of all runs.
+    The training runs are searched; where what they name leaves more than noise on the validation runs, all runs are.
     """
 
     library: Library | None
     """None where faults of acquisition keep physics from being looked at."""
     evidence: Evidence | None
-    trained: Posterior | None
+    searched: Posterior | None
     """How probable each set is by the runs that are searched."""
     posterior: Posterior | None
-    """The same after what the validation runs charge; ``trained`` before them."""
+    """The same after judging: charges of the validation runs, then look-alikes."""
     answer: Answer
     findings: tuple[Finding, ...]
     router: tuple[ResidualShares, ...]
@@ -64,8 +63,8 @@ class Selected:
     of its ties, which has zero."""
 
     removed: Mapping[str, float] = field(default_factory=dict)
-    """Share of the systematic error of the validation runs that a cause removes, by label, of all that were asked
-    whether they are look-alikes."""
+    """Share of the validation runs' systematic error that each cause removed when it was tested for being a look-alike,
+    by label."""
 
     by_all: AllRunsSearch | None = None
     """None where the evidence is of the training runs."""
@@ -95,8 +94,8 @@ class Selected:
 
     def as_all_runs_search(self, first: "Selected", train_count: int) -> "Selected":
         """Return what all runs show, after what the first ``train_count`` of them, to train on, showed alone."""
-        assert first.trained is not None
-        by_all = AllRunsSearch(train_count, answer_of(first.trained).labels)
+        assert first.searched is not None
+        by_all = AllRunsSearch(train_count, answer_of(first.searched).labels)
         return replace(self, by_all=by_all)
 
     @property
@@ -161,21 +160,21 @@ class Selected:
         harms : bool
             Whether the model predicts these runs worse with the charged cause, which is then told as dropped.
         """
-        assert self.trained is not None
+        assert self.searched is not None
         charged = {**self.charged, **charges}
         floors = {one.members: _lowered(one, charges, self._elements) for one in self.answer.named}
-        weighed = _with_floors(self.trained.judged(charged), floors)
-        again = self._reweighed(weighed, charged=charged)
+        weighed = _with_floors(self.searched.judged(charged), floors)
+        again = replace(self._reweighed(weighed), charged=charged)
         doubted = {one.element.label for one in self.answer.named if harms and one.element.variant in charges}
         return replace(again, dropped=(self.dropped | doubted) - set(again.answer.labels))
 
-    def _reweighed(self, weighed: Posterior, **judged: Any) -> "Selected":
-        """Return the answer by another posterior, and what was ``judged`` to come to it."""
+    def _reweighed(self, weighed: Posterior) -> "Selected":
+        """Return the answer read off another posterior; only causes named or tied before may be named."""
         likely = answer_of(weighed, [one.members for one in self.answer.named])
         # Anything else that becomes likely is a finding: refuting one cause is no evidence for another.
         named = tuple(one for one in likely.named if one.element.label in self.answer.members)
         answer = replace(likely, named=named)
-        return replace(self, posterior=weighed, answer=answer, findings=tuple(findings(weighed, answer)), **judged)
+        return replace(self, posterior=weighed, answer=answer, findings=tuple(findings(weighed, answer)))
 
     def with_look_alikes(self, removed: Mapping[str, float]) -> "Selected":
         """Return the answer in which named causes may be unlisted effects that resemble them.
@@ -190,11 +189,11 @@ class Selected:
         named = [one for one in self.answer.named if one.element.label in removed]
         shares = {one.members: removed[one.element.label] for one in named}
         weighed = with_look_alikes(self.posterior, shares)
-        return self._reweighed(weighed, removed=dict(removed))
+        return replace(self._reweighed(weighed), removed=dict(removed))
 
     @property
     def _elements(self) -> tuple[Element, ...]:
-        return () if self.trained is None else self.trained.elements
+        return () if self.searched is None else self.searched.elements
 
     def _best_shape(self, label: str, one: Named) -> Element:
         """Return the most probable shape of a tie in the place of a named cause."""

@@ -10,8 +10,8 @@ from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fit.validation import Validated
 from pipelines.diagnosis.fit.validation_error import gain
-from pipelines.diagnosis.verdict.findings_in_words import LAW
 from pipelines.effects import EFFECTS, Effect
+from pipelines.law import LAW
 from pipelines.mechanics.machine import Machine
 
 ORDER = {"named": 0, "indistinguishable": 1, "unlisted": 2, "rejected": 3, "absorbed": 4}

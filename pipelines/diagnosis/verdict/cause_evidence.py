@@ -10,6 +10,8 @@ CERTAIN = 1000.0
 """Odds from which more is not told: no calibration could vouch for a figure."""
 TELLING = 3.0
 """Log likelihood from which auxiliary evidence is mentioned: odds of 20."""
+NEARLY_ALL = 0.9
+"""Share of the systematic error below which it is told that a cause may be a look-alike."""
 AUXILIARY = {
     VoluntaryTorque.name: "cycle-to-cycle differences appear in cuff forces and drive torque "
     "alike, so they come from the wearer",
@@ -31,6 +33,11 @@ def cause_evidence(d: Diagnosis, named: Named) -> list[str]:
     ]
     if doubt := doubt_of_gain(d, label):
         sentences.append(doubt[1])
+    if (share := d.selected.removed.get(label, 1.0)) < NEARLY_ALL:
+        sentences.append(
+            f"it removes {share:.0%} of the systematic error there, where a true cause removes nearly all: a part of "
+            "its probability is given to an unlisted effect that resembles it"
+        )
     if effect.each_run:
         sentences.append(_differs(d, label, effect))
     assert d.selected.evidence is not None

@@ -33,7 +33,7 @@ def caveats(d: Diagnosis) -> list[str]:
     ]
     doubtful = [] if d.data.spoilt else [*_high_floor(d), *d.upside_down]
     return [
-        *known, *_at_ends(d), *_unknown_size(d), *_default_length(d), *[noisy] * d.data.noisy_angles,
+        *known, *_at_ends(d), *_size_may_be_zero(d), *_default_length(d), *[noisy] * d.data.noisy_angles,
         *_unrealizable(d), *doubtful, *(_reversal(d, one) for one in d.reversals), *_by_all_runs(d), *_differs(d),
         *_one_run(d), *_one_kind(d),
     ]  # fmt: skip
@@ -72,11 +72,11 @@ def _at_ends(d: Diagnosis) -> list[str]:
     ]
 
 
-def _unknown_size(d: Diagnosis) -> list[str]:
-    """Say which named cause may be of either sign, for all that the training runs tell."""
+def _size_may_be_zero(d: Diagnosis) -> list[str]:
+    """Say of which named causes the size may be zero, by the training runs."""
     return [
-        f"how large {label_in_words(cause.label, d.baseline.machine)} is, the training runs hardly tell: the 95 % "
-        "interval of its size includes zero"
+        f"the training runs do not determine the size of {label_in_words(cause.label, d.baseline.machine)}: its 95 % "
+        "interval includes zero"
         for number, cause in enumerate(d.after.fit.causes)
         if not cause.effect.per_run
         and d.uncertainty.includes_zero(d.after.fit.values, d.after.fit.columns_of(number).slice)
@@ -153,7 +153,7 @@ def _differs(d: Diagnosis) -> list[str]:
 
 def _one_run(d: Diagnosis) -> list[str]:
     """Say what one training run cannot show, where nothing is named that it could be."""
-    if d.causes or d.data.spoilt or len(d.train) > 1:
+    if d.causes or d.data.spoilt or len(d.train) > 1 or d.selected.by_all:
         return []
     if d.status == "nothing_missing" and not _differing(d):
         return []

@@ -4,29 +4,13 @@ from collections.abc import Iterator
 from typing import Any
 
 from pipelines.contracts.joints import the
-from pipelines.diagnosis.candidates.smooth_laws import IN_WORDS
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.selection import look_alikes
 from pipelines.diagnosis.selection.findings import Finding
 from pipelines.diagnosis.selection.posterior import Posterior
 from pipelines.label import effect_labelled, in_words
+from pipelines.law import LAW, family_in_words, kind_and_joint, law_in_words
 from pipelines.mechanics.machine import Machine
 
-FAMILIES = {
-    "angle": "a law of {joint}'s angle",
-    "speed": "a law of {joint}'s speed",
-    "reversal": "friction of {joint} that remembers its reversals",
-    "load": "a law of {joint}'s load",
-    "time": "a torque at {joint} that changes with time",
-    "transmission": "something in {joint}'s transmission",
-    "sensor": "something in {joint}'s sensors",
-    "person": "something of the person at {joint}",
-}
-"""What is missing, known by its family alone."""
-WITHOUT_JOINT = {"angle": "a law of {joint}'s angles"}
-"""The same of no single joint, where it is worded otherwise."""
-LAW = "law:"
-"""What the label of an unlisted law begins with."""
 WORTH_A_LINE = 0.01
 """Probability below which a law is not listed with a finding."""
 
@@ -41,16 +25,7 @@ def label_in_words(label: str, machine: Machine) -> str:
     """Return a cause, or an unlisted law by its label, as a sentence says it."""
     if not label.startswith(LAW):
         return in_words(effect_labelled(label))
-    kind, joint = _law_of(label)
-    return _said_of({**IN_WORDS, **look_alikes.IN_WORDS}[kind], joint, machine)
-
-
-def _said_of(words: str, joint: str, machine: Machine) -> str:
-    """Return words about a joint, if any; one that slides has a position and a force."""
-    if not joint:
-        return words
-    own = machine.joint(joint)
-    return words.replace("angle", own.place).replace("torque", own.effort).format(joint=the(joint))
+    return law_in_words(label, machine)
 
 
 def family_of(label: str, weighed: Posterior) -> str:
@@ -85,22 +60,13 @@ def _node_in_words(node: dict[str, Any], finding: dict[str, Any], machine: Machi
     if level == "joint":
         return f"something at {the(value)}" if value else "something of no single joint"
     if level == "family":
-        if not finding["joint"]:
-            return WITHOUT_JOINT.get(value, FAMILIES[value]).format(joint="the machine")
-        return _said_of(FAMILIES[value], finding["joint"], machine)
+        return family_in_words(value, finding["joint"], machine)
     return str(finding["causes"][0]["words"])
-
-
-def _law_of(label: str) -> tuple[str, str]:
-    """Return kind and joint of an unlisted law's label."""
-    kind, _, joint = label.removeprefix(LAW).partition("@")
-    return kind, joint
 
 
 def _laws(finding: Finding, machine: Machine) -> Iterator[dict[str, Any]]:
     """Yield the unlisted laws beside a finding that are worth a line."""
     for label, p in finding.laws:
         if p >= WORTH_A_LINE:
-            kind, joint = _law_of(label)
-            words = label_in_words(label, machine)
-            yield {"law": kind, "joint": joint or None, "probability": p, "words": words}
+            kind, joint = kind_and_joint(label)
+            yield {"law": kind, "joint": joint, "probability": p, "words": law_in_words(label, machine)}

@@ -34,6 +34,8 @@ def _noise_without_periods(d: Diagnosis) -> str:
     weighed, floor = d.prepared.noise.from_periods, d.floor.from_periods
     if weighed and floor:
         return ""
+    if floor and d.selected.by_all:
+        return ""  # the runs that were searched hold periods
     if floor:
         return f" No training run holds two periods, so the noise that weighs causes is estimated from {_otherwise(d)}."
     told = any(run.motion.period_s for run in (*d.train, *d.validate))
@@ -128,20 +130,22 @@ def _unlisted(d: Diagnosis) -> str:
     laws = [law for law in first["laws"] if law["probability"] >= CRITERIA.likely]
     if laws and laws[0]["words"] != first["words"]:
         said += f" Most likely it is {laws[0]['words']} ({laws[0]['probability']:.2f})."
-    return f"{said}{_dropped(d) or _closest(first)}"
+    return f"{said}{_dropped(d) or _closest(d, first)}"
 
 
-def _closest(finding: dict[str, Any]) -> str:
-    """Say which listed cause comes closest, if any does."""
+def _closest(d: Diagnosis, finding: dict[str, Any]) -> str:
+    """Say which listed cause comes closest, if any does, and what keeps it from being named."""
     close = [one for one in finding["causes"] if one["probability"] >= CLOSEST]
     if not close:
         return ""
     words, p = close[0]["words"], close[0]["probability"]
-    return f" Of the listed causes {words} ({p:.2f}) comes closest."
+    share = d.selected.removed.get(cause_label(close[0]))
+    but = "" if share is None else f", but removes only {share:.0%} of the systematic error on the validation runs"
+    return f" Of the listed causes {words} ({p:.2f}) comes closest{but}."
 
 
 def _dropped(d: Diagnosis) -> str:
-    """Say which causes are not named since they do harm on the validation runs."""
+    """Say which causes the validation runs speak against, and how."""
     labels = sorted(d.selected.dropped)
     if not labels:
         return ""
@@ -149,8 +153,9 @@ def _dropped(d: Diagnosis) -> str:
     plural = len(labels) > 1
     said = f" {words[:1].upper()}{words[1:]} would explain"
     if d.selected.by_all:
-        verb = "explain" if plural else "explains"
-        return f"{said} all runs, but fitted to the training runs {verb} too little of the validation runs' error."
+        they, lower, s = ("they", "lower", "") if plural else ("it", "lowers", "s")
+        fitted = f"fitted to the training runs alone, {they} {lower} the error on the validation runs too little"
+        return f"{said} all runs together, but {fitted}, or raise{s} it."
     return f"{said} the training runs, but {'raise' if plural else 'raises'} the error on the validation runs."
 
 
@@ -192,7 +197,7 @@ def _no_gain_at_its_own(d: Diagnosis, causes: list[dict[str, Any]]) -> str:
 def _remains(d: Diagnosis, most: int) -> str:
     """Say how far the joint is from its floor, and where else something stays unexplained."""
     ratio = d.after.errors.rms / d.floor_rms
-    left = [share is not None and share > CRITERIA.left_of_explained for share in d.unexplained]
+    left = d.left_over
     here = f"{'still ' if left[most] else ''}{ratio[most]:.2f} times the floor"
     others = [
         f"; {the(joint)}'s is then {amount(d.baseline.machine, joint, d.after.errors.rms[j])}, "

@@ -12,7 +12,7 @@ from pipelines.diagnosis.fit.joint_fit import residuals_on
 from pipelines.diagnosis.fit.validation_error import errors_of
 
 MENTIONED = 5
-"""Variables that are told, with which what is left goes, at most."""
+"""Most variables that the verdict lists for the remaining error."""
 
 
 @dataclass(frozen=True)

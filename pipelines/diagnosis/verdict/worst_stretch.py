@@ -16,7 +16,7 @@ from pipelines.errors import ExoidError
 STRETCH_S = 6.0
 """Length of the stretch, s."""
 STEP_S = 0.5
-"""From the begin of one stretch that is looked at to that of the next, s."""
+"""Time between the starts of successive stretches, s."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,88 @@
+"""An unlisted law's label, ``law:angle@hip``: the family that it belongs to, and how sentences say it."""
+
+from pipelines.contracts.joints import the
+from pipelines.mechanics.machine import Machine
+
+LAW = "law:"
+"""What the label of an unlisted law begins with."""
+UNLISTED = "unlisted_"
+"""What the kind begins with of an unlisted effect that resembles a listed cause; the cause's family follows."""
+FAMILIES = {
+    "angle": "angle", "other_angle": "angle", "both_angles": "angle",
+    "friction_by_angle": "angle", "friction_by_other_angle": "angle",
+    "speed": "speed", "other_speed": "speed",
+    "load": "load", "other_load": "load",
+    "inertia_by_angle": "transmission",
+    "gain_over_time": "time", "friction_over_time": "time", "time": "time", "hum": "time",
+    "across_joints": "angle", "quantisation": "sensor",
+}  # fmt: skip
+"""The family of each kind of smooth law."""
+IN_WORDS = {
+    "angle": "a law of {joint}'s angle",
+    "other_angle": "a law of the other joint's angle at {joint}",
+    "both_angles": "a law of both joints' angles at {joint}",
+    "speed": "a law of {joint}'s speed",
+    "other_speed": "a law of the other joint's speed at {joint}",
+    "friction_by_angle": "friction of {joint} that depends on its angle",
+    "friction_by_other_angle": "friction of {joint} that depends on the other joint's angle",
+    "load": "a law of {joint}'s load",
+    "other_load": "a law of the other joint's load at {joint}",
+    "inertia_by_angle": "an inertia of {joint} that depends on its angle",
+    "gain_over_time": "a torque gain of {joint} that changes with time",
+    "friction_over_time": "friction of {joint} that changes with time",
+    "time": "a torque of {joint} that wanders in time and does not repeat",
+    "hum": "a tone at {joint} that does not follow the motion",
+    "across_joints": "an elastic torque across both joints",
+    "quantisation": "a torque of {joint} that is reported in coarse steps",
+}
+FAMILIES_IN_WORDS = {
+    "angle": "a law of {joint}'s angle",
+    "speed": "a law of {joint}'s speed",
+    "reversal": "friction of {joint} that remembers its reversals",
+    "load": "a law of {joint}'s load",
+    "time": "a torque at {joint} that changes with time",
+    "transmission": "something in {joint}'s transmission",
+    "sensor": "something in {joint}'s sensors",
+    "person": "something of the person at {joint}",
+}
+"""What is missing, known by its family alone."""
+WITHOUT_JOINT = {"angle": "a law of {joint}'s angles"}
+"""The same of no single joint, where it is worded otherwise."""
+
+
+def law_label(kind: str, joint: str | None, wearer: str = "all") -> str:
+    """Return what a law is called, ``law:angle@hip``; with ``/human`` if it is the person's."""
+    return LAW + kind + (f"@{joint}" if joint else "") + ("" if wearer == "all" else f"/{wearer}")
+
+
+def kind_and_joint(label: str) -> tuple[str, str | None]:
+    """Return a law's kind, and its joint; None where it is of no single joint."""
+    kind, _, joint = label.removeprefix(LAW).partition("@")
+    return kind, joint or None
+
+
+def family_of_kind(kind: str) -> str:
+    """Return the family that a kind of law belongs to."""
+    return kind.removeprefix(UNLISTED) if kind.startswith(UNLISTED) else FAMILIES[kind]
+
+
+def law_in_words(label: str, machine: Machine | None = None) -> str:
+    """Return a law as a sentence says it; the machine tells which of its joints slide."""
+    kind, joint = kind_and_joint(label)
+    if kind.startswith(UNLISTED):
+        return f"{family_in_words(family_of_kind(kind), joint, machine)}, similar to a listed cause"
+    return _said_of(IN_WORDS[kind], joint, machine)
+
+
+def family_in_words(family: str, joint: str | None, machine: Machine | None = None) -> str:
+    """Return what is missing, of which the family is known and the joint, if it is of one."""
+    words = FAMILIES_IN_WORDS[family] if joint else WITHOUT_JOINT.get(family, FAMILIES_IN_WORDS[family])
+    return _said_of(words, joint, machine)
+
+
+def _said_of(words: str, joint: str | None, machine: Machine | None) -> str:
+    """Return words about a joint, or about the machine; a joint that slides has a position and a force."""
+    if joint and machine is not None:
+        own = machine.joint(joint)
+        words = words.replace("angle", own.place).replace("torque", own.effort)
+    return words.format(joint=the(joint) if joint else "the machine")
