@@ -73,6 +73,7 @@ def measures(scores: Sequence[Score]) -> list[Measure]:
             (not s.right for s in of(scores, "imperfect")),
             high=0.03,
         ),
+        _rate("of these alarms: what is named is there", map(_is_there, _alarmed(scores))),
         _rate("outside the catalogue: called unlisted", right(outside), low=0.85),
         _rate(
             "outside the catalogue: nothing_missing",
@@ -142,6 +143,18 @@ def _worst_world(scores: Sequence[Score], low: float) -> Measure:
         return Measure(name, "no cases", None, low)
     world = min(rates, key=lambda w: rates[w].value)
     return Measure(name, f"{world}: {rates[world]}", rates[world].value, low)
+
+
+def _alarmed(scores: Sequence[Score]) -> list[Score]:
+    """Return sessions of small imperfections about which a verdict was not silent."""
+    return [
+        s for s in of(scores, "imperfect") if not s.right and s.status not in ("refused", "crashed")
+    ]
+
+
+def _is_there(score: Score) -> bool:
+    """Tell whether causes are named, and each is among a session's imperfections."""
+    return bool(score.named) and set(score.named) <= set(score.truth)
 
 
 def of(scores: Iterable[Score], *categories: str) -> list[Score]:

@@ -6,11 +6,12 @@ from pipelines.contracts.joints import the
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.data_faults import Fault
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.verdict.cause_evidence import doubt_of_gain
+from pipelines.diagnosis.verdict.cause_evidence import NEARLY_ALL, doubt_of_gain
 from pipelines.diagnosis.verdict.caveats import floor_that_hides
 from pipelines.diagnosis.verdict.findings_in_words import findings, label_in_words
 from pipelines.diagnosis.verdict.unexplained import Unexplained
 from pipelines.label import amount, cause_label, effect_told, in_words
+from pipelines.law import UNLISTED
 
 MENTIONED = 3
 """Tied causes in the summary; ``indistinguishable_from`` has all."""
@@ -128,7 +129,8 @@ def _unlisted(d: Diagnosis) -> str:
     )
     said = f"Something is missing {which}: {first['words']} (probability {first['probability']:.2f}){also}."
     laws = [law for law in first["laws"] if law["probability"] >= CRITERIA.likely]
-    if laws and laws[0]["words"] != first["words"]:
+    # An effect that resembles a listed cause is told by that cause.
+    if laws and laws[0]["words"] != first["words"] and not laws[0]["law"].startswith(UNLISTED):
         said += f" Most likely it is {laws[0]['words']} ({laws[0]['probability']:.2f})."
     return f"{said}{_dropped(d) or _closest(d, first)}"
 
@@ -139,8 +141,9 @@ def _closest(d: Diagnosis, finding: dict[str, Any]) -> str:
     if not close:
         return ""
     words, p = close[0]["words"], close[0]["probability"]
-    share = d.selected.removed.get(cause_label(close[0]))
-    but = "" if share is None else f", but removes only {share:.0%} of the systematic error on the validation runs"
+    share = d.selected.removed.get(cause_label(close[0]), 1.0)
+    only = f", but removes only {share:.0%} of the systematic error on the validation runs"
+    but = only if share < NEARLY_ALL else ""
     return f" Of the listed causes {words} ({p:.2f}) comes closest{but}."
 
 
