@@ -35,7 +35,7 @@ def cause_evidence(d: Diagnosis, named: Named) -> list[str]:
         sentences.append(doubt[1])
     if (share := d.selected.removed.get(label, 1.0)) < NEARLY_ALL:
         sentences.append(
-            f"it removes {share:.0%} of the systematic error there, where a true cause removes nearly all: a part of "
+            f"it removes {100.0 * share:.0f} % of the systematic error there, where a true cause removes nearly all: a part of "
             "its probability is given to an unlisted effect that resembles it"
         )
     if effect.each_run:

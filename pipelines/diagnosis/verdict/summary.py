@@ -142,7 +142,7 @@ def _closest(d: Diagnosis, finding: dict[str, Any]) -> str:
         return ""
     words, p = close[0]["words"], close[0]["probability"]
     share = d.selected.removed.get(cause_label(close[0]), 1.0)
-    only = f", but removes only {share:.0%} of the systematic error on the validation runs"
+    only = f", but removes only {100.0 * share:.0f} % of the systematic error on the validation runs"
     but = only if share < NEARLY_ALL else ""
     return f" Of the listed causes {words} ({p:.2f}) comes closest{but}."
 
