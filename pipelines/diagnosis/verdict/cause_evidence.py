@@ -35,8 +35,8 @@ def cause_evidence(d: Diagnosis, named: Named) -> list[str]:
         sentences.append(doubt[1])
     if (share := d.selected.removed.get(label, 1.0)) < NEARLY_ALL:
         sentences.append(
-            f"it removes {100.0 * share:.0f} % of the systematic error there, where a true cause removes nearly all: a part of "
-            "its probability is given to an unlisted effect that resembles it"
+            f"it removes {100.0 * share:.0f} % of the systematic error there, where a true cause removes nearly all: "
+            "a part of its probability is given to an unlisted effect that resembles it"
         )
     if effect.each_run:
         sentences.append(_differs(d, label, effect))
