@@ -88,9 +88,7 @@ def assert_noise_of_the_angles_passes_for_nothing(found):
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    strict=True, reason="the elbow's zeros pass for a torque that drifts, and the shoulder's are not named"
-)
+@pytest.mark.xfail(strict=True, reason="the shoulder's zeros are not named")
 def test_free_swings_show_rotor_and_zeros_set_anew_and_every_run_is_foretold_better_than_by_its_makers(
     real_data, theirs, tmp_path_factory
 ):
