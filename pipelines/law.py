@@ -7,6 +7,8 @@ LAW = "law:"
 """What the label of an unlisted law begins with."""
 UNLISTED = "unlisted_"
 """What the kind begins with of an unlisted effect that resembles a listed cause; the cause's family follows."""
+OTHER = "other"
+"""In the kind of a law of what the other joint does."""
 FAMILIES = {
     "angle": "angle", "other_angle": "angle", "both_angles": "angle",
     "friction_by_angle": "angle", "friction_by_other_angle": "angle",
@@ -46,6 +48,12 @@ FAMILIES_IN_WORDS = {
     "person": "something of the person at {joint}",
 }
 """What is missing, known by its family alone."""
+OF_OTHER_JOINT = {
+    "angle": "a torque at {joint} that depends on the other joint's angle",
+    "speed": "a torque at {joint} that depends on the other joint's speed",
+    "load": "a torque at {joint} that depends on the other joint's load",
+}
+"""The same where the likely law is of the other joint."""
 WITHOUT_JOINT = {"angle": "a law of {joint}'s angles"}
 """The same of no single joint, where it is worded otherwise."""
 
@@ -74,10 +82,17 @@ def law_in_words(label: str, machine: Machine | None = None) -> str:
     return _said_of(IN_WORDS[kind], joint, machine)
 
 
-def family_in_words(family: str, joint: str | None, machine: Machine | None = None) -> str:
+def is_of_other_joint(label: str) -> bool:
+    """Tell whether a law is of what the other joint does."""
+    return OTHER in kind_and_joint(label)[0].split("_")
+
+
+def family_in_words(
+    family: str, joint: str | None, machine: Machine | None = None, *, of_other_joint: bool = False
+) -> str:
     """Return what is missing, of which the family is known and the joint, if it is of one."""
-    words = FAMILIES_IN_WORDS[family] if joint else WITHOUT_JOINT.get(family, FAMILIES_IN_WORDS[family])
-    return _said_of(words, joint, machine)
+    special = WITHOUT_JOINT if not joint else OF_OTHER_JOINT if of_other_joint else {}
+    return _said_of(special.get(family, FAMILIES_IN_WORDS[family]), joint, machine)
 
 
 def _said_of(words: str, joint: str | None, machine: Machine | None) -> str:

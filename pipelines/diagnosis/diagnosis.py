@@ -114,10 +114,22 @@ class Diagnosis:
         return (made.errors.rms > CRITERIA.at_floor * self.floor_rms).tolist()
 
     @property
+    def has_periods(self) -> bool:
+        """Whether some recording tells the period of its motion."""
+        return any(run.motion.period_s for run in (*self.train, *self.validate))
+
+    @property
+    def is_mostly_unexplained(self) -> bool:
+        """Whether most of some joint's mean square error is left above the noise floor."""
+        return bool(np.any(self.after.errors.rms**2 > 2.0 * self.floor_rms**2))
+
+    @property
     def leaves_something(self) -> bool:
         """Whether the extended model leaves more than noise at some joint."""
-        if self.data.spoilt or self.status == "nothing_missing":
+        if self.data.spoilt:
             return False
+        if self.status == "nothing_missing":
+            return self.is_mostly_unexplained
         return self.status != "explained" or self.after.leaves_more_than_noise
 
     @cached_property

@@ -34,11 +34,13 @@ ELEMENTS = (
     law("hum", "knee", "time", repeats=False),
     cause("cogging", "knee", "angle"),
     cause("payload_change", "hip", "time", repeats=False),
+    law("other_speed", "hip", "speed"),
+    law("speed", "hip", "speed"),
 )
-SPEED, OFFSET, TILT, ANGLE, HUM, COGGING, PAYLOAD = range(len(ELEMENTS))
+SPEED, OFFSET, TILT, ANGLE, HUM, COGGING, PAYLOAD, OTHER_SPEED, OWN_SPEED = range(len(ELEMENTS))
 
 
-def diagnosed(sets, ratios=(), joints=HIP_AND_KNEE):
+def diagnosed(sets, ratios=(), joints=HIP_AND_KNEE, has_periods=True):
     """Return what is read of a diagnosis, of sets with their probabilities."""
     order = sorted(sets, key=lambda chosen: -sets[chosen])
     p = np.array([sets[chosen] for chosen in order])
@@ -54,9 +56,28 @@ def diagnosed(sets, ratios=(), joints=HIP_AND_KNEE):
         effects={label: effect_labelled(label) for label in labels},
         effect_of=effect_labelled,
         causes=labels,
+        has_periods=has_periods,
         named=selected.answer.named,
         status="explained" if labels else "unknown_cause",
     )
+
+
+@pytest.mark.parametrize(("has_periods", "said"), [(True, "repeats"), (False, "goes")])
+def test_without_periods_nothing_is_said_to_repeat(has_periods, said):
+    (found,) = findings(diagnosed({(ANGLE,): 0.95, (): 0.05}, has_periods=has_periods))
+    assert found["path"][1]["words"] == f"something that {said} with the motion"
+
+
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        (OTHER_SPEED, "a torque at the hip that depends on the other joint's speed"),
+        (OWN_SPEED, "a law of the hip's speed"),
+    ],
+)
+def test_a_law_of_the_other_joint_is_of_a_family_of_the_other_joint(law, words):
+    (found,) = findings(diagnosed({(law,): 0.95, (): 0.05}))
+    assert (found["family"], found["words"]) == ("speed", words)
 
 
 def levels(finding):

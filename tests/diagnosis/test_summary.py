@@ -144,6 +144,16 @@ def test_a_floor_that_is_measured_or_a_small_share_is_taken_as_it_is(stuck, shar
     assert not any("noise floor" in caveat for caveat in told["caveats"])
 
 
+@pytest.mark.parametrize(("times", "told"), [(1.35, False), (1.5, True)])
+def test_where_nothing_is_likely_to_be_missing_most_of_an_error_that_is_not_noise_is_told(stuck, times, told):
+    silent = nothing_missing(stuck, 0.05, from_periods=True)
+    after = replace(silent.after, errors=errors(silent.floor_rms * [times, 1.0]))
+    said = verdict(replace(silent, before=after, after=after))
+    assert said["status"] == "nothing_missing"
+    assert ("Most of that error is not noise" in said["finding"]) == told
+    assert (said["residual"] is not None) == told
+
+
 @pytest.mark.parametrize(("p", "told"), [(0.3, True), (0.04, False)])
 def test_what_comes_closest_is_said_where_nothing_is_likely_to_be_missing(stuck, p, told):
     silent = nothing_missing(stuck, 0.05, from_periods=True)

@@ -61,14 +61,18 @@ def channel_faults(motion: Motion) -> Iterator[Fault]:
 
 
 def _repeated(motion: Motion) -> Iterator[Fault]:
-    """Report drives that hand out old values: angle and torque are the last sample's while the joint moves."""
+    """Report drives that hand out old values: angle and torque are the last sample's while the joint moves.
+
+    A torque rounded to coarse steps is often the last sample's, and tells nothing of that.
+    """
     if motion.measured_angle is None:
         return
     same: NDArray = np.zeros(motion.torque.shape, dtype=bool)
     same[1:] = (np.diff(motion.measured_angle, axis=0) == 0) & (np.diff(motion.torque, axis=0) == 0)
     for j, torque in enumerate(motion.torque.T):
         # A torque that stands for longer is stuck, whatever the angle does.
-        same[:, j] &= ~mask_of(constant_stretches(torque, round(STUCK_TORQUE_S * motion.sample_rate_hz)), len(torque))
+        stuck = constant_stretches(torque, round(STUCK_TORQUE_S * motion.sample_rate_hz))
+        same[:, j] &= ~mask_of(stuck, len(torque)) & (not _is_in_steps(torque, stuck))
     step, change = motion.dq / motion.sample_rate_hz, np.diff(motion.measured_angle, axis=0)
     count = np.array([_count_of(angle) for angle in motion.measured_angle.T])
     noise = median_abs_deviation(change - step[1:], axis=0, scale="normal")

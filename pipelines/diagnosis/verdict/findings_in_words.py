@@ -4,11 +4,12 @@ from collections.abc import Iterator
 from typing import Any
 
 from pipelines.contracts.joints import the
+from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.selection.findings import Finding
 from pipelines.diagnosis.selection.posterior import Posterior
 from pipelines.label import effect_labelled, in_words
-from pipelines.law import LAW, family_in_words, kind_and_joint, law_in_words
+from pipelines.law import LAW, family_in_words, is_of_other_joint, kind_and_joint, law_in_words
 from pipelines.mechanics.machine import Machine
 
 WORTH_A_LINE = 0.01
@@ -42,8 +43,11 @@ def _as_json(d: Diagnosis, finding: Finding, weighed: Posterior) -> dict[str, An
             "family": family_of(label, weighed), "words": in_words(effect),
             "dropped": label in against,
         }  # fmt: skip
+    # Of several laws the most probable tells whose angle, speed or load it is.
+    likely = max(finding.laws, key=lambda law: law[1], default=("", 0.0))
+    of_other_joint = likely[1] >= CRITERIA.likely and is_of_other_joint(likely[0])
     for node in told["path"]:
-        node["words"] = _node_in_words(node, told, machine)
+        node["words"] = _node_in_words(d, node, told, of_other_joint)
     told["laws"] = list(_laws(finding, machine))
     last = told["path"][-1]["words"]
     # Where it is unknown whether it repeats, the path ends at its beginning.
@@ -51,16 +55,18 @@ def _as_json(d: Diagnosis, finding: Finding, weighed: Posterior) -> dict[str, An
     return told
 
 
-def _node_in_words(node: dict[str, Any], finding: dict[str, Any], machine: Machine) -> str:
+def _node_in_words(d: Diagnosis, node: dict[str, Any], finding: dict[str, Any], of_other_joint: bool) -> str:
     level, value = node["level"], node["value"]
     if level == "missing":
         return "something is missing"
     if level == "repeats":
+        if not d.has_periods:
+            return f"something that {'goes' if value else 'does not go'} with the motion"
         return f"something that {'repeats' if value else 'does not repeat'} with the motion"
     if level == "joint":
         return f"something at {the(value)}" if value else "something of no single joint"
     if level == "family":
-        return family_in_words(value, finding["joint"], machine)
+        return family_in_words(value, finding["joint"], d.baseline.machine, of_other_joint=of_other_joint)
     return str(finding["causes"][0]["words"])
 
 

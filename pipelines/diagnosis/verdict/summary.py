@@ -39,9 +39,8 @@ def _noise_without_periods(d: Diagnosis) -> str:
         return ""  # the runs that were searched hold periods
     if floor:
         return f" No training run holds two periods, so the noise that weighs causes is estimated from {_otherwise(d)}."
-    told = any(run.motion.period_s for run in (*d.train, *d.validate))
     which = "validation run" if weighed else "run"
-    why = f"No {which} holds two periods" if told else "No recording names a period"
+    why = f"No {which} holds two periods" if d.has_periods else "No recording names a period"
     return f" {why}, so the noise floor is estimated from {_otherwise(d)}."
 
 
@@ -68,9 +67,9 @@ def finding_in_words(d: Diagnosis, causes: list[dict[str, Any]], left: Unexplain
     """Return what was found, without remarks on floor and faults."""
     described = f" {left.description}" if left and left.description else ""
     if d.status == "nothing_missing":
-        return _nothing(d)
+        return f"{_nothing(d)}{described}"
     if d.status == "unknown_cause":
-        return f"{_unlisted(d)} {_worst(d)}{described}"
+        return f"{_unlisted(d)} {_error_there(d)}{described}"
     return f"{_named(d, causes)}{described}"
 
 
@@ -78,18 +77,20 @@ def _worst_joint(d: Diagnosis) -> int:
     return int((d.before.errors.rms / d.floor_rms).argmax())
 
 
-def _size(d: Diagnosis) -> str:
-    """Return the error of the joint where it is largest compared with the noise floor, and that ratio."""
-    worst = _worst_joint(d)
-    joint, error = d.baseline.joints[worst], d.before.errors.rms[worst]
-    ratio = error / d.floor_rms[worst]
+def _size(d: Diagnosis, place: int) -> str:
+    """Return a joint's error, and how many times the noise floor it is."""
+    joint, error = d.baseline.joints[place], d.before.errors.rms[place]
+    ratio = error / d.floor_rms[place]
     return f"{amount(d.baseline.machine, joint, error)}, {ratio:.2f} times the noise floor"
 
 
-def _worst(d: Diagnosis) -> str:
-    joint = d.baseline.joints[_worst_joint(d)]
+def _error_there(d: Diagnosis) -> str:
+    """Return the error at the joint of the first finding; of none, where it is largest compared with the noise."""
+    joint = d.selected.findings[0].joint if d.selected.findings else None
+    place = d.baseline.joints.index(joint) if joint else _worst_joint(d)
+    joint = d.baseline.joints[place]
     effort = d.baseline.machine.joint(joint).effort
-    return f"{the(joint).capitalize()}'s {effort} error is {_size(d)}."
+    return f"{the(joint).capitalize()}'s {effort} error is {_size(d, place)}."
 
 
 def _nothing(d: Diagnosis) -> str:
@@ -98,11 +99,14 @@ def _nothing(d: Diagnosis) -> str:
     said = (
         "Nothing is missing that these data could show "
         f"(probability {d.selected.answer.nothing:.2f}). Compared with the noise, the {effort} error is largest at "
-        f"{the(joint)}: {_size(d)}"
+        f"{the(joint)}: {_size(d, _worst_joint(d))}"
     )
     if hiding := floor_that_hides(d).get(joint):
         said += f", but the floor itself is {hiding:.0%} of the {effort}: little could show"
-    return f"{said}.{_dropped(d) or _nearest(d)}"
+    said = f"{said}.{_dropped(d) or _nearest(d)}"
+    if d.is_mostly_unexplained:
+        said += " Most of that error is not noise, and neither a listed cause nor a smooth law explains it."
+    return said
 
 
 def _nearest(d: Diagnosis) -> str:
