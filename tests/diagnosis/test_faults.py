@@ -253,6 +253,15 @@ def test_a_torque_that_is_rounded_to_coarse_steps_is_no_fault(session, step):
     assert faults_of(session) == []
 
 
+def test_an_angle_that_repeats_beside_a_torque_in_coarse_steps_is_no_stale_row(session):
+    """In a tenth of the samples the angle is the last one's; the torque is new, but rounded."""
+    rounded(session, 4.0)
+    frame, _ = session[SPOILED]
+    again = np.random.default_rng(4).random(len(frame)) < 0.1
+    frame["knee_angle_rad"] = frame["knee_angle_rad"].mask(again).ffill().bfill()
+    assert [fault for fault in faults_of(session) if "stale" in fault.what] == []
+
+
 def test_a_torque_in_coarse_steps_that_stops_is_stuck(session):
     rounded(session, 2.0)
     frame, _ = session[SPOILED]
