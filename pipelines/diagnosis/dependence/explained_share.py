@@ -362,4 +362,4 @@ def _where(above: Sequence[Excess]) -> str:
         means = sorted(((float(np.mean(v)), name) for name, v in groups.items()), reverse=True)
         if len(means) > 1 and means[0][0] > ONE_SIDED * means[1][0]:
             return f", mostly {words[means[0][1]]}" if what == "run" else f", mostly in {means[0][1]}"
-    return ", in all runs alike" if len(above) > 1 else ""
+    return ", in all validation runs alike" if len(above) > 1 else ""
