@@ -163,7 +163,7 @@ def _show_known(known: Mapping[str, Any]) -> None:
 
 def _show_cause(cause: Mapping[str, Any]) -> None:
     from pipelines.contracts.joints import the
-    from pipelines.label import cause_label
+    from pipelines.label import effect_told, in_words
 
     where = f" at {the(cause['joint'])}" if cause["joint"] else ""
     likely = f"probability {cause['probability']:.2f}"
@@ -175,8 +175,7 @@ def _show_cause(cause: Mapping[str, Any]) -> None:
     for sentence in cause["evidence"]:
         console.note(f"- {sentence}")
     for tie in cause["indistinguishable_from"]:
-        per_run = "per-run " * tie.get("per_run", False)
-        console.note(f"or {per_run}{cause_label(tie)}: {tie['why']}; {tie['how_to_separate']}")
+        console.note(f"or {in_words(effect_told(tie))}: {tie['why']}; {tie['how_to_separate']}")
 
 
 def _in_words(parameter: Mapping[str, Any]) -> str:
