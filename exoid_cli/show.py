@@ -80,11 +80,11 @@ def _show_whole(found: "Inspection") -> bool:
 
 def _show_candidates(rows: list[dict[Any, Any]]) -> None:
     """Say of the first candidates what became of each, and why."""
-    from pipelines.report.bars import label_in_words, labels_in_words
+    from pipelines.report.bars import any_label_in_words, labels_in_words
 
     labels = {label for row in rows for label in row["causes"]}
     for row in rows[:FIRST]:
-        console.say(f"\n{row['rank']} {' + '.join(map(label_in_words, row['causes']))}: {row['verdict']}")
+        console.say(f"\n{row['rank']} {' + '.join(map(any_label_in_words, row['causes']))}: {row['verdict']}")
         console.note(labels_in_words(row["reason"], labels))
     if len(rows) > FIRST:
         console.say(f"\n{len(rows) - FIRST} more are in the file")

@@ -6,6 +6,7 @@ from typing import Any
 from pipelines.contracts.joints import the
 from pipelines.effects import EFFECTS, Effect
 from pipelines.errors import InputError, about
+from pipelines.law import LAW, law_in_words
 from pipelines.mechanics.machine import Machine
 from pipelines.model import effect_named
 
@@ -81,3 +82,8 @@ def in_words(effect: Effect) -> str:
     title = title_in_words(effect)
     title = f"per-run {title}" if effect.each_run else title
     return f"{title} at {the(effect.joint)}" if effect.joint else title
+
+
+def label_in_words(label: str, machine: Machine | None = None) -> str:
+    """Return a cause, or an unlisted law, as a sentence says it; the machine tells which of its joints slide."""
+    return law_in_words(label, machine) if label.startswith(LAW) else in_words(effect_labelled(label))

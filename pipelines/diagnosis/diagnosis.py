@@ -99,19 +99,15 @@ class Diagnosis:
         """Share of each joint's systematic power that is left; None where there was none."""
         floor, before, after = self.floor_rms**2, self.before.errors.rms**2, self.after.errors.rms**2
         left = np.maximum(after - floor, 0.0)
-        was = self._above_floor(self.before)
+        was = self.before.above(self.floor)
         shares = left / np.where(was, before - floor, 1.0)
         return [float(share) if there else None for share, there in zip(shares, was, strict=True)]
 
     @property
     def left_over(self) -> list[bool]:
         """Joints that end above the floor, with more than ``left_of_explained`` of their systematic power."""
-        shares = zip(self.unexplained, self._above_floor(self.after), strict=True)
-        return [above and share is not None and share > CRITERIA.left_of_explained for share, above in shares]
-
-    def _above_floor(self, made: Validated) -> list[bool]:
-        """Return at which joints a model leaves more than noise."""
-        return (made.errors.rms > CRITERIA.at_floor * self.floor_rms).tolist()
+        shares = zip(self.unexplained, self.after.above(self.floor), strict=True)
+        return [bool(above) and share is not None and share > CRITERIA.left_of_explained for share, above in shares]
 
     @property
     def has_periods(self) -> bool:

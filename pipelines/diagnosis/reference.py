@@ -56,12 +56,18 @@ def meanings() -> dict[str, str]:
     """Return the sentence below each field of ``Criteria``."""
     tree = ast.parse(inspect.getsource(criteria))
     (body,) = (n.body for n in tree.body if isinstance(n, ast.ClassDef) and n.name == "Criteria")
-    found = {}
-    for field, below in pairwise(body):
-        if isinstance(field, ast.AnnAssign) and isinstance(below, ast.Expr):
-            assert isinstance(field.target, ast.Name) and isinstance(below.value, ast.Constant)
-            found[field.target.id] = " ".join(str(below.value.value).split())
-    return found
+    return {
+        statement.target.id: told
+        for statement, told in _documented(body)
+        if told and isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name)
+    }
+
+
+def _documented(body: Sequence[ast.stmt]) -> Iterator[tuple[ast.stmt, str]]:
+    """Yield each statement with the string below it, empty without one."""
+    for statement, below in pairwise([*body, ast.Pass()]):
+        meaning = below.value if isinstance(below, ast.Expr) else None
+        yield statement, " ".join(str(meaning.value).split()) if isinstance(meaning, ast.Constant) else ""
 
 
 def numbers_of(folder: Path) -> Iterator[tuple[str, dict[str, Any], str]]:
@@ -69,12 +75,10 @@ def numbers_of(folder: Path) -> Iterator[tuple[str, dict[str, Any], str]]:
     for path in sorted(folder.glob("*.py")):
         body = ast.parse(path.read_text(encoding="utf-8")).body
         module = importlib.import_module(f"{__package__}.{folder.name}.{path.stem}")
-        for statement, below in pairwise([*body, ast.Pass()]):
+        for statement, meaning in _documented(body):
             values = {name: value for name in _assigned(statement) if _is_number(value := getattr(module, name))}
             if values:
-                meaning = below.value if isinstance(below, ast.Expr) else None
-                told = str(meaning.value) if isinstance(meaning, ast.Constant) else ""
-                yield path.name, values, " ".join(told.split())
+                yield path.name, values, meaning
 
 
 def _assigned(statement: ast.stmt) -> list[str]:

@@ -9,8 +9,8 @@ import numpy as np
 
 from pipelines.contracts.joints import the
 from pipelines.errors import InputError
-from pipelines.label import SHARES, cause_label, effect_labelled, effect_told, in_words
-from pipelines.law import LAW, law_in_words
+from pipelines.label import SHARES, cause_label, effect_told, in_words, label_in_words
+from pipelines.law import LAW
 
 TONES = {"noise_floor": "noise", "repeatable_unexplained": "left", "not_repeatable": "wanders", "unexplained": "left"}
 """Names of the colours of what is no cause."""
@@ -98,7 +98,7 @@ def budget(verdict: dict[str, Any]) -> list[Bar]:
         for key, share in shares.items():
             start = right if share >= 0 else left
             tone = TONES[key] if key in TONES else f"cause{1 + causes.index(key) % CAUSES}"
-            words = SHARES.get(key) or told.get(key) or label_in_words(key)
+            words = SHARES.get(key) or told.get(key) or any_label_in_words(key)
             if key == "noise_floor" and share < 0.999 * verdict["noise_floor_nm"][joint] ** 2:
                 words = "noise, all of it below the floor"
             segments.append(Segment(key, words, tone, min(start, start + share), max(start, start + share), share))
@@ -129,14 +129,14 @@ def torque_unit(verdict: dict[str, Any], joint: str) -> str:
     return verdict.get("units", {}).get(joint, {}).get("torque", "N·m")
 
 
-def label_in_words(label: str) -> str:
+def any_label_in_words(label: str) -> str:
     """Return ``cogging@knee`` as a sentence says it; an effect that is not known here by its name."""
     name, _, joint = label.partition("@")
     at = f" at {the(joint)}" if joint else ""
     try:
-        return law_in_words(label) if label.startswith(LAW) else in_words(effect_labelled(label))
+        return label_in_words(label)
     except (InputError, KeyError):
-        return name.replace("_", " ") + at
+        return name.removeprefix(LAW).replace("_", " ") + at
 
 
 def cause_in_words(cause: Mapping[str, Any]) -> str:
@@ -144,7 +144,7 @@ def cause_in_words(cause: Mapping[str, Any]) -> str:
     try:
         return in_words(effect_told(cause))
     except InputError:
-        return label_in_words(cause_label(cause))
+        return any_label_in_words(cause_label(cause))
 
 
 def told_in_words(verdict: Mapping[str, Any]) -> dict[str, str]:
@@ -156,7 +156,7 @@ def labels_in_words(text: str, labels: Iterable[str]) -> str:
     """Return a sentence with the labels that stand in it said as sentences say them."""
     known = sorted(set(labels), key=len, reverse=True)
     any_of = re.compile(rf"(?<![\w@])(?:{'|'.join(map(re.escape, known))})(?![\w@])") if known else None
-    return any_of.sub(lambda found: label_in_words(found[0]), text) if any_of else text
+    return any_of.sub(lambda found: any_label_in_words(found[0]), text) if any_of else text
 
 
 def causes_in_words(causes: Sequence[dict[str, Any]]) -> str:

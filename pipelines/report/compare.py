@@ -8,7 +8,7 @@ from typing import Any
 from pipelines.errors import InputError
 from pipelines.label import cause_label
 from pipelines.report.acquisition import runs
-from pipelines.report.bars import cause_in_words, label_in_words, torque_unit
+from pipelines.report.bars import any_label_in_words, cause_in_words, torque_unit
 from pipelines.report.lead import lead
 from pipelines.report.numbers import digits
 from pipelines.report.page import render
@@ -264,7 +264,7 @@ def _only(session: Session, alone: Sequence[Estimate]) -> tuple[str, ...]:
     """Return the parameters that a session has alone, those of the causes that it names as such."""
     named = {cause_label(cause) for cause in (session.verdict or {}).get("causes", [])}
     return tuple(
-        f"{e.words} of {label_in_words(label)}, which it names" if (label := _label(e)) in named else e.words
+        f"{e.words} of {any_label_in_words(label)}, which it names" if (label := _label(e)) in named else e.words
         for e in alone
     )
 

@@ -14,11 +14,11 @@ from pipelines.report.acquisition import Run
 from pipelines.report.acquisition import runs as recordings
 from pipelines.report.animation import animations, drawn_as
 from pipelines.report.bars import (
+    any_label_in_words,
     budget,
     cause_in_words,
     causes_in_words,
     falls,
-    label_in_words,
     labels_in_words,
     ties_of,
     told_in_words,
@@ -322,7 +322,7 @@ def _candidates(session: Session) -> list[dict[str, Any]]:
             "rank": row["rank"],
             "is_more": (more := _beyond(row, named)) is not None,
             "words": [
-                told.get(row["verdict"], {}).get(label) or label_in_words(label)
+                told.get(row["verdict"], {}).get(label) or any_label_in_words(label)
                 for label in (row["causes"] if more is None else more)
             ],
             "probability": _likely(row["probability"]),

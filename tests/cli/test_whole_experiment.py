@@ -193,9 +193,9 @@ def test_a_model_is_shown_by_its_parameters(exoid, experiment):
 
 def test_the_candidates_of_a_diagnosis_are_shown_with_what_became_of_each(exoid, experiment):
     lines = exoid("show", "diagnosed/candidates.parquet").out.splitlines()
-    assert re.search(
-        r"1 [^@]+ at the (hip|knee): (named|unlisted|rejected|absorbed|indistinguishable)", " ".join(lines)
-    )
+    first_reason = next(n for n, line in enumerate(lines) if line.startswith("  "))
+    entry = " ".join(lines[2:first_reason])  # its words may take two lines
+    assert re.fullmatch(r"1 \S.* at the (hip|knee).*: (named|unlisted|rejected|absorbed|indistinguishable)", entry)
     assert not any("@" in line for line in lines)
     assert max(map(len, lines)) <= 80
 

@@ -21,8 +21,8 @@ NEVER, ALWAYS = 1e6, -1e6
 TURNS = ("1/turn", "rad/m")
 """Units of what is counted along a joint's way."""
 WAVES = 1.5
-"""Of a ripple within the angles that are swept: with fewer it is not seen to repeat, and beside a spring it could
-imitate any function of the angle."""
+"""Fewest waves of a ripple within the angles that are swept: with fewer it does not repeat, and together with a spring
+it fits any function of the angle."""
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ BINS = 1024
 PEAKS = 4
 """Steps tried within the width of a line."""
 STEPS_TRIED = 2.0 * REACH * (1.0 / FINEST - 1.0 / COARSEST)
-"""Number of steps that can be told from one another within the reach."""
+"""Number of steps within the reach that differ by at least the width of a line."""
 
 
 def rounding(torque: NDArray, step: float) -> NDArray:

@@ -16,9 +16,9 @@ from pipelines.mechanics.motion import Motion
 from pipelines.signals.blocks import BlockAverage
 
 BLOCK_S = 0.1
-"""Long ones: noise of the angles must not pass for accelerations that no torque goes with."""
+"""Length of the averages, s: long, so that noise of the angles does not pass for accelerations without torque."""
 LEAST_BLOCKS = 50
-"""Five seconds of motion: with fewer, gravity and inertia are not told apart."""
+"""Fewest averages, five seconds of motion, that separate gravity from inertia."""
 FROM_POSITIVE = np.array([[1.0, 1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
 """X1..X4 from (X1 - X2, X2, X3, X4), none of which is negative: M(q) > 0 needs X1 > X2 > 0."""
 AS_RECORDED, KNEE_REVERSED, EXCHANGED = ((0, 1), (1.0, 1.0)), ((0, 1), (1.0, -1.0)), ((1, 0), (1.0, 1.0))

@@ -21,7 +21,7 @@ from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.origin import settings_of
 
 LEAST_BLOCKS = 50
-"""Of fewer no interval is known."""
+"""Fewest averages from which an interval is estimated."""
 
 
 def sign_faults(motion: Motion) -> Iterator[Fault]:

@@ -22,7 +22,7 @@ NEEDED = 0.5
 LOUDER = 1.25
 """Ratio of variances from which cuffs and drives feel the same at all."""
 FEWEST = 30
-"""Averages that a variance is told from."""
+"""Fewest averages from which a variance is estimated."""
 
 
 def cuff_coherence(runs: Sequence[Run], residuals: Sequence[NDArray]) -> NDArray:

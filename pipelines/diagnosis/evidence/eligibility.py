@@ -19,8 +19,8 @@ MOST_NM = 10_000.0
 COPIED = 1e-12
 """Up to which a correlation falls short of 1 by rounding alone: two encoders differ by more than their last count."""
 LEAST_S = 5.0
-"""Of an exoskeleton's motion, all runs of a kind and purpose together; below, gravity, inertia and friction are not
-told apart."""
+"""Least motion of an exoskeleton, s, all runs of a kind and purpose together: less does not separate gravity, inertia
+and friction."""
 
 
 def refuse_unfit(motions: Sequence[Motion]) -> None:

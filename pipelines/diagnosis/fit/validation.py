@@ -42,8 +42,11 @@ class Validated:
     @property
     def leaves_more_than_noise(self) -> bool:
         """Whether the error of some joint is above the noise floor."""
-        floor = self.floor.rms[: len(self.errors.rms)]
-        return bool(np.any(self.errors.rms > CRITERIA.at_floor * floor))
+        return bool(self.above(self.floor).any())
+
+    def above(self, floor: Floor) -> NDArray:
+        """Return at which joints the error is above a noise floor, (J,) bool."""
+        return np.asarray(self.errors.rms > CRITERIA.at_floor * floor.rms[: len(self.errors.rms)])
 
 
 def without_each(

@@ -200,6 +200,8 @@ def explained(gram: NDArray, right: NDArray, slow: NDArray, variance: NDArray, m
     free = np.full(len(gram), 1.0 / CRITERIA.explained_share**2)
     as_noise = np.concatenate([1.0 / np.maximum(variance, LEAST_VARIANCE), free[: len(rest)]])
     beside = _beyond_noise(gram[np.ix_(order, order)], right[order], as_noise, len(slow))
+    if not most:
+        return beside
     of_slow_noise = max(_beyond_noise(gram, right, free, 0) - beside, 0.0)
     return beside + min(of_slow_noise, most)
 

@@ -13,7 +13,7 @@ from pipelines.diagnosis.selection.answer import Answer, Named
 from pipelines.diagnosis.selection.posterior import Posterior
 
 CLOSEST = 3
-"""Listed causes that are told where none is named."""
+"""Most listed causes that are reported where none is named."""
 LEVELS = ("repeats", "joint", "family")
 """From the root to the causes: attributes of elements."""
 Inside = frozenset[int]

@@ -32,10 +32,10 @@ TRIPLES = 8
 """Triples of each pair that are weighed in full."""
 
 CONTEXTS = 8
-"""Sets whose causes are refined beside one another."""
+"""Most sets whose causes are refined together."""
 
 STRONGEST = 2
-"""Single causes whose partners are sought beside them."""
+"""Number of most probable single causes, each of which is refined together with possible partners."""
 
 SURE = 1.0 - 1e-12
 """What counts as certain: beyond it rounding decides."""

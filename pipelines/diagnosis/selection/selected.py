@@ -22,7 +22,7 @@ from pipelines.mechanics.motion import Motion
 LIBRARY_SHARE = 0.6
 """Of the progress bar, where the library is done."""
 PARTNERS = 5
-"""Causes that are refined beside a strong one."""
+"""Number of causes that are refined together with each of the most probable ones."""
 ROUNDS = 50
 """Rounds in which the probabilities of several groups are raised to their floors in turn."""
 Report = Callable[[float, str], None]

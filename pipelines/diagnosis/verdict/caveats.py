@@ -6,10 +6,9 @@ from pipelines.contracts.joints import the
 from pipelines.diagnosis.candidates.shape_refinement import reach
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fit.presliding_test import NEAR_S, BuildUp
-from pipelines.diagnosis.verdict.findings_in_words import label_in_words
 from pipelines.effects import PreslidingHysteresis
 from pipelines.estimation.angle_noise import CUTOFF_HZ, IN_WORDS
-from pipelines.label import amount
+from pipelines.label import amount, label_in_words
 from pipelines.mechanics.geometry import Geometry
 
 HIDING = 0.2

@@ -8,8 +8,8 @@ from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.selection.findings import Finding
 from pipelines.diagnosis.selection.posterior import Posterior
-from pipelines.label import effect_labelled, in_words
-from pipelines.law import LAW, family_in_words, is_of_other_joint, kind_and_joint, law_in_words
+from pipelines.label import in_words
+from pipelines.law import family_in_words, is_of_other_joint, kind_and_joint, law_in_words
 from pipelines.mechanics.machine import Machine
 
 WORTH_A_LINE = 0.01
@@ -20,13 +20,6 @@ def findings(d: Diagnosis) -> list[dict[str, Any]]:
     """Return the findings as JSON objects, each with its words and the unlisted laws beside it."""
     weighed = d.selected.posterior
     return [] if weighed is None else [_as_json(d, one, weighed) for one in d.selected.findings]
-
-
-def label_in_words(label: str, machine: Machine) -> str:
-    """Return a cause, or an unlisted law by its label, as a sentence says it."""
-    if not label.startswith(LAW):
-        return in_words(effect_labelled(label))
-    return law_in_words(label, machine)
 
 
 def family_of(label: str, weighed: Posterior) -> str:
@@ -43,9 +36,9 @@ def _as_json(d: Diagnosis, finding: Finding, weighed: Posterior) -> dict[str, An
             "family": family_of(label, weighed), "words": in_words(effect),
             "dropped": label in against,
         }  # fmt: skip
-    # Of several laws the most probable tells whose angle, speed or load it is.
-    likely = max(finding.laws, key=lambda law: law[1], default=("", 0.0))
-    of_other_joint = likely[1] >= CRITERIA.likely and is_of_other_joint(likely[0])
+    # The most probable law tells whose angle, speed or load it is.
+    law, p = next(iter(finding.laws), ("", 0.0))
+    of_other_joint = p >= CRITERIA.likely and is_of_other_joint(law)
     for node in told["path"]:
         node["words"] = _node_in_words(d, node, told, of_other_joint)
     told["laws"] = list(_laws(finding, machine))

@@ -8,9 +8,9 @@ from pipelines.diagnosis.data_faults import Fault
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.verdict.cause_evidence import NEARLY_ALL, doubt_of_gain
 from pipelines.diagnosis.verdict.caveats import floor_that_hides
-from pipelines.diagnosis.verdict.findings_in_words import findings, label_in_words
+from pipelines.diagnosis.verdict.findings_in_words import findings
 from pipelines.diagnosis.verdict.unexplained import Unexplained
-from pipelines.label import amount, cause_label, effect_told, in_words
+from pipelines.label import amount, cause_label, effect_told, in_words, label_in_words
 from pipelines.law import UNLISTED
 
 MENTIONED = 3
@@ -86,20 +86,21 @@ def _size(d: Diagnosis, place: int) -> str:
 
 def _error_there(d: Diagnosis) -> str:
     """Return the error at the joint of the first finding; of none, where it is largest compared with the noise."""
-    joint = d.selected.findings[0].joint if d.selected.findings else None
-    place = d.baseline.joints.index(joint) if joint else _worst_joint(d)
+    of_finding = d.selected.findings[0].joint if d.selected.findings else None
+    place = d.baseline.joints.index(of_finding) if of_finding else _worst_joint(d)
     joint = d.baseline.joints[place]
     effort = d.baseline.machine.joint(joint).effort
     return f"{the(joint).capitalize()}'s {effort} error is {_size(d, place)}."
 
 
 def _nothing(d: Diagnosis) -> str:
-    joint = d.baseline.joints[_worst_joint(d)]
+    place = _worst_joint(d)
+    joint = d.baseline.joints[place]
     effort = d.baseline.machine.joint(joint).effort
     said = (
         "Nothing is missing that these data could show "
         f"(probability {d.selected.answer.nothing:.2f}). Compared with the noise, the {effort} error is largest at "
-        f"{the(joint)}: {_size(d, _worst_joint(d))}"
+        f"{the(joint)}: {_size(d, place)}"
     )
     if hiding := floor_that_hides(d).get(joint):
         said += f", but the floor itself is {hiding:.0%} of the {effort}: little could show"

@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from pipelines.diagnosis.diagnosis import Diagnosis
-from pipelines.diagnosis.verdict.findings_in_words import family_of, label_in_words
+from pipelines.diagnosis.verdict.findings_in_words import family_of
 from pipelines.findings import PARTS, VARIABLES, searched_runs
+from pipelines.label import label_in_words
 from pipelines.law import LAW
 from pipelines.plots import BLUE, GREY, NOISE, WANDERS
 
