@@ -90,7 +90,7 @@ def _record(
     reset_faults: bool,
 ) -> None:
     from pipelines.acquisition.acquire import acquire as record
-    from pipelines.acquisition.somebody import unnoticed
+    from pipelines.acquisition.preconditions.human_interlock import unnoticed
     from pipelines.workflow.imported import refuse_imported
     from pipelines.workflow.kept import refuse_recorded
 

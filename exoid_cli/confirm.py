@@ -24,7 +24,7 @@ def confirm(
     """Show what will be moved and the limits in force, and ask; raise InputError unless the answer is yes."""
     import numpy as np
 
-    from pipelines.acquisition.safety import HOLD_SAMPLES
+    from pipelines.acquisition.safety.limits import HOLD_SAMPLES
 
     _refuse_nobody_to_ask(f"run {run.name} moves somebody, which wants to be confirmed on a terminal")
     seconds = min(run.duration_s, motion.period_s or run.duration_s)

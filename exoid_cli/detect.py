@@ -137,7 +137,7 @@ def _show(found: Sequence["Detectable"]) -> None:
 
 
 def _row(one: "Detectable") -> tuple[str, ...]:
-    from pipelines.label import number
+    from pipelines.wording.label import number
 
     machine = one.effect.on
     name = (one.effect.name, one.effect.joint or ("whole leg" if machine.is_exoskeleton else "whole machine"))

@@ -40,7 +40,7 @@ def export(
     from pipelines.errors import SettingsError
     from pipelines.export import FORMATS, exported
     from pipelines.mechanics.read import geometry_from
-    from pipelines.validation import suggestion
+    from pipelines.validation.suggestion import suggestion
 
     formats = {format.name: format for format in FORMATS}
     if to not in formats:

@@ -32,7 +32,7 @@ def figures(
     from pipelines.report.figures import draw
     from pipelines.report.figures import figures as figures_of
     from pipelines.report.session import find
-    from pipelines.validation import suggestion
+    from pipelines.validation.suggestion import suggestion
 
     session = find(folders or [Path()])
     warn_of_unreadable(session)

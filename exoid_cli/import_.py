@@ -66,7 +66,7 @@ def _propose(files: list[Path], place: Path | None) -> None:
 
 def _import(files: list[Path], map_: Path, output: Path) -> None:
     from pipelines.contracts.atomic import folder_to_fill, leftovers
-    from pipelines.importing.aftermath import unused
+    from pipelines.importing.sanity.leftover_recordings import unused
     from pipelines.settings.import_map import load_map
 
     _refuse_the_name_of_a_recording(output)
@@ -97,8 +97,8 @@ def _refuse_the_name_of_a_recording(output: Path) -> None:
 def _made(files: list[Path], settings: "ImportMap", map_: Path, output: Path) -> list[dict[str, Any]]:
     """Write the recordings of all files, or none of them; return what is told of each file."""
     from pipelines.contracts.atomic import all_or_none
+    from pipelines.importing.quantities.turn_offset import Beginnings
     from pipelines.importing.recordings import recordings, refuse_to_overwrite
-    from pipelines.importing.turns import Beginnings
 
     sources: dict[Path, Path] = {}
     before = Beginnings()
@@ -134,7 +134,7 @@ def _twice(path: Path, first: Path, second: Path) -> str:
 
 
 def _say_what_follows(output: Path, made: list[str], map_: Path) -> None:
-    from pipelines.importing.aftermath import lacks, no_longer_made
+    from pipelines.importing.sanity.leftover_recordings import lacks, no_longer_made
     from pipelines.workflow.imported import imported_in
 
     found = imported_in(output)

@@ -10,7 +10,7 @@ from exoid_cli.place import place_of
 from pipelines.errors import InputError
 
 if TYPE_CHECKING:
-    from pipelines.acquisition.recover import Recovered
+    from pipelines.acquisition.recording.recover import Recovered
 
 
 def recover(
@@ -31,8 +31,8 @@ def recover(
       exoid recover
       exoid recover recordings/with_human_train.parquet.journal
     """
-    from pipelines.acquisition.recover import journals_in
-    from pipelines.acquisition.recover import recover as make_recording
+    from pipelines.acquisition.recording.recover import journals_in
+    from pipelines.acquisition.recording.recover import recover as make_recording
 
     recordings = [] if journals else [place_of(None, lacking="no journal is given", look_only=True).out / "recordings"]
     places = journals or [folder for folder in recordings if folder.exists()]

@@ -10,7 +10,7 @@ from exoid_cli.console import console
 from exoid_cli.heeding import Command, JsonOption, QuietOption, heeding
 from exoid_cli.rig import rig as serve
 from exoid_cli.rig_check import check
-from pipelines.validation import closest
+from pipelines.validation.suggestion import closest
 
 
 class _ServesAFile(TyperGroup):

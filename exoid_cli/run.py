@@ -69,7 +69,7 @@ def _say_what_is_left_out(left_out: Sequence[LeftOut]) -> None:
 
 def _known(stages: list[str], place: Place) -> list[str]:
     from pipelines.errors import InputError
-    from pipelines.validation import suggestion
+    from pipelines.validation.suggestion import suggestion
     from pipelines.workflow.graph import STAGES
 
     known = list(dict.fromkeys(step.stage for step in place.steps))

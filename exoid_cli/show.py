@@ -80,7 +80,7 @@ def _show_whole(found: "Inspection") -> bool:
 
 def _show_candidates(rows: list[dict[Any, Any]]) -> None:
     """Say of the first candidates what became of each, and why."""
-    from pipelines.report.bars import any_label_in_words, labels_in_words
+    from pipelines.report.sections.error_budget import any_label_in_words, labels_in_words
 
     labels = {label for row in rows for label in row["causes"]}
     for row in rows[:FIRST]:

@@ -5,8 +5,8 @@ import sys
 from collections.abc import Iterator
 from types import FrameType
 
-from pipelines.ending import ENDING, known, not_ignored
 from pipelines.errors import ExoidError
+from pipelines.process.termination import ENDING, known, not_ignored
 
 
 class Interrupted(KeyboardInterrupt):

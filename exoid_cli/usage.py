@@ -5,7 +5,8 @@ from typing import Any
 
 from typer.exceptions import TyperException
 
-from pipelines.validation import closest, expectation
+from pipelines.validation.explain import expectation
+from pipelines.validation.suggestion import closest
 
 
 def told(error: TyperException) -> str:

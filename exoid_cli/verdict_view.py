@@ -63,7 +63,7 @@ def _show_faults(said: Mapping[str, Any]) -> None:
 
 def _show_findings(said: Mapping[str, Any]) -> None:
     """Print how probable it is that something is missing, and the path to what it is."""
-    from pipelines.findings import outcomes, rows
+    from pipelines.wording.findings import outcomes, rows
 
     cases, tree = outcomes(said), rows(said)
     if not cases:
@@ -91,7 +91,7 @@ def _broken(words: str, depth: int) -> list[str]:
 
 def _show_router(said: Mapping[str, Any]) -> None:
     """Print what the residual of each joint is made of, and what it depends on."""
-    from pipelines.findings import searched_runs, shares
+    from pipelines.wording.findings import searched_runs, shares
 
     joints = shares(said)
     if not joints or said.get("acquisition_at_fault"):
@@ -154,7 +154,7 @@ def _excess_left(said: Mapping[str, Any], joint: str) -> str:
 
 
 def _show_known(known: Mapping[str, Any]) -> None:
-    from pipelines.label import cause_label
+    from pipelines.wording.label import cause_label
 
     console.say(f"\n{cause_label(known)}, assumed present")
     for parameter in known["parameters"]:
@@ -163,7 +163,7 @@ def _show_known(known: Mapping[str, Any]) -> None:
 
 def _show_cause(cause: Mapping[str, Any]) -> None:
     from pipelines.contracts.joints import the
-    from pipelines.label import effect_told, in_words
+    from pipelines.wording.label import effect_told, in_words
 
     where = f" at {the(cause['joint'])}" if cause["joint"] else ""
     likely = f"probability {cause['probability']:.2f}"

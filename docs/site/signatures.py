@@ -20,7 +20,7 @@ from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.machine import THE_LEG
 from pipelines.mechanics.motion import Motion, motion_from_table
 from pipelines.model import Model, Term, baseline
-from pipelines.plots import BLUE, GREY, ORANGE, STYLE, save
+from pipelines.plotting.style import BLUE, GREY, ORANGE, STYLE, save
 from pipelines.rig.plant import Plant
 from pipelines.rig.record import record
 from pipelines.settings.filter import FilterSettings

@@ -14,30 +14,31 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.acquisition.alone import alone
-from pipelines.acquisition.columns import columns_of
-from pipelines.acquisition.embedded import embedded
-from pipelines.acquisition.feasible import refusals
-from pipelines.acquisition.journal import Journal, JournalFile, refuse_leftover
-from pipelines.acquisition.lock import Lock, locked
 from pipelines.acquisition.loop import Loop, Progress, Report, run_to_its_end
-from pipelines.acquisition.machine import Machine
-from pipelines.acquisition.pace import urgent
+from pipelines.acquisition.machine.embedded_rig import embedded
+from pipelines.acquisition.machine.machine import Machine
+from pipelines.acquisition.machine.sampling import sampling_of
+from pipelines.acquisition.modbus.exclusive_access import alone
+from pipelines.acquisition.modbus.file_lock import Lock, locked
+from pipelines.acquisition.pacing import urgent
 from pipelines.acquisition.plan import check_start, check_trajectory, make_plan
-from pipelines.acquisition.recorded import account_of, place_for, write_recording
-from pipelines.acquisition.rehearsal import refuse_unkept_rate
-from pipelines.acquisition.resolution import refuse_coarse_set_points
-from pipelines.acquisition.same_place import refuse_misplaced_set_points
-from pipelines.acquisition.sampling import sampling_of
-from pipelines.acquisition.somebody import refuse_unguarded
-from pipelines.acquisition.states import State, Supervisor
+from pipelines.acquisition.preconditions.feasible_rate import refusals
+from pipelines.acquisition.preconditions.human_interlock import refuse_unguarded
+from pipelines.acquisition.preconditions.rehearsal import refuse_unkept_rate
+from pipelines.acquisition.preconditions.set_point_resolution import refuse_coarse_set_points
+from pipelines.acquisition.preconditions.set_point_scale import refuse_misplaced_set_points
+from pipelines.acquisition.recording.columns import columns_of
+from pipelines.acquisition.recording.journal import Journal, JournalFile, refuse_leftover
+from pipelines.acquisition.recording.recording import account_of, place_for, write_recording
+from pipelines.acquisition.safety.supervisor import Supervisor
+from pipelines.acquisition.states import State
 from pipelines.contracts import RECORDING
 from pipelines.contracts.atomic import open_folder
 from pipelines.contracts.beside import journal_of
 from pipelines.contracts.provenance import describe
-from pipelines.ending import ENDING, heard, known
 from pipelines.errors import DeviceError, ExoidError, about
 from pipelines.mechanics.trajectory import Trajectory, read_trajectory
+from pipelines.process.termination import ENDING, heard, known
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.mechanism import MechanismSettings
 from pipelines.settings.rig import RigSettings, load_rig

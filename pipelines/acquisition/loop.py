@@ -8,18 +8,19 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from pipelines.acquisition.columns import columns_of
-from pipelines.acquisition.drive import Drive, Reading
-from pipelines.acquisition.journal import Journal
-from pipelines.acquisition.latency import Latencies
-from pipelines.acquisition.machine import Machine, all_answers
-from pipelines.acquisition.pace import Lockstep, PhaseLock
+from pipelines.acquisition.machine.drive import Drive, Reading
+from pipelines.acquisition.machine.machine import Machine, all_answers
+from pipelines.acquisition.machine.row import Answers, Row
+from pipelines.acquisition.machine.sampling import Sampling
+from pipelines.acquisition.pacing import Lockstep, PhaseLock
 from pipelines.acquisition.plan import Plan
-from pipelines.acquisition.row import Answers, Row
-from pipelines.acquisition.sampling import Sampling
-from pipelines.acquisition.states import SLACK_SAMPLES, State, Supervisor
+from pipelines.acquisition.recording.columns import columns_of
+from pipelines.acquisition.recording.journal import Journal
+from pipelines.acquisition.recording.latency_histogram import Latencies
+from pipelines.acquisition.safety.supervisor import SLACK_SAMPLES, Supervisor
+from pipelines.acquisition.states import State
 from pipelines.errors import DeviceError, Unanswered
-from pipelines.event_loop import exact_event_loop
+from pipelines.process.event_loop import exact_event_loop
 
 REPORT_S = 0.1
 DISABLE_TRIES = 3

@@ -11,7 +11,7 @@ import pyarrow.compute as pc
 
 from pipelines.contracts import checks, contract_of, parquet, verdict
 from pipelines.errors import ContractError
-from pipelines.toml import read_toml
+from pipelines.validation.toml import read_toml
 
 ORIGIN = ("created_by", "created_at", "software", "inputs", "config")
 

@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 from pipelines.contracts.atomic import refuse_what_is_no_file, whole_file
 from pipelines.contracts.sameness import KEY, MAGIC
 from pipelines.errors import ContractError
-from pipelines.validation import similar_file
+from pipelines.validation.suggestion import similar_file
 
 STREAM = b"\xff\xff\xff\xff"
 """How an Arrow stream starts, and so the journal of a run."""

@@ -16,7 +16,8 @@ from pipelines.contracts import checks, parquet
 from pipelines.contracts.joints import Joint, joints_of
 from pipelines.contracts.metadata import TableKeys
 from pipelines.errors import ContractError
-from pipelines.validation import closest, explain
+from pipelines.validation.explain import explain
+from pipelines.validation.suggestion import closest
 
 FLOAT, INTEGER, BOOLEAN, TEXT = pa.float64(), pa.int64(), pa.bool_(), pa.string()
 

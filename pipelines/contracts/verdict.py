@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
 from pipelines.errors import ContractError
-from pipelines.validation import explain
+from pipelines.validation.explain import explain
 
 Number = Annotated[FiniteFloat, Field(strict=True)]
 ByJoint = dict[str, Number]

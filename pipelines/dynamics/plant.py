@@ -16,7 +16,7 @@ from pipelines.mechanics.machine import Machine, machine_of
 from pipelines.mechanics.mechanisms.leg import LEG
 from pipelines.mechanics.motion import geometry_of
 from pipelines.model import Model, model_from_parameters
-from pipelines.own_values import with_own_values
+from pipelines.model.per_run import with_own_values
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from pipelines.estimation.iteratively_reweighted import IterativelyReweighted
 from pipelines.estimation.least_squares import OrdinaryLeastSquares, WeightedLeastSquares
 from pipelines.estimation.output_error import OutputError
 from pipelines.estimation.realizable import Realizable
-from pipelines.validation import suggestion
+from pipelines.validation.suggestion import suggestion
 
 ESTIMATORS: tuple[type[Estimator], ...] = (
     WeightedLeastSquares,

@@ -17,11 +17,11 @@ from pipelines.contracts.table import Table
 from pipelines.effects import RUNS, Effect
 from pipelines.effects.rigid_body import RigidBody
 from pipelines.errors import InputError, about
-from pipelines.label import effect_at
 from pipelines.mechanics.machine import Machine
 from pipelines.mechanics.run import Run
 from pipelines.model import BASELINE, Term, terms_beside_bodies
-from pipelines.own_values import guess, own_term
+from pipelines.model.per_run import guess, own_term
+from pipelines.wording.label import effect_at
 
 WHY = "others have shapes that a diagnosis finds (--causes), or cannot be told from rigid body and friction"
 

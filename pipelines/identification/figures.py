@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 
 from pipelines.contracts.joints import Joint
 from pipelines.contracts.table import Rows
-from pipelines.plots import BLUE as LEFT
-from pipelines.plots import GREY as MEASURED
-from pipelines.plots import ORANGE as PREDICTED
-from pipelines.plots import STYLE, save
+from pipelines.plotting.style import BLUE as LEFT
+from pipelines.plotting.style import GREY as MEASURED
+from pipelines.plotting.style import ORANGE as PREDICTED
+from pipelines.plotting.style import STYLE, save
 
 BINS, FEWEST = 25, 8
 """Of the running mean of a residual, and the samples a bin needs to have one."""

@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.errors import InputError, SettingsError
-from pipelines.importing import clock
-from pipelines.importing.clock import Run
 from pipelines.importing.finding import Finding, counted
-from pipelines.importing.numbers import TAKEN_FOR_MISSING, numbers
-from pipelines.importing.reading import columns_of, quantity, turn_of_its_counter
+from pipelines.importing.quantities.conversion import columns_of, quantity, turn_of_its_counter
+from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING, numbers
 from pipelines.importing.sources.source import Columns, Source
+from pipelines.importing.time import clock
+from pipelines.importing.time.clock import Run
 from pipelines.settings import transmission
 from pipelines.settings.import_map import ImportMap, ReadingSettings, TimeSettings
-from pipelines.validation import suggestion
+from pipelines.validation.suggestion import suggestion
 
 
 @dataclass(frozen=True)

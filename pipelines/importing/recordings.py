@@ -14,14 +14,14 @@ from pipelines.contracts import RECORDING, describe, parquet
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
 from pipelines.contracts.provenance import sha256, told_by
 from pipelines.errors import ContractError, InputError, SettingsError, about
-from pipelines.importing.clock import FASTEST_HZ, SLOWEST_HZ, Run, Sampling
 from pipelines.importing.finding import Finding, counted
 from pipelines.importing.log import Log, read_log
-from pipelines.importing.numbers import TAKEN_FOR_MISSING
-from pipelines.importing.plausible import look_at
-from pipelines.importing.repetition import repeats_after
+from pipelines.importing.quantities.numbers import TAKEN_FOR_MISSING
+from pipelines.importing.quantities.turn_offset import Beginnings
+from pipelines.importing.sanity.plausibility import look_at
 from pipelines.importing.sources.open import open_source
-from pipelines.importing.turns import Beginnings
+from pipelines.importing.time.clock import FASTEST_HZ, SLOWEST_HZ, Run, Sampling
+from pipelines.importing.time.period import repeats_after
 from pipelines.settings.import_map import ImportMap, RecordingSettings
 
 FEWEST = 10

@@ -19,7 +19,7 @@ from pipelines.mechanics.unseen import refuse_seen
 from pipelines.settings.experiment import Experiment
 from pipelines.settings.filter import FilterSettings
 from pipelines.settings.mechanism import MechanismSettings
-from pipelines.validation import suggestion
+from pipelines.validation.suggestion import suggestion
 
 
 def geometry_from(experiment: Experiment) -> Geometry | None:

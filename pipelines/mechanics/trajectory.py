@@ -13,7 +13,7 @@ from pipelines.errors import ContractError, SettingsError
 from pipelines.mechanics.fourier import FourierTrajectory
 from pipelines.mechanics.sampled_trajectory import SampledTrajectory
 from pipelines.settings.base import Settings, load_toml
-from pipelines.validation import similar_file
+from pipelines.validation.suggestion import similar_file
 
 Trajectory = FourierTrajectory | SampledTrajectory
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pipelines.effects import EFFECTS, Effect, Parameter, Side
 from pipelines.errors import InputError
 from pipelines.mechanics.motion import Motion
-from pipelines.validation import closest, suggestion
+from pipelines.validation.suggestion import closest, suggestion
 
 BY_NAME = {effect.name: effect for effect in EFFECTS}
 

@@ -6,16 +6,16 @@ from math import hypot
 from typing import Any
 
 from pipelines.errors import InputError
-from pipelines.label import cause_label
-from pipelines.report.acquisition import runs
-from pipelines.report.bars import any_label_in_words, cause_in_words, torque_unit
-from pipelines.report.lead import lead
 from pipelines.report.numbers import digits
 from pipelines.report.page import render
-from pipelines.report.parameters import Estimate, estimates
 from pipelines.report.report import headline, machine, status
+from pipelines.report.sections.error_budget import any_label_in_words, cause_in_words, torque_unit
+from pipelines.report.sections.lead import lead
+from pipelines.report.sections.parameters import Estimate, estimates
+from pipelines.report.sections.recordings import runs
+from pipelines.report.sections.settings_diff import SettingApart, settings_apart
 from pipelines.report.session import Artifact, Session
-from pipelines.report.settings_apart import SettingApart, settings_apart
+from pipelines.wording.label import cause_label
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,10 @@ from pathlib import Path
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
-from pipelines.plots import STYLE, save
-from pipelines.report.bars import budget, falls
-from pipelines.report.paper import budget_figure, chart_figure, falls_figure
+from pipelines.plotting.style import STYLE, save
+from pipelines.report.charts.matplotlib_charts import budget_figure, chart_figure, falls_figure
 from pipelines.report.report import charts
+from pipelines.report.sections.error_budget import budget, falls
 from pipelines.report.session import Session
 
 DPI = 200

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from pipelines import __version__
 from pipelines.contracts import describe
 from pipelines.contracts.provenance import sha256
-from pipelines.report.animation import Animation
-from pipelines.report.chart import Chart
+from pipelines.report.charts.chart import Chart
 from pipelines.report.numbers import beside, digits
+from pipelines.report.sections.animation import Animation
 from pipelines.report.session import Artifact
 from pipelines.workflow.graph import SWEEP
 

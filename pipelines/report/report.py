@@ -9,11 +9,14 @@ import numpy as np
 
 from pipelines.contracts import Joint
 from pipelines.contracts.joints import either
-from pipelines.report import provenance
-from pipelines.report.acquisition import Run
-from pipelines.report.acquisition import runs as recordings
-from pipelines.report.animation import animations, drawn_as
-from pipelines.report.bars import (
+from pipelines.report.charts.chart import Chart, thinned_alike
+from pipelines.report.numbers import digits
+from pipelines.report.page import LARGEST_BYTES, VALUES, indented, render
+from pipelines.report.sections import provenance
+from pipelines.report.sections.animation import animations, drawn_as
+from pipelines.report.sections.control import control_charts, loops
+from pipelines.report.sections.decision import decision
+from pipelines.report.sections.error_budget import (
     any_label_in_words,
     budget,
     cause_in_words,
@@ -23,12 +26,8 @@ from pipelines.report.bars import (
     ties_of,
     told_in_words,
 )
-from pipelines.report.chart import Chart, thinned_alike
-from pipelines.report.control import control_charts, loops
-from pipelines.report.decision import decision
-from pipelines.report.excitation import excitations
-from pipelines.report.lead import faults_in_short, lead
-from pipelines.report.measured import (
+from pipelines.report.sections.excitation import excitations
+from pipelines.report.sections.fit_quality import (
     Score,
     angle_charts,
     models_of,
@@ -37,16 +36,17 @@ from pipelines.report.measured import (
     scores,
     torque_charts,
 )
-from pipelines.report.numbers import digits
-from pipelines.report.own_values import own_values
-from pipelines.report.page import LARGEST_BYTES, VALUES, indented, render
-from pipelines.report.parameters import models, side_by_side
-from pipelines.report.residual import against, residual_charts, telling
+from pipelines.report.sections.key_figures import tiles, worst_joint
+from pipelines.report.sections.lead import faults_in_short, lead
+from pipelines.report.sections.not_simulated import lacks_causes, unmoved
+from pipelines.report.sections.parameters import models, side_by_side
+from pipelines.report.sections.per_run_values import own_values
+from pipelines.report.sections.recordings import Run
+from pipelines.report.sections.recordings import runs as recordings
+from pipelines.report.sections.residuals import against, residual_charts, telling
+from pipelines.report.sections.standstill import worse
+from pipelines.report.sections.symbols import terms
 from pipelines.report.session import Session
-from pipelines.report.standstill import worse
-from pipelines.report.symbols import terms
-from pipelines.report.tiles import tiles, worst_joint
-from pipelines.report.unmoved import lacks_causes, unmoved
 
 MOST_CANDIDATES = 12
 """In sight; the others unfold."""

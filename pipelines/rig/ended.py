@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from pipelines.ending import ENDING, heard, known, not_ignored
+from pipelines.process.termination import ENDING, heard, known, not_ignored
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from pymodbus.constants import ExcCodes
 from pymodbus.pdu import ExceptionResponse, ModbusPDU
 from pymodbus.pdu.file_message import ReadFifoQueueRequest, ReadFifoQueueResponse
 
-from pipelines.registers import Block
+from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import MOST_QUEUED, RingSettings, registers_of
 
 QUEUE_RECORDS = 4096

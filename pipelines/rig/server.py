@@ -24,9 +24,9 @@ from pymodbus.constants import ExcCodes
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 from pipelines.errors import SettingsError, about
-from pipelines.event_loop import exact_event_loop
 from pipelines.mechanics.motion import CUFFS
-from pipelines.registers import Block
+from pipelines.modbus.register_block import Block
+from pipelines.process.event_loop import exact_event_loop
 from pipelines.rig.clocks import OwnClock
 from pipelines.rig.ended import ended_by_signals
 from pipelines.rig.listening import listening

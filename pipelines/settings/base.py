@@ -9,8 +9,9 @@ from typing import Any, Self, TypeVar, get_args
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from pipelines.errors import SettingsError
-from pipelines.toml import read_toml
-from pipelines.validation import explain, similar_file
+from pipelines.validation.explain import explain
+from pipelines.validation.suggestion import similar_file
+from pipelines.validation.toml import read_toml
 
 
 class Settings(BaseModel):

@@ -14,7 +14,7 @@ from pipelines.settings.filter import FilterSettings
 from pipelines.settings.identify import IdentifySettings
 from pipelines.settings.mechanism import MechanismSettings
 from pipelines.settings.simulate import SimulateSettings
-from pipelines.validation import similar_file, suggestion
+from pipelines.validation.suggestion import similar_file, suggestion
 
 
 def _four_runs() -> tuple[RunSettings, ...]:

@@ -15,7 +15,7 @@ from pipelines.settings import transmission
 from pipelines.settings.base import Settings, load_toml
 from pipelines.settings.rig import GeometrySettings
 from pipelines.settings.units import unit_named, units_of
-from pipelines.validation import closest, similar_file
+from pipelines.validation.suggestion import closest, similar_file
 
 LARGEST = 1e12
 """The most that a number of a map may be; what is more is a slip of the pen."""

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pipelines.contracts import Joint
-from pipelines.plots import BLUE, GREY, ORANGE, STYLE, save
+from pipelines.plotting.style import BLUE, GREY, ORANGE, STYLE, save
 
 JOINT_COLOURS = (BLUE, ORANGE)
 

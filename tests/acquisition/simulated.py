@@ -10,14 +10,17 @@ from unittest.mock import patch
 
 from pymodbus.client.base import ModbusBaseClient
 
-from pipelines.acquisition import drive, journal, loop, machine, pace, sensor
+from pipelines.acquisition import loop, pacing
 from pipelines.acquisition.acquire import _finish, _record
-from pipelines.acquisition.device import Device
-from pipelines.acquisition.line import Line
 from pipelines.acquisition.loop import Loop, run_to_its_end
-from pipelines.acquisition.states import State, Supervisor
+from pipelines.acquisition.machine import drive, force_sensor, machine
+from pipelines.acquisition.modbus.device import Device
+from pipelines.acquisition.modbus.line import Line
+from pipelines.acquisition.recording import journal
+from pipelines.acquisition.safety.supervisor import Supervisor
+from pipelines.acquisition.states import State
 from pipelines.errors import DeviceError, Unanswered
-from pipelines.registers import Block
+from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import registers_of
 
 RATE = 50.0
@@ -419,7 +422,7 @@ def _patched(simulated, time, run, plan, own):
             run.followed_since = time.now
 
     with ExitStack() as stack:
-        for module in (drive, loop, machine, pace, sensor):
+        for module in (drive, loop, machine, pacing, force_sensor):
             stack.enter_context(patch.object(module, "time", time))
         stack.enter_context(patch("pipelines.acquisition.loop.exact_event_loop", lambda: time))
         # A line gives everybody their turn; every request then goes to the simulated rig.

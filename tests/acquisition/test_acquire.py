@@ -8,8 +8,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pipelines.acquisition.acquire import acquire
-from pipelines.acquisition.journal import Journal, refuse_leftover
-from pipelines.acquisition.recorded import write_recording
+from pipelines.acquisition.recording.journal import Journal, refuse_leftover
+from pipelines.acquisition.recording.recording import write_recording
 from pipelines.contracts import RECORDING
 from pipelines.contracts.beside import journal_of
 from pipelines.errors import InputError

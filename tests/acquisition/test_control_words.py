@@ -5,8 +5,8 @@ import asyncio
 import pytest
 
 from pipelines.acquisition.acquire import acquire
-from pipelines.acquisition.device import Device
-from pipelines.acquisition.machine import Machine
+from pipelines.acquisition.machine.machine import Machine
+from pipelines.acquisition.modbus.device import Device
 from pipelines.errors import DeviceError, SettingsError
 from pipelines.rig.server import Drive
 from pipelines.rig.servo import Servo

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.acquisition.drive import Reading
+from pipelines.acquisition.machine.drive import Reading
 from pipelines.acquisition.plan import Plan
-from pipelines.acquisition.states import Supervisor
+from pipelines.acquisition.safety.supervisor import Supervisor
 from pipelines.errors import DeviceError
 from pipelines.settings import datasets
 from pipelines.settings.acquire import RunSettings

@@ -5,7 +5,7 @@ import time
 
 from pymodbus.client import AsyncModbusTcpClient
 
-from pipelines.registers import Block
+from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import DeviceSettings, RigSettings, registers_of
 
 CYCLES = 1500

@@ -7,7 +7,7 @@ from pathlib import Path
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
-from pipelines.plots import BLUE, GREY, STYLE, save
+from pipelines.plotting.style import BLUE, GREY, STYLE, save
 from tests.blind.scoring import Score
 from tests.blind.statistics import Bin, reliability
 

@@ -13,7 +13,7 @@ from pipelines.diagnosis.selection.findings import findings as read_off
 from pipelines.diagnosis.selection.posterior import Posterior
 from pipelines.diagnosis.selection.selected import Selected
 from pipelines.diagnosis.verdict.findings_in_words import findings
-from pipelines.label import effect_labelled
+from pipelines.wording.label import effect_labelled
 
 
 def cause(name: str, joint: str | None, family: str, repeats: bool = True) -> Element:

@@ -19,7 +19,6 @@ from pipelines.effects.backlash import Backlash
 from pipelines.effects.parallel_spring import ParallelSpring
 from pipelines.errors import InputError
 from pipelines.identification import identify
-from pipelines.label import cause_label
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.kinematics import motion_table
 from pipelines.mechanics.machine import THE_LEG, Machine, machine_of
@@ -28,6 +27,7 @@ from pipelines.mechanics.motion import motion_from_table
 from pipelines.mechanics.scale import on_one_scale
 from pipelines.model import Model, Term, baseline
 from pipelines.settings.filter import FilterSettings
+from pipelines.wording.label import cause_label
 from tests.diagnosis.machines import lift, pendulum, slide
 from tests.diagnosis.naming import naming
 

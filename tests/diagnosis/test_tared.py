@@ -10,7 +10,7 @@ import pytest
 
 from pipelines.diagnosis.diagnose import diagnose
 from pipelines.diagnosis.verdict.verdict import verdict
-from pipelines.label import cause_label
+from pipelines.wording.label import cause_label
 from tests.diagnosis.sessions import banded, session
 from tests.diagnosis.test_each_run import zeroed
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from pipelines.acquisition.recover import recover
+from pipelines.acquisition.recording.recover import recover
 from pipelines.contracts import RECORDING
 from pipelines.contracts.beside import journal_of
 from tests.faults.faults import Case, cases

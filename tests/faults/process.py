@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipelines.acquisition.journal import JournalFile
+from pipelines.acquisition.recording.journal import JournalFile
 from pipelines.contracts.beside import journal_of
 from pipelines.errors import ContractError
 from tests.faults.faults import nothing

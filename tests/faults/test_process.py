@@ -6,7 +6,7 @@ import signal
 import numpy as np
 import pytest
 
-from pipelines.acquisition.recover import recover
+from pipelines.acquisition.recording.recover import recover
 from pipelines.contracts import RECORDING
 from pipelines.contracts.beside import journal_of
 from tests.faults.process import fill_the_disk, send, strike

@@ -15,9 +15,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from pipelines.acquisition.drive import Drive
-from pipelines.acquisition.machine import Machine
-from pipelines.acquisition.sensor import Sensor
+from pipelines.acquisition.machine.drive import Drive
+from pipelines.acquisition.machine.force_sensor import Sensor
+from pipelines.acquisition.machine.machine import Machine
 from pipelines.errors import DeviceError
 from pipelines.settings import datasets
 from pipelines.settings.rig import RigSettings, load_rig

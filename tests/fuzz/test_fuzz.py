@@ -8,7 +8,7 @@ import pytest
 from pymodbus.framer import FramerRTU
 from pymodbus.pdu import DecodePDU
 
-from pipelines.acquisition.reply import ReplyDecoder
+from pipelines.acquisition.modbus.reply import ReplyDecoder
 from pipelines.errors import DeviceError
 from tests.fuzz import replies, requests
 from tests.fuzz.frames import Frame

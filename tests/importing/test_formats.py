@@ -11,7 +11,7 @@ import scipy.io
 from numpy.testing import assert_allclose
 
 from exoid_cli.app import run
-from pipelines.importing.numbers import numbers
+from pipelines.importing.quantities.numbers import numbers
 from tests.importing.conftest import MAP
 
 

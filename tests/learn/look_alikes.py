@@ -11,9 +11,9 @@ from scipy.optimize import minimize
 
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.selection.look_alikes import kept_share
-from pipelines.label import cause_label
-from pipelines.law import UNLISTED, family_of_kind, kind_and_joint
 from pipelines.model import effect_named
+from pipelines.wording.label import cause_label
+from pipelines.wording.law import UNLISTED, family_of_kind, kind_and_joint
 from tests.blind.scoring import names_of
 from tests.blind.statistics import brier, calibration_error
 

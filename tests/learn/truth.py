@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from pipelines.law import FAMILIES, family_of_kind, kind_and_joint
+from pipelines.wording.law import FAMILIES, family_of_kind, kind_and_joint
 
 ALIKE = (
     {"torque_offset", "coulomb_asymmetry"},

@@ -13,15 +13,15 @@ from exoid_cli.app import run
 from pipelines.contracts import PARAMETERS, RESIDUALS
 from pipelines.dynamics.replay import replay
 from pipelines.effects.rotor_inertia import RotorInertia
-from pipelines.label import cause_label
 from pipelines.mechanics.geometry import Geometry
 from pipelines.mechanics.motion import Motion
 from pipelines.mechanics.read import read_motions
 from pipelines.model import Model, Term, baseline, model_from_parameters, term_from
-from pipelines.own_values import with_own_values
+from pipelines.model.per_run import with_own_values
 from pipelines.settings.datasets import datasets
 from pipelines.settings.filter import FilterSettings
 from pipelines.signals.low_pass import ORDER
+from pipelines.wording.label import cause_label
 from tests.real.relative_error import TorqueError, slow_error, slow_values
 
 

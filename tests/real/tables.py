@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.label import cause_label, effect_told
 from pipelines.mechanics.motion import Motion
+from pipelines.wording.label import cause_label, effect_told
 from tests.real.machines import LOGS, Diagnosed, of_purpose, symmetric, with_rotor
 from tests.real.published import EMPS, EMPS_ERRORS, double_pendulum, their_torque
 from tests.real.relative_error import TorqueError, decimated_error, error_by_place, fitted, slow_error, slow_fit

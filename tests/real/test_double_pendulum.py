@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipelines.label import effect_told
+from pipelines.wording.label import effect_told
 from tests.real.machines import LOGS, diagnosed, of_purpose, with_rotor
 from tests.real.published import double_pendulum, their_torque
 from tests.real.relative_error import slow_error, slow_fit

@@ -9,7 +9,7 @@ import pytest
 from pipelines.contracts import PARAMETERS
 from pipelines.errors import InputError
 from pipelines.report.compare import changes, compare, titles_of
-from pipelines.report.parameters import Estimate
+from pipelines.report.sections.parameters import Estimate
 from pipelines.report.session import find
 from tests.report.sessions import (
     AXIS,

@@ -4,10 +4,10 @@ import re
 
 import pytest
 
-from pipelines.report.bars import causes_in_words, labels_in_words
 from pipelines.report.report import report
+from pipelines.report.sections.error_budget import causes_in_words, labels_in_words
+from pipelines.report.sections.key_figures import tiles
 from pipelines.report.session import find
-from pipelines.report.tiles import tiles
 from tests.report.sessions import AXIS, decision_of, verdict_of, write_session, write_verdict
 
 FAULT = {"file": "run_1.parquet", "channel": "hip_angle_rad", "what": "the hip's angle is stuck"}

@@ -13,12 +13,12 @@ import pytest
 from pipelines.contracts import CANDIDATES, PARAMETERS, RESIDUALS, Joint, describe
 from pipelines.contracts.provenance import provenance_of, sha256
 from pipelines.errors import InputError
-from pipelines.report import provenance
-from pipelines.report.animation import animations
-from pipelines.report.bars import budget
 from pipelines.report.report import charts, report
+from pipelines.report.sections import provenance
+from pipelines.report.sections.animation import animations
+from pipelines.report.sections.error_budget import budget
+from pipelines.report.sections.standstill import moving
 from pipelines.report.session import find
-from pipelines.report.standstill import moving
 from tests.report.sessions import (
     AXIS,
     RUN,

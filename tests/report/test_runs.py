@@ -5,12 +5,12 @@ import pytest
 
 from pipelines.contracts import PARAMETERS, RESIDUALS, Joint
 from pipelines.contracts.provenance import sha256
-from pipelines.report.measured import scores
-from pipelines.report.parameters import models
 from pipelines.report.report import report
+from pipelines.report.sections.fit_quality import scores
+from pipelines.report.sections.key_figures import tiles
+from pipelines.report.sections.not_simulated import unmoved
+from pipelines.report.sections.parameters import models
 from pipelines.report.session import find
-from pipelines.report.tiles import tiles
-from pipelines.report.unmoved import unmoved
 from tests.report.sessions import (
     RUN,
     verdict_of,

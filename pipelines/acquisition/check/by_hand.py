@@ -12,7 +12,7 @@ from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.probe import Probe, Series
 from pipelines.acquisition.check.velocity import check_velocity
 from pipelines.acquisition.check.zeros import AXES
-from pipelines.acquisition.drive import Drive
+from pipelines.acquisition.machine.drive import Drive
 from pipelines.settings.rig import DIMENSION, UNITS, RigSettings
 
 PATIENCE_S = 20.0

@@ -7,17 +7,17 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Literal
 
-from pipelines.acquisition.alone import alone
 from pipelines.acquisition.check.by_hand import Operator, by_hand
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.guided import guided, refuse_far_from_zero
 from pipelines.acquisition.check.look import RigReport, look, probes_of
-from pipelines.acquisition.embedded import embedded
-from pipelines.acquisition.feasible import refusals
-from pipelines.acquisition.machine import Machine
-from pipelines.acquisition.pace import urgent
-from pipelines.acquisition.same_place import misplaced_set_points
-from pipelines.acquisition.somebody import refuse_seldom_read
+from pipelines.acquisition.machine.embedded_rig import embedded
+from pipelines.acquisition.machine.machine import Machine
+from pipelines.acquisition.modbus.exclusive_access import alone
+from pipelines.acquisition.pacing import urgent
+from pipelines.acquisition.preconditions.feasible_rate import refusals
+from pipelines.acquisition.preconditions.human_interlock import refuse_seldom_read
+from pipelines.acquisition.preconditions.set_point_scale import misplaced_set_points
 from pipelines.errors import DeviceError, InputError, SettingsError
 from pipelines.settings.acquire import RunSettings
 from pipelines.settings.rig import RigSettings, load_rig

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.interpretation import remedy
 from pipelines.acquisition.check.probe import Probe, Series
-from pipelines.acquisition.counter import RATE_TOLERANCE
+from pipelines.acquisition.modbus.wraparound import RATE_TOLERANCE
 from pipelines.settings.rig import DIMENSION, UNITS
 
 RATES_HZ = (0.5, 1e5)

@@ -8,7 +8,7 @@ from typing import get_args
 from numpy.typing import NDArray
 
 from pipelines.acquisition.check.probe import Series
-from pipelines.registers import Block
+from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import DIMENSION, REGISTERS, Register, RegisterType
 
 MOST_NAMED = 2

@@ -16,12 +16,12 @@ from pipelines.acquisition.check.rate import Rate, check_rate, cycles
 from pipelines.acquisition.check.rings import check_rings
 from pipelines.acquisition.check.velocity import check_velocity
 from pipelines.acquisition.check.zeros import check_zeros
-from pipelines.acquisition.counter import RATE_TOLERANCE
-from pipelines.acquisition.drive import Drive
-from pipelines.acquisition.line import Line
-from pipelines.acquisition.machine import Machine
-from pipelines.acquisition.pace import SLOW
-from pipelines.acquisition.sensor import Sensor
+from pipelines.acquisition.machine.drive import Drive
+from pipelines.acquisition.machine.force_sensor import Sensor
+from pipelines.acquisition.machine.machine import Machine
+from pipelines.acquisition.modbus.line import Line
+from pipelines.acquisition.modbus.wraparound import RATE_TOLERANCE
+from pipelines.acquisition.pacing import SLOW
 from pipelines.errors import DeviceError
 from pipelines.settings.rig import RigSettings
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.interpretation import remedy
 from pipelines.acquisition.check.probe import Probe, Series
-from pipelines.acquisition.drive import Drive
+from pipelines.acquisition.machine.drive import Drive
 from pipelines.settings.rig import DriveSettings, RigSettings
 
 TEMPERATURE_C = (-20.0, 150.0)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.acquisition.counter import Counter
-from pipelines.acquisition.drive import Drive
-from pipelines.acquisition.sensor import Sensor
-from pipelines.registers import Block
+from pipelines.acquisition.machine.drive import Drive
+from pipelines.acquisition.machine.force_sensor import Sensor
+from pipelines.acquisition.modbus.wraparound import Counter
+from pipelines.modbus.register_block import Block
 from pipelines.settings.rig import Register, registers_of
 
 

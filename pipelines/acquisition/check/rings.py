@@ -4,13 +4,13 @@ import asyncio
 import time
 from collections.abc import Sequence
 
-from pipelines.acquisition.agreement import Agreement
 from pipelines.acquisition.check.finding import Finding
 from pipelines.acquisition.check.probe import Probe
-from pipelines.acquisition.drive import Drive
-from pipelines.acquisition.frozen import Told
-from pipelines.acquisition.machine import Machine
-from pipelines.acquisition.stream import Stream
+from pipelines.acquisition.machine.drive import Drive
+from pipelines.acquisition.machine.machine import Machine
+from pipelines.acquisition.safety.record_agreement import Agreement
+from pipelines.acquisition.safety.sample_checks import Stream
+from pipelines.acquisition.safety.stuck_register import Told
 from pipelines.errors import DeviceError, ExoidError
 
 DRAINS = 40

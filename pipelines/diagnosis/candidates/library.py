@@ -23,7 +23,7 @@ from pipelines.diagnosis.evidence.decision_regression import DecisionRegression
 from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
 from pipelines.effects import Cogging, Effect
-from pipelines.law import law_label
+from pipelines.wording.law import law_label
 
 ALTERNATIVES = 2
 """Shapes of a cause besides its best one."""

@@ -15,7 +15,7 @@ from numpy.polynomial.legendre import legder, legval, legvander
 from numpy.typing import NDArray
 
 from pipelines.diagnosis.evidence.observed_run import Run
-from pipelines.law import law_label
+from pipelines.wording.law import law_label
 
 IN_CUFFS = ("angle", "both_angles", "speed", "inertia_by_angle", "load", "other_load")
 """Laws by which cuff forces may be a little wrong on their own."""

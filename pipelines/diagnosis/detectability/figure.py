@@ -8,8 +8,8 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 
 from pipelines.diagnosis.detectability.detectability import Detectable
-from pipelines.label import effect_labelled, title_in_words
-from pipelines.plots import BLUE, GREY, ORANGE, STYLE, save
+from pipelines.plotting.style import BLUE, GREY, ORANGE, STYLE, save
+from pipelines.wording.label import effect_labelled, title_in_words
 
 
 def draw(found: Sequence[Detectable], stem: Path, title: str) -> None:

@@ -6,9 +6,9 @@ Who built a machine knows its rotors and gears. Data need not show that they are
 from collections.abc import Sequence
 
 from pipelines.effects import Effect, Side
-from pipelines.label import effect_at
 from pipelines.mechanics.machine import Machine
 from pipelines.model import BASELINE
+from pipelines.wording.label import effect_at
 
 
 def known_effects(labels: Sequence[str], machine: Machine) -> tuple[Effect, ...]:

@@ -22,7 +22,7 @@ from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.evidence.line_spectrum import Kind
 from pipelines.diagnosis.evidence.prepared_runs import Prepared
 from pipelines.effects import Cogging, Family
-from pipelines.law import FAMILIES, law_label
+from pipelines.wording.law import FAMILIES, law_label
 
 LEAST_VARIANCE = 1e-10
 """Of slow noise's coefficients, squared shares of the torque: keeps their precision finite."""

@@ -15,7 +15,7 @@ from scipy.special import expit
 from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.selection.evidence import Element
 from pipelines.diagnosis.selection.posterior import Posterior
-from pipelines.law import UNLISTED, law_label
+from pipelines.wording.law import UNLISTED, law_label
 
 LEAST = 0.01
 """Smallest share of the systematic error whose logarithm is taken."""

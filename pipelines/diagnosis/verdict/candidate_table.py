@@ -11,8 +11,8 @@ from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fit.validation import Validated
 from pipelines.diagnosis.fit.validation_error import gain
 from pipelines.effects import EFFECTS, Effect
-from pipelines.law import LAW
 from pipelines.mechanics.machine import Machine
+from pipelines.wording.law import LAW
 
 ORDER = {"named": 0, "indistinguishable": 1, "unlisted": 2, "rejected": 3, "absorbed": 4}
 

@@ -4,7 +4,7 @@ from pipelines.contracts.joints import the
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.selection.answer import Named, in_place
 from pipelines.effects import Effect, VoluntaryTorque
-from pipelines.label import amount, effect_labelled, in_words, number
+from pipelines.wording.label import amount, effect_labelled, in_words, number
 
 CERTAIN = 1000.0
 """Odds from which more is not told: no calibration could vouch for a figure."""

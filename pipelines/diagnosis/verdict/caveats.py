@@ -8,8 +8,8 @@ from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fit.presliding_test import NEAR_S, BuildUp
 from pipelines.effects import PreslidingHysteresis
 from pipelines.estimation.angle_noise import CUTOFF_HZ, IN_WORDS
-from pipelines.label import amount, label_in_words
 from pipelines.mechanics.geometry import Geometry
+from pipelines.wording.label import amount, label_in_words
 
 HIDING = 0.2
 """Share of a joint's torque from which an estimated noise floor is doubted: no sensor is as noisy,

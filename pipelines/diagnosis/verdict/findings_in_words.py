@@ -8,9 +8,9 @@ from pipelines.diagnosis.criteria import CRITERIA
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.selection.findings import Finding
 from pipelines.diagnosis.selection.posterior import Posterior
-from pipelines.label import in_words
-from pipelines.law import family_in_words, is_of_other_joint, kind_and_joint, law_in_words
 from pipelines.mechanics.machine import Machine
+from pipelines.wording.label import in_words
+from pipelines.wording.law import family_in_words, is_of_other_joint, kind_and_joint, law_in_words
 
 WORTH_A_LINE = 0.01
 """Probability below which a law is not listed with a finding."""

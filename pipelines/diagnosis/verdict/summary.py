@@ -10,8 +10,8 @@ from pipelines.diagnosis.verdict.cause_evidence import NEARLY_ALL, doubt_of_gain
 from pipelines.diagnosis.verdict.caveats import floor_that_hides
 from pipelines.diagnosis.verdict.findings_in_words import findings
 from pipelines.diagnosis.verdict.unexplained import Unexplained
-from pipelines.label import amount, cause_label, effect_told, in_words, label_in_words
-from pipelines.law import UNLISTED
+from pipelines.wording.label import amount, cause_label, effect_told, in_words, label_in_words
+from pipelines.wording.law import UNLISTED
 
 MENTIONED = 3
 """Tied causes in the summary; ``indistinguishable_from`` has all."""

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 from numpy.typing import NDArray
 
-from pipelines.importing.counter import full_at, signed, unwrapped
 from pipelines.importing.guess.joints import JointColumns
 from pipelines.importing.guess.motion import TURNS
 from pipelines.importing.guess.register import lost_sign
+from pipelines.importing.quantities.wraparound import full_at, signed, unwrapped
 
 
 @dataclass(frozen=True)

@@ -8,17 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.errors import InputError, about
-from pipelines.importing import clock
 from pipelines.importing.guess.counting import countings
 from pipelines.importing.guess.joint_table import write_joint
 from pipelines.importing.guess.joints import JointColumns, group_joints, order_is_told
 from pipelines.importing.guess.names import meanings
 from pipelines.importing.guess.proposal import Proposal
 from pipelines.importing.guess.time import TimeGuess, guess_time, write_time
-from pipelines.importing.numbers import numbers, whole_nanoseconds
-from pipelines.importing.repetition import repeats_after
+from pipelines.importing.quantities.numbers import numbers, whole_nanoseconds
 from pipelines.importing.sources.open import open_source
 from pipelines.importing.sources.source import Source
+from pipelines.importing.time import clock
+from pipelines.importing.time.period import repeats_after
 from pipelines.settings.import_map import SourceSettings
 from pipelines.settings.units import UNITS
 

@@ -15,7 +15,7 @@ from pipelines.importing.guess.motion import TURNS, Units, counts_in_a_turn, gue
 from pipelines.importing.guess.proposal import Proposal
 from pipelines.importing.guess.register import are_whole
 from pipelines.importing.guess.torque import TorqueFit, fit_torque
-from pipelines.importing.plausible import STRONGEST
+from pipelines.importing.sanity.plausibility import STRONGEST
 from pipelines.importing.sources.source import Columns
 from pipelines.settings.transmission import TARGETS
 from pipelines.settings.units import UNITS

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipelines.contracts.checks import LARGEST_ANGLE_RAD
-from pipelines.importing.consistency import Agreement, integral_agreement
 from pipelines.importing.guess.register import are_whole
+from pipelines.importing.sanity.consistency import Agreement, integral_agreement
 from pipelines.settings.units import UNITS
 
 NEAR = 0.12

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipelines.importing import clock
 from pipelines.importing.guess.names import Meaning
 from pipelines.importing.guess.proposal import Proposal
+from pipelines.importing.time import clock
 from pipelines.settings.units import UNITS
 
 ADVANCES = 0.9

@@ -9,7 +9,7 @@ from pipelines.errors import InputError
 from pipelines.importing.sources.flatten import flattened
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.settings.import_map import SourceSettings
-from pipelines.validation import suggestion
+from pipelines.validation.suggestion import suggestion
 
 
 def open_json(path: Path, settings: SourceSettings) -> Source:

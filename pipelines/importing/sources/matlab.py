@@ -9,7 +9,7 @@ from pipelines.importing.sources.flatten import flattened
 from pipelines.importing.sources.hdf5 import open_hdf5
 from pipelines.importing.sources.source import Source
 from pipelines.settings.import_map import SourceSettings
-from pipelines.validation import suggestion
+from pipelines.validation.suggestion import suggestion
 
 V73 = b"MATLAB 7.3"
 

@@ -11,7 +11,7 @@ from pipelines.importing.sources.rosbag import open_rosbag
 from pipelines.importing.sources.source import Source
 from pipelines.importing.sources.text import open_text
 from pipelines.settings.import_map import SourceSettings
-from pipelines.validation import similar_file
+from pipelines.validation.suggestion import similar_file
 
 BEGINNINGS = {
     b"PAR1": open_parquet,

@@ -10,7 +10,7 @@ from pipelines.errors import InputError
 from pipelines.importing.sources.extra import library
 from pipelines.importing.sources.source import Columns, Source
 from pipelines.settings.import_map import SourceSettings
-from pipelines.validation import suggestion
+from pipelines.validation.suggestion import suggestion
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 QUANTITIES = ("position", "velocity", "effort")

@@ -14,7 +14,7 @@ from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.evidence.observed_run import Run
 from pipelines.diagnosis.verdict.figures.palette import AFTER, BEFORE
 from pipelines.mechanics.units import unit_at
-from pipelines.plots import NOISE
+from pipelines.plotting.style import NOISE
 from pipelines.signals.binned_mean import binned_mean
 
 DOTS = 2000

@@ -11,9 +11,9 @@ from matplotlib.patches import Patch
 
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.verdict.error_budget import FLOOR, LEFT, REPEATS, WANDERS
-from pipelines.label import SHARES, in_words
-from pipelines.plots import BLUE, CAUSES, NOISE
-from pipelines.plots import WANDERS as SCATTER
+from pipelines.plotting.style import BLUE, CAUSES, NOISE
+from pipelines.plotting.style import WANDERS as SCATTER
+from pipelines.wording.label import SHARES, in_words
 
 COLOURS = {FLOOR: NOISE, REPEATS: BLUE, WANDERS: SCATTER, LEFT: BLUE}
 ROOM = 0.07

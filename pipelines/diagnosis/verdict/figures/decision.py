@@ -14,10 +14,10 @@ from matplotlib.patches import Patch
 
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.verdict.findings_in_words import family_of
-from pipelines.findings import PARTS, VARIABLES, searched_runs
-from pipelines.label import label_in_words
-from pipelines.law import LAW
-from pipelines.plots import BLUE, GREY, NOISE, WANDERS
+from pipelines.plotting.style import BLUE, GREY, NOISE, WANDERS
+from pipelines.wording.findings import PARTS, VARIABLES, searched_runs
+from pipelines.wording.label import label_in_words
+from pipelines.wording.law import LAW
 
 COLOURS = {
     "noise": NOISE, "wanders": WANDERS, "between_runs": "#5b87e5", "repeats": BLUE, "unsplit": GREY,

@@ -7,7 +7,7 @@ from matplotlib import pyplot as plt
 
 from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.verdict.figures import budget, decision, dependence, simulation, verdict
-from pipelines.plots import STYLE, save
+from pipelines.plotting.style import STYLE, save
 
 DRAWN_BY = {
     "decision": decision.figure,

@@ -12,8 +12,8 @@ from pipelines.diagnosis.diagnosis import Diagnosis
 from pipelines.diagnosis.fit.validation import Validated
 from pipelines.diagnosis.verdict.figures.palette import AFTER, BEFORE, MEASURED
 from pipelines.diagnosis.verdict.worst_stretch import Stretch, simulated_error, worst_stretch
-from pipelines.label import number
-from pipelines.plots import NOISE
+from pipelines.plotting.style import NOISE
+from pipelines.wording.label import number
 
 NARROWEST = 8.0
 """Inches that the titles need."""

@@ -15,9 +15,9 @@ from pipelines.diagnosis.verdict.figures.against import against, draw, reach
 from pipelines.diagnosis.verdict.figures.budget import colours_of, highest, lowest, rms, stack, words_of
 from pipelines.diagnosis.verdict.figures.palette import AFTER, BEFORE
 from pipelines.effects import RUNS
-from pipelines.label import in_words
 from pipelines.model import effect_named
-from pipelines.plots import NOISE
+from pipelines.plotting.style import NOISE
+from pipelines.wording.label import in_words
 
 WIDTH = 125
 """Characters of the summary in a line."""

@@ -1,0 +1,1 @@
+"""The machine: drives, force sensors, and how they are sampled."""

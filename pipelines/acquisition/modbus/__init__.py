@@ -1,0 +1,1 @@
+"""Modbus: lines, devices, replies, ring buffers, exclusive access."""

@@ -1,0 +1,164 @@
+"""A Modbus device: what can be asked of it, and every way to fail turned into one sentence."""
+
+from collections.abc import Awaitable, Callable, Iterable, Sequence
+from contextlib import AbstractAsyncContextManager
+from typing import Any, NamedTuple
+
+from pymodbus.constants import ExcCodes
+from pymodbus.exceptions import ModbusException
+from pymodbus.pdu import ModbusPDU
+
+from pipelines.acquisition.modbus.line import Line
+from pipelines.acquisition.modbus.reply import NoReply
+from pipelines.errors import DeviceError, Refused, Unanswered
+from pipelines.modbus.register_block import Block
+from pipelines.settings.rig import Identity, SafetySettings
+
+MEANING: dict[int, str] = {
+    ExcCodes.ILLEGAL_FUNCTION: "it does not know this function",
+    ExcCodes.ILLEGAL_ADDRESS: "it has no such register",
+    ExcCodes.ILLEGAL_VALUE: "it does not take this value",
+    ExcCodes.DEVICE_FAILURE: "it failed",
+    ExcCodes.DEVICE_BUSY: "it is busy (server device busy)",
+    ExcCodes.GATEWAY_PATH_UNAVIABLE: "the gateway has no path to it",
+    ExcCodes.GATEWAY_NO_RESPONSE: "the gateway got no answer from it",
+}
+
+_GATEWAY = "check the cable behind the gateway, and the unit id in the rig file"
+REMEDY: dict[int, str] = {
+    ExcCodes.DEVICE_FAILURE: "see the device's manual and its own display",
+    ExcCodes.DEVICE_BUSY: "end what else asks it, wait until it is ready, or lower acquire.sample_rate_hz",
+    ExcCodes.GATEWAY_PATH_UNAVIABLE: _GATEWAY,
+    ExcCodes.GATEWAY_NO_RESPONSE: _GATEWAY,
+}
+
+
+class Wait(NamedTuple):
+    """How long a reply is awaited, and what in a rig file's ``safety`` sets that."""
+
+    seconds: float
+    setting: str
+
+
+class Device:
+    """One device on a line. Several may be asked side by side; those on one line are answered one after the other."""
+
+    def __init__(self, name: str, unit: int, line: Line, safety: SafetySettings) -> None:
+        """Join a line; a rig's safety settings tell how long a reply is awaited."""
+        self.label = line.join(name, unit)
+        self.line = line
+        self._client = line.client
+        self._unit = unit
+        self._at_rest = Wait(safety.connect_s, "connect_s")
+        self._in_motion = Wait(safety.longest_reply_s, "reply_s or watchdog_s")
+        self._to_tell = Wait(safety.watchdog_s, "watchdog_s")
+
+    @property
+    def awaited_s(self) -> float:
+        """For how long it has not answered what it was asked, s; 0 where it has."""
+        return self.line.awaited_s(self._unit)
+
+    def turn(self) -> AbstractAsyncContextManager[None]:
+        """Wait until it is its turn on the line, and keep it for all that this task asks it within."""
+        return self.line.turn(self._unit)
+
+    async def check_identity(self, identity: Iterable[Identity]) -> None:
+        """Refuse a device that is not the one that the rig file describes."""
+        for entry in identity:
+            (found,) = await self.read(entry.address, 1)
+            if found != entry.value:
+                raise DeviceError(
+                    f"{self.label}: identity register {entry.address} holds 0x{found:04X}, expected "
+                    f"0x{entry.value:04X}: it is another device; check cabling and unit id, or correct the rig file"
+                )
+
+    async def read(self, address: int, count: int, *, in_motion: bool = False) -> list[int]:
+        """Return words read by FC03."""
+        what = f"reading registers {address} to {address + count - 1}"
+        wait = self._in_motion if in_motion else self._at_rest
+        request = self._client.read_holding_registers
+        return await self._ask(what, count, wait, request, address=address, count=count)
+
+    async def read_fifo(self, address: int, words: int) -> list[int]:
+        """Return what a queue holds, read by FC24: whole records of so many words, or nothing.
+
+        Raises
+        ------
+        DeviceError
+            Where what it holds are no whole records.
+        """
+        what = f"reading the queue at register {address}"
+        response = await self._request(what, self._in_motion, self._client.read_fifo_queue, address=address)
+        found = list(getattr(response, "values", []))
+        if len(found) % words:
+            raise DeviceError(
+                f"{self.label}: answered {what} with {len(found)} registers, expected a multiple of {words}; "
+                "compare ring.words in the rig file with the device's manual"
+            )
+        return found
+
+    async def write(self, block: Block, words: Sequence[int], *, in_motion: bool = False) -> None:
+        """Write a block by FC16."""
+        what = f"writing registers {_range(block)}"
+        wait = self._in_motion if in_motion else self._to_tell
+        request = self._client.write_registers
+        await self._ask(what, None, wait, request, address=block.address, values=list(words))
+
+    async def exchange(self, write: Block, words: Sequence[int], read: Block) -> list[int]:
+        """Write one block and read another in one FC23 exchange."""
+        what = f"an exchange (writing registers {_range(write)}, reading {_range(read)})"
+        return await self._ask(
+            what,
+            read.count,
+            self._in_motion,
+            self._client.readwrite_registers,
+            read_address=read.address,
+            read_count=read.count,
+            write_address=write.address,
+            values=list(words),
+        )
+
+    async def _ask(
+        self,
+        what: str,
+        words: int | None,
+        wait: Wait,
+        request: Callable[..., Awaitable[ModbusPDU]],
+        **arguments: Any,
+    ) -> list[int]:
+        """Send a request and return the words of the answer, ``words`` of them where it is to bring any."""
+        response = await self._request(what, wait, request, **arguments)
+        if words is not None and len(response.registers) != words:
+            raise DeviceError(
+                f"{self.label}: answered {what} with {len(response.registers)} registers, expected {words}; "
+                "compare the register map in the rig file with the device's manual"
+            )
+        return list(response.registers)
+
+    async def _request(
+        self, what: str, wait: Wait, request: Callable[..., Awaitable[ModbusPDU]], **arguments: Any
+    ) -> ModbusPDU:
+        """Send a request and return its answer; raise DeviceError where there is none, or a refusal."""
+        try:
+            response = await self.line.ask(self._unit, wait.seconds, request, **arguments)
+        except (ModbusException, OSError) as error:
+            silent = Unanswered if self._client.connected else DeviceError
+            raise silent(
+                f"{self.label}: did not answer {what} within {wait.seconds:.3g} s; check cable and power, "
+                f"or raise safety.{wait.setting} in the rig file"
+            ) from error
+        if isinstance(response, NoReply):
+            raise DeviceError(
+                f"{self.label}: answered {what} with {response.found}; check that it speaks Modbus, and the line"
+            )
+        # An exception reply is an answer like any other to pymodbus: nothing is raised.
+        if response.isError():
+            code = int(getattr(response, "exception_code", 0))
+            meaning = f": {MEANING[code]}" if code in MEANING else ""
+            remedy = REMEDY.get(code, "compare the register map in the rig file with the device's manual")
+            raise Refused(f"{self.label}: answered {what} with Modbus exception {code}{meaning}; {remedy}")
+        return response
+
+
+def _range(block: Block) -> str:
+    return f"{block.address} to {block.address + block.count - 1}"

@@ -1,0 +1,1 @@
+"""Checks that must pass before a drive is enabled."""

@@ -1,0 +1,1 @@
+"""Recordings: the journal of a run, and the file that it becomes."""

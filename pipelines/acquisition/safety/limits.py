@@ -1,0 +1,138 @@
+"""What may be measured, what may be sent, and how set-points slow down."""
+
+from collections.abc import Sequence
+from math import copysign, isfinite, isnan
+
+from numpy.typing import NDArray
+
+from pipelines.acquisition.machine.drive import Reading
+from pipelines.acquisition.machine.row import Answers, Row
+from pipelines.errors import DeviceError
+from pipelines.mechanics.motion import CUFFS
+from pipelines.settings.rig import DriveSettings, RigSettings, SensorSettings
+
+ROUNDING_RAD = 1e-9
+HOLD_SAMPLES = 20
+"""Samples for which a stopped drive holds before its torque is taken away."""
+
+
+class Limits:
+    """The limits of a rig, checked at every sample."""
+
+    def __init__(self, rig: RigSettings, sample_rate_hz: float, sensors: Sequence[SensorSettings] = ()) -> None:
+        """Watch drives, and those cuff sensors that are read."""
+        self._rig = rig
+        self._rate = sample_rate_hz
+        self._samples_per_cycle = rig.samples_per_cycle(sample_rate_hz)
+        self._sensors = {CUFFS.index(sensor.cuff): sensor for sensor in sensors}
+        self._felt: dict[int, int] = {}
+        """Of each cuff the machine's counter at its last fresh sample."""
+        self._last: dict[int, Reading] = {}
+        """Of each drive the last sample that it told."""
+
+    def violation(self, told: Row | Answers) -> str | None:
+        """Return which limit is broken by what came, None if it keeps them all."""
+        samples_hz = self._rate * self._samples_per_cycle
+        for j, (drive, found) in enumerate(zip(self._rig.drive, told.drives, strict=True)):
+            if isinstance(found, Reading):
+                if why := sample_violation(drive, self._last.get(j, found), found, samples_hz):
+                    return why
+                self._last[j] = found
+        return self.cuff_violation(told)
+
+    def cuff_violation(self, told: Row | Answers) -> str | None:
+        """Return which cuff's force is above its limit, or could be unseen: its sensor tells nothing any more."""
+        first = told.drives[0]
+        cycle = first.sequence // self._samples_per_cycle if isinstance(first, Reading) else None
+        return self.force_violation(told.forces) or (None if cycle is None else self._silence(told.forces, cycle))
+
+    def straying(self, told: Row | Answers, in_force: NDArray, late: int = 0) -> str | None:
+        """Return which joint is too far from its set-point, (J,) rad, None if none is.
+
+        A drive that has been told nothing for so many samples ``late`` may have gone on meanwhile.
+        """
+        for drive, reading, reference in zip(self._rig.drive, told.drives, in_force, strict=True):
+            if not isinstance(reading, Reading):
+                continue
+            error = reading.angle - reference
+            allowed = self._rig.safety.following_error_rad + drive.speed_rad_s * late / self._rate
+            if not abs(error) <= allowed:
+                return (
+                    f"{drive.joint} angle {reading.angle:.3f} rad is {abs(error):.3f} rad from its set-point of "
+                    f"{reference:.3f} rad, allowed are {allowed:.3g} rad (safety.following_error_rad); is the leg "
+                    "blocked, or the drive without power?"
+                )
+        return None
+
+    def _silence(self, forces: NDArray, cycle: int) -> str | None:
+        """Return which cuff sensor has told nothing for too long: its limit would be watched by nobody."""
+        for cuff, sensor in self._sensors.items():
+            if all(map(isfinite, forces[cuff].tolist())):
+                self._felt[cuff] = cycle
+            silent_s = (cycle - self._felt.setdefault(cuff, cycle)) / self._rate
+            if silent_s > self._rig.safety.watchdog_s + sensor.every / self._rate:
+                return (
+                    f"watchdog: no new sample from {self._rig.label_of(sensor)} for {silent_s:.3f} s, allowed are "
+                    f"{self._rig.safety.watchdog_s:g} s; its counter stands still, or what it sends is no number"
+                )
+        return None
+
+    def force_violation(self, forces: NDArray) -> str | None:
+        """Return which force (4, 3) N is above the limit; rows all NaN are sensors without a new sample."""
+        most = self._rig.safety.cuff_force_n
+        for cuff, force in zip(CUFFS, forces.tolist(), strict=True):
+            if all(map(isnan, force)):
+                continue
+            for axis, value in zip("xyz", force, strict=True):
+                if not abs(value) <= most:
+                    return f"{cuff} force {axis} {value:.0f} N is above the limit of {most:g} N"
+        return None
+
+
+def sample_violation(drive: DriveSettings, before: Reading, found: Reading, samples_hz: float) -> str | None:
+    """Return which limit of its joint a drive's sample breaks, None if it keeps them all."""
+    low, high = drive.angle_rad
+    if not low <= found.angle <= high:
+        return f"{drive.joint} angle {found.angle:.3f} rad is outside its limits {low:g} to {high:g} rad"
+    speed = found.velocity
+    if isnan(speed):
+        # The drive tells no speed: what the angle did since the last sample.
+        speed = (found.angle - before.angle) * samples_hz / max(found.sequence - before.sequence, 1)
+    # Written so that a NaN breaks every limit.
+    if not abs(speed) <= drive.speed_rad_s:
+        return f"{drive.joint} speed {speed:.3f} rad/s is above its limit of {drive.speed_rad_s:g} rad/s"
+    if not abs(found.torque) <= drive.torque_nm:
+        return f"{drive.joint} torque {found.torque:.1f} N·m is above its limit of {drive.torque_nm:g} N·m"
+    return None
+
+
+def refuse_leap(drive: DriveSettings, last: float, reference: float, allowed_s: float) -> None:
+    """Stand between the plan and the wire: refuse a set-point (rad) that no planned motion may ask for.
+
+    Whatever went wrong before, it is a number, within its joint's limits, and no further from the ``last`` one than
+    its speed limit leads in the time that it is allowed, s.
+    """
+    low, high = drive.angle_rad
+    if not low <= reference <= high:
+        raise DeviceError(
+            f"{drive.joint}: a set-point of {reference:.3f} rad was due, outside its limits {low:g} to {high:g} rad; "
+            "it was not sent"
+        )
+    if not abs(reference - last) <= drive.speed_rad_s * allowed_s + ROUNDING_RAD:
+        raise DeviceError(
+            f"{drive.joint}: a set-point of {reference:.3f} rad was due after {last:.3f} rad with {allowed_s:.3f} s to "
+            f"get there, faster than its limit of {drive.speed_rad_s:g} rad/s; it was not sent"
+        )
+
+
+def clamped(value: float, low: float, high: float) -> float:
+    """Return what is nearest to a value within bounds; NaN stays NaN."""
+    return min(max(value, low), high)  # in this order: what a NaN is compared with does not take its place
+
+
+def slowed(reference: float, speed: float, deceleration: float, time_s: float) -> tuple[float, float]:
+    """Return set-point (rad) and speed (rad/s) a while later of one that slows down to rest."""
+    moving_s = min(time_s, abs(speed) / deceleration)
+    path = speed * moving_s - copysign(0.5 * deceleration * moving_s**2, speed)
+    left = speed - copysign(deceleration * moving_s, speed) if moving_s == time_s else 0.0
+    return float(reference + path), float(left)

@@ -1,0 +1,1 @@
+"""Columns of a log as physical quantities: units, signs, counters, expressions."""

@@ -1,0 +1,72 @@
+"""A column as a quantity in SI: sign bit, wraps, scale, zero, unit, drive train, sign."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.importing.finding import Finding, counted
+from pipelines.importing.quantities.expression import Expression
+from pipelines.importing.quantities.numbers import numbers
+from pipelines.importing.quantities.wraparound import full_at, signed, unwrapped
+from pipelines.settings.import_map import ReadingSettings
+from pipelines.settings.units import Unit, unit_named
+
+
+def columns_of(reading: ReadingSettings, where: str) -> tuple[str, ...]:
+    """Return the columns that a reading is made of, its clock's not among them."""
+    if reading.column is not None:
+        return (reading.column,)
+    return Expression(str(reading.expression), f"{where}.expression").names
+
+
+def quantity(
+    reading: ReadingSettings, gain: float, columns: Mapping[str, NDArray], where: str, findings: list[Finding]
+) -> NDArray:
+    """Return the quantity (n,) in SI: sign x gain x unit(scale x raw - zero), NaN where the log has none.
+
+    ``gain`` is the drive train's: counts per turn, gear ratio, torque constant.
+    """
+    raw = _raw(reading, columns, where, findings)
+    if reading.signed_bits is not None:
+        raw = signed(raw, reading.signed_bits, where, findings)
+    if reading.range is not None:
+        raw = _believed(raw, reading.range, where, findings)
+    if reading.wraps_at is not None:
+        near = reading.zero / reading.scale if reading.begins_at is None else reading.begins_at
+        raw = unwrapped(raw, reading.wraps_at, where, findings, near)
+    unit = unit_named(reading.unit)
+    assert unit is not None, "was looked at with the map"
+    if reading.wraps_at is None and (full := full_at(raw, _turns(reading, unit))) is not None:
+        seen = f"steps by {full:.6g} from one row to the next, as a counter does that is full"
+        findings.append(Finding(where, seen, f"kept; set wraps_at = {full:.10g} at it"))
+    return reading.sign * gain * (unit.factor * (reading.scale * raw - reading.zero) + unit.offset)
+
+
+def turn_of_its_counter(reading: ReadingSettings, gain: float) -> float | None:
+    """Return what the quantity is after which the counter starts anew, in SI; None of what does not."""
+    unit = unit_named(reading.unit)
+    assert unit is not None, "was looked at with the map"
+    return None if reading.wraps_at is None else abs(gain * unit.factor * reading.scale * reading.wraps_at)
+
+
+def _turns(reading: ReadingSettings, unit: Unit) -> tuple[float, ...]:
+    """Return the raw reading that is a full turn of what an encoder sits on, where the reading is one's."""
+    counts = getattr(reading, "counts_per_turn", None) if unit.dimension == "counts" else None
+    turn = 2.0 * np.pi / unit.factor if unit.dimension == "angle" else counts
+    return () if turn is None else (abs(turn / reading.scale),)
+
+
+def _raw(reading: ReadingSettings, columns: Mapping[str, NDArray], where: str, findings: list[Finding]) -> NDArray:
+    if reading.column is not None:
+        return numbers(columns[reading.column], where, findings)
+    expression = Expression(str(reading.expression), f"{where}.expression")
+    return expression({name: numbers(columns[name], where, findings) for name in expression.names})
+
+
+def _believed(raw: NDArray, limits: tuple[float, float], where: str, findings: list[Finding]) -> NDArray:
+    outside = (raw < limits[0]) | (raw > limits[1])
+    if outside.any():
+        seen = f"{counted(int(outside.sum()), 'row')} outside {limits[0]:g} … {limits[1]:g}"
+        findings.append(Finding(where, seen, "taken for missing"))
+    return np.where(outside, np.nan, raw)

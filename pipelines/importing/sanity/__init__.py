@@ -1,0 +1,1 @@
+"""Whether what was imported can be the motion of a machine."""

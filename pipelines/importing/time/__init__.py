@@ -1,0 +1,1 @@
+"""Clock and period of a log."""

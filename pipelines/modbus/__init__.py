@@ -1,0 +1,1 @@
+"""Blocks of Modbus registers, for acquisition and rig."""

@@ -1,0 +1,1 @@
+"""The style of exoid's matplotlib figures."""

@@ -1,0 +1,1 @@
+"""The process that exoid runs in: its event loop, and the signals that end it."""

@@ -1,0 +1,103 @@
+"""A figure as data: drawn with a mouse to zoom on the page, and with matplotlib on paper."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.report.charts.downsampling import extremes
+
+
+class Role(StrEnum):
+    """What a curve stands for; page and paper give each role its colour."""
+
+    MEASURED = "measured"
+    WANTED = "wanted"
+    BEFORE = "before"
+    AFTER = "after"
+
+
+class Mark(StrEnum):
+    """How a curve is drawn."""
+
+    LINE = "line"
+    DOTS = "dots"
+    MEAN = "mean"
+    """A thick line through few points: over rows that it has no value in."""
+
+
+@dataclass(frozen=True)
+class Series:
+    """One curve of n points; NaN where it has none, which interrupts a ``LINE``."""
+
+    label: str
+    values: NDArray
+    role: Role
+    mark: Mark = Mark.LINE
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Curves on one axis."""
+
+    label: str
+    """Of the vertical axis, with the unit."""
+    series: tuple[Series, ...]
+    band: float | None = None
+    """Half the height of the noise floor's band about zero."""
+    reach: float | None = None
+    """Half the height that is shown; what all curves need unless given."""
+    title: str = ""
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Panels one above the other that share their horizontal axis."""
+
+    key: str
+    """Its name in links and as a file."""
+    title: str
+    caption: str
+    x_label: str
+    x: NDArray
+    """(n,) never falling."""
+    panels: tuple[Panel, ...]
+    group: str = ""
+    """Charts of one group zoom together."""
+    rows: int = field(default=0)
+    """How many rows it had before it was thinned; 0 where it never was."""
+
+    @property
+    def width(self) -> int:
+        """Number of columns, x among them."""
+        return 1 + sum(len(panel.series) for panel in self.panels)
+
+    @property
+    def all_series(self) -> list[Series]:
+        """Every curve, panel by panel."""
+        return [series for panel in self.panels for series in panel.series]
+
+    def thinned(self, rows: int) -> "Chart":
+        """Return the chart with so many rows at most, each of them a row it had; every peak stays."""
+        if len(self.x) <= rows:
+            return self
+        kept = extremes(np.column_stack([series.values for series in self.all_series]), rows)
+        panels = tuple(
+            replace(panel, series=tuple(replace(s, values=s.values[kept]) for s in panel.series))
+            for panel in self.panels
+        )
+        return replace(self, x=self.x[kept], panels=panels, rows=len(self.x))
+
+
+def thinned_alike(charts: Sequence[Chart], values: int) -> list[Chart]:
+    """Return charts that together hold so many numbers at most: the longest give way first."""
+    low, high = 1, max((len(chart.x) for chart in charts), default=1)
+    while low < high:
+        rows = (low + high + 1) // 2
+        if sum(min(rows, len(chart.x)) * chart.width for chart in charts) <= values:
+            low = rows
+        else:
+            high = rows - 1
+    return [chart.thinned(low) for chart in charts]

@@ -1,0 +1,114 @@
+"""The page's charts on paper: the same data, drawn by matplotlib as PDF and PNG."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib import pyplot as plt
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from pipelines.plotting.style import BLUE, CAUSES, GREY, NOISE, WANDERS
+from pipelines.report.charts.chart import Chart, Mark, Panel, Role, Series
+from pipelines.report.numbers import digits
+from pipelines.report.sections.error_budget import Bar, Fall
+
+ROWS = 6000
+"""Of a chart, at most: more no printer resolves, and a PDF of them opens slowly."""
+COLOURS = {Role.MEASURED: "black", Role.WANTED: "black", Role.BEFORE: GREY, Role.AFTER: BLUE}
+WIDTHS = {Role.MEASURED: 0.7, Role.WANTED: 0.7, Role.BEFORE: 1.6, Role.AFTER: 0.9}
+TONES = {"noise": NOISE, "left": BLUE, "wanders": WANDERS} | {f"cause{n}": c for n, c in enumerate(CAUSES, 1)}
+WIDE, NARROW = 7.2, 3.6
+"""Inches: of two columns of a paper, and of one."""
+
+
+def chart_figure(chart: Chart) -> Figure:
+    """Return a chart, its panels one above the other."""
+    chart = chart.thinned(ROWS)
+    cloud = any(series.mark is Mark.DOTS for series in chart.all_series)
+    heights = [2.0] + [1.3 if chart.group else 2.0] * (len(chart.panels) - 1)
+    figure, axes = plt.subplots(
+        len(chart.panels), 1, sharex=True, squeeze=False, height_ratios=heights,
+        figsize=(NARROW if cloud else WIDE, 0.7 + 0.85 * sum(heights)), layout="constrained",
+    )  # fmt: skip
+    for axis, panel in zip(axes[:, 0], chart.panels, strict=True):
+        _draw(axis, chart, panel)
+    axes[-1, 0].set_xlabel(chart.x_label)
+    lines = {line.get_label(): line for axis in axes[:, 0] for line in axis.get_lines() if line.get_label()[0] != "_"}
+    figure.suptitle(_sentence(chart.title), x=0.01, ha="left", fontsize=9, fontweight="bold")
+    if lines:
+        figure.legend(lines.values(), lines.keys(), loc="outside lower left", ncols=len(lines), fontsize=8)
+    figure.align_ylabels()
+    return figure
+
+
+def _draw(axis: Axes, chart: Chart, panel: Panel) -> None:
+    if panel.band:
+        axis.axhspan(-panel.band, panel.band, color=TONES["noise"], alpha=0.6, lw=0)
+    for series in panel.series:
+        _draw_series(axis, chart, series)
+    axis.set_ylabel(panel.label)
+    axis.margins(x=0.01)
+    if panel.reach:
+        axis.set_ylim(-panel.reach, panel.reach)
+
+
+def _draw_series(axis: Axes, chart: Chart, series: Series) -> None:
+    colour, label = COLOURS[series.role], series.label or "_"
+    if series.mark is Mark.DOTS:
+        axis.plot(chart.x, series.values, ".", ms=1.6, mew=0, alpha=0.5, color=colour, label=label, rasterized=True)
+        return
+    x, values = chart.x, series.values
+    if series.mark is Mark.MEAN:
+        own = ~np.isnan(values)  # over the rows of others
+        x, values = x[own], values[own]
+    width = 1.8 if series.mark is Mark.MEAN else WIDTHS[series.role]
+    axis.plot(x, values, color=colour, lw=width, label=label)
+
+
+def budget_figure(bars: Sequence[Bar]) -> Figure:
+    """Return the error budget: one bar a joint, each to its own scale."""
+    figure, axes = plt.subplots(
+        len(bars), 1, figsize=(WIDE, 0.5 + 1.25 * len(bars)), squeeze=False, layout="constrained"
+    )
+    for axis, bar in zip(axes[:, 0], bars, strict=True):
+        shown = [segment for segment in bar.segments if segment.share]
+        for segment in shown:
+            axis.barh(0, segment.high - segment.low, left=segment.low, color=TONES[segment.tone], ec="white", lw=0.5)
+        axis.set_yticks([])
+        axis.set_title(_sentence(f"{bar.joint}: {digits(bar.rms)} {bar.unit} rms"), loc="left", fontsize=9)
+        axis.set_xlabel(f"mean square error, ({bar.unit})²")
+        axis.grid(visible=False)
+        axis.legend(
+            [Patch(color=TONES[segment.tone]) for segment in shown],
+            [f"{segment.label}: {digits(segment.rms)} {bar.unit}" for segment in shown],
+            loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=8,
+        )  # fmt: skip
+    return figure
+
+
+def falls_figure(falls: Sequence[Fall]) -> Figure:
+    """Return each joint's error before and after, and its noise floor."""
+    figure, axis = plt.subplots(figsize=(NARROW, 0.6 + 0.75 * len(falls)), layout="constrained")
+    for row, fall in enumerate(falls):
+        bars = [(fall.before, GREY)] + ([(fall.after, BLUE)] if fall.after is not None else [])
+        for shift, (value, colour) in zip((-0.19, 0.19), bars, strict=False):
+            axis.barh(row + shift, value, height=0.34, color=colour)
+        axis.plot([fall.floor] * 2, [row - 0.42, row + 0.42], color="black", lw=1.4)
+    units = " and ".join(dict.fromkeys(fall.unit for fall in falls))
+    axis.set_yticks(range(len(falls)), [fall.joint for fall in falls])
+    axis.invert_yaxis()
+    axis.set_xlabel(f"rms error on runs that no fit has seen, {units}")
+    axis.grid(axis="y", visible=False)
+    legend: dict[str, Artist] = {"rigid body and friction": Patch(color=GREY), "with the causes": Patch(color=BLUE)}
+    if falls[0].after is None:
+        del legend["with the causes"]
+    legend["noise floor"] = Line2D([], [], color="black")
+    figure.legend(legend.values(), legend.keys(), loc="outside lower left", ncols=len(legend), fontsize=7)
+    return figure
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,90 @@
+"""The machine in motion: measured, and as each model has it move in simulations of one second."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipelines.contracts import Table
+from pipelines.contracts.joints import Kind
+from pipelines.report.sections.fit_quality import MODELS, replayed
+from pipelines.report.session import Session
+
+FRAMES_HZ = 50.0
+LONGEST_S = 40.0
+"""Of a longer run the stretch is shown in which the first model is furthest off."""
+DRAWN: dict[tuple[Kind, ...], str] = {
+    ("revolute", "revolute"): "leg", ("revolute",): "pendulum", ("prismatic",): "slider",
+}  # fmt: skip
+"""Machines that there is a drawing of, by the kinds of their joints."""
+SHANK_TO_THIGH = 1.05
+"""The shank's drawn length: no file tells it, and no torque depends on it."""
+
+
+@dataclass(frozen=True)
+class Animation:
+    """Frames of one run."""
+
+    run: str
+    kind: str
+    """How the machine is drawn, as in ``DRAWN``."""
+    lengths: tuple[float, ...]
+    """Of the links as drawn, m; of a slider how far it goes either way."""
+    time: NDArray
+    """(n,) s."""
+    angles: dict[str, NDArray]
+    """``measured`` and each model's role: (n, joints), rad or m."""
+    labels: dict[str, str]
+
+
+def animations(session: Session) -> list[Animation]:
+    """Return one for each replayed run of a machine that can be drawn."""
+    if not drawn_as(session):
+        return []
+    found = []
+    for run, replays in replayed(session).items():
+        tables = {model: session.table(one) for model, one in replays.items()}
+        found.append(_animation(session, run, tables))
+    return found
+
+
+def drawn_as(session: Session) -> str:
+    """Return how a session's machine is drawn; nothing where there is no drawing of it."""
+    return DRAWN.get(tuple(joint.kind for joint in session.joints), "")
+
+
+def _animation(session: Session, run: str, tables: dict[str, Table]) -> Animation:
+    first = next(iter(tables.values()))
+    tables = {model: table for model, table in tables.items() if len(table.frame) == len(first.frame)}
+    time, off = first.frame["time_s"].to_numpy(), np.abs(first.stacked("error")).sum(axis=1)
+    rows = _frames(time, off)
+    angles = {"measured": first.stacked("reference")[rows]}
+    labels = {"measured": "measured"}
+    for model, table in tables.items():
+        role, words = MODELS[model]
+        angles[role], labels[role] = table.stacked("angle")[rows], words
+    kind, lengths = _machine(session, first, angles["measured"])
+    return Animation(run, kind, lengths, time[rows], angles, labels)
+
+
+def _frames(time: NDArray, off: NDArray) -> NDArray:
+    """Return the rows to show: some each second, of the stretch with most error."""
+    begin = time[0]
+    if time[-1] - begin > LONGEST_S:
+        total = np.concatenate([[0.0], np.cumsum(off**2)])
+        ends = np.searchsorted(time, time + LONGEST_S)
+        whole = time + LONGEST_S <= time[-1]
+        begin = time[np.argmax(np.where(whole, total[ends] - total[:-1], -1.0))]
+    wanted = np.arange(begin, min(begin + LONGEST_S, time[-1]), 1.0 / FRAMES_HZ)
+    return np.unique(np.clip(np.searchsorted(time, wanted), 0, len(time) - 1))
+
+
+def _machine(session: Session, table: Table, measured: NDArray) -> tuple[str, tuple[float, ...]]:
+    drawn = drawn_as(session)
+    if drawn == "slider":
+        return drawn, (float(np.abs(measured).max()) or 1.0,)
+    if drawn == "pendulum":
+        return drawn, (1.0,)
+    geometry = table.metadata.get("plant", {}).get("geometry", {})
+    thigh = geometry.get("thigh_length_m") or 0.4
+    return drawn, (thigh, SHANK_TO_THIGH * thigh)

@@ -1,0 +1,97 @@
+"""The adaptive loop on the model without and with the named causes: tracking, error, torque, and the sweep of Kv."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from pipelines.contracts import Joint
+from pipelines.report.charts.chart import Chart, Mark, Panel, Role, Series
+from pipelines.report.sections.fit_quality import MODELS, models_of
+from pipelines.report.session import Artifact, Session
+from pipelines.workflow.graph import SWEEP
+
+GAIN = "feedback_gain_nm_s_rad"
+LIMIT = 4.0
+"""How many times the largest settled error a panel shows: the start, from rest, would flatten the rest."""
+
+
+def loops(session: Session) -> dict[str, Artifact]:
+    """Return one adaptive loop of each model; where there are several, that with a person in the leg."""
+    found = {}
+    for model, made in session.simulations_by_model("loop").items():
+        ranked = sorted(made, key=lambda one: one.metadata.get("plant", {}).get("run") != "with_human")
+        if ranked and model in models_of(session):
+            found[model] = ranked[0]
+    return found
+
+
+def control_charts(session: Session) -> Iterator[Chart]:
+    """Yield a chart for each joint, then that of the sweep."""
+    made = loops(session)
+    tables = {model: session.table(one).frame for model, one in made.items()}
+    if not tables:
+        return
+    settled = next(iter(made.values())).metadata.get("config", {}).get("simulate", {}).get("settled_after_s", 0.0)
+    for joint in session.joints:
+        yield _loop_chart(joint, tables, settled)
+    sweep = _sweep_chart(session, {model: one.path.with_name(SWEEP) for model, one in made.items()})
+    if sweep:
+        yield sweep
+
+
+def _loop_chart(joint: Joint, tables: dict[str, pd.DataFrame], settled: float) -> Chart:
+    first = next(iter(tables.values()))
+    angles, errors, torques, worst = [], [], [], 0.0
+    for model, frame in tables.items():
+        if len(frame) != len(first):
+            continue
+        role, words = MODELS[model]
+        error = 1e3 * frame[joint.column("error")].to_numpy()
+        worst = max(worst, float(np.abs(error[frame["time_s"] >= settled]).max(initial=0.0)))
+        angles.append(Series(words, frame[joint.column("angle")].to_numpy(), role))
+        errors.append(Series(words, error, role))
+        torques.append(Series(words, frame[joint.column("torque")].to_numpy(), role))
+    angles.append(Series("wanted", first[joint.column("reference")].to_numpy(), Role.WANTED))
+    unit = joint.unit("angle")
+    return Chart(
+        key=f"control-{joint.name}",
+        title=f"{joint.name} under adaptive RBF control",
+        caption=f"From rest; errors count from {settled:g} s on, when the network has learnt the leg.",
+        x_label="time, s",
+        x=first["time_s"].to_numpy(),
+        panels=(
+            Panel(f"angle, {unit}", tuple(angles)),
+            Panel(f"error, m{unit}", tuple(errors), reach=LIMIT * worst or None),
+            Panel(f"torque, {joint.unit('torque')}", tuple(torques)),
+        ),
+        group="control",
+    )
+
+
+def _sweep_chart(session: Session, files: dict[str, Path]) -> Chart | None:
+    tables = {model: pd.read_csv(path) for model, path in files.items() if path.is_file()}
+    columns = [GAIN, *(joint.column("error") for joint in session.joints)]
+    tables = {model: table for model, table in tables.items() if set(columns) <= set(table.columns) and len(table)}
+    if not tables:
+        return None
+    first = next(iter(tables.values()))
+    panels = []
+    for joint in session.joints:
+        curves = tuple(
+            Series(
+                MODELS[model][1], 1e3 * table[joint.column("error")].to_numpy(dtype=float), MODELS[model][0], Mark.MEAN
+            )
+            for model, table in tables.items()
+            if table[GAIN].equals(first[GAIN])
+        )
+        panels.append(Panel(f"{joint.name}, m{joint.unit('angle')}", curves))
+    return Chart(
+        key="kv-sweep",
+        title="Largest settled error against the feedback gain",
+        caption="Each gain is a simulation of its own.",
+        x_label="feedback gain Kv, N·m·s/rad",
+        x=first[GAIN].to_numpy(dtype=float),
+        panels=tuple(panels),
+    )

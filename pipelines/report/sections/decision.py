@@ -1,0 +1,80 @@
+"""What the first screen shows of the decision: what is missing, and how the residual splits."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pipelines.report.sections.error_budget import torque_unit
+from pipelines.wording.findings import PARTS, Row, Shares, outcomes, rows, searched_runs, shares
+
+OUTCOMES = {"nothing": "noise", "listed": "cause1", "unlisted": "unlisted"}
+TONES = {
+    "noise": "noise", "wanders": "wanders", "between_runs": "runs", "unsplit": "before",
+    "repeats": "left",
+}  # fmt: skip
+"""Names of colours, in the order in which the parts are laid end to end."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a bar whose whole is one."""
+
+    words: str
+    tone: str
+    """Name of its colour."""
+    low: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Split:
+    """How one joint's residual splits."""
+
+    joint: str
+    unit: str
+    rms: float
+    parts: tuple[Part, ...]
+    with_person_only: float | None
+    predicted: dict[str, float]
+    """Share of the variance that a curve of one variable alone predicts."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The two cards of the first screen."""
+
+    outcomes: tuple[Part, ...]
+    """Nothing missing, listed causes only, something unlisted."""
+    rows: tuple[Row, ...]
+    splits: tuple[Split, ...]
+    searched: str
+    """The runs whose residual is split."""
+
+
+def decision(verdict: Mapping[str, Any]) -> Decision | None:
+    """Return what a verdict says of the decision; None where it says nothing of it."""
+    cases = outcomes(verdict)
+    if not cases:
+        return None
+    return Decision(
+        _end_to_end([(case.words, OUTCOMES[case.key], case.probability) for case in cases]),
+        tuple(rows(verdict)),
+        tuple(_split(verdict, one) for one in shares(verdict)),
+        searched_runs(verdict),
+    )
+
+
+def _split(verdict: Mapping[str, Any], one: Shares) -> Split:
+    parts = [(PARTS[name], tone, one.parts[name]) for name, tone in TONES.items()]
+    return Split(
+        one.joint, torque_unit(dict(verdict), one.joint), one.rms, _end_to_end(parts),
+        one.with_person_only, one.predicted,
+    )  # fmt: skip
+
+
+def _end_to_end(told: list[tuple[str, str, float]]) -> tuple[Part, ...]:
+    parts, low = [], 0.0
+    for words, tone, share in told:
+        parts.append(Part(words, tone, low, share))
+        low += share
+    return tuple(parts)

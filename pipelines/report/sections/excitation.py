@@ -1,0 +1,46 @@
+"""The excitation: how good it is, what it was to bring, and how near its bounds it comes."""
+
+from dataclasses import dataclass
+from math import pi
+from typing import Any
+
+from pipelines.report.numbers import digits
+from pipelines.report.sections.symbols import unit
+from pipelines.report.session import Artifact, Session
+
+NUMBERS = {
+    "condition": "condition number",
+    "scaled_condition": "condition number of its columns scaled to one length",
+    "log_det": "log determinant of the regressor's Gram matrix",
+}
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """A ``trajectory/1`` file as the page shows it."""
+
+    file: str
+    about: str
+    margins: tuple[dict[str, Any], ...]
+    """Each with joint, quantity, unit, low, high, lowest, highest and margin."""
+    errors: tuple[tuple[str, float | None, str], ...]
+    """Each parameter's standard error foreseen, and its unit."""
+
+
+def excitations(session: Session) -> list[Excitation]:
+    """Return every excitation of a session."""
+    return [_excitation(session, one) for one in session.of_kind("trajectory")]
+
+
+def _excitation(session: Session, artifact: Artifact) -> Excitation:
+    about = artifact.metadata
+    told = [f"{words} {digits(about[key])}" for key, words in NUMBERS.items() if about.get(key) is not None]
+    if about.get("a") and about.get("omega_rad_s"):
+        base_hz = about["omega_rad_s"] / (2 * pi)
+        told.insert(0, f"{len(about['a'][0])} harmonics of {digits(base_hz)} Hz")
+    return Excitation(
+        session.shown(artifact.path),
+        ", ".join(told),
+        tuple(about.get("margins") or ()),
+        tuple((name, error, unit(session, name)) for name, error in (about.get("standard_errors") or {}).items()),
+    )

@@ -1,0 +1,198 @@
+"""Measured beside simulated over whole runs, before and after the causes are named."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from pipelines.contracts import Joint
+from pipelines.report.charts.chart import Chart, Panel, Role, Series
+from pipelines.report.sections.standstill import moving, strays_further, torque_error_grew
+from pipelines.report.session import Artifact, Session
+
+MODELS = {"baseline": (Role.BEFORE, "rigid body and friction"), "extended": (Role.AFTER, "with the causes")}
+"""The models of ``residuals/1``, and how charts call them."""
+
+
+def run_names(session: Session) -> list[str]:
+    """Return the runs that have residuals, validation runs first."""
+    if session.residuals is None:
+        return []
+    runs = session.residuals.frame[["file", "purpose"]].drop_duplicates("file")
+    return list(runs.sort_values("purpose", ascending=False, kind="stable")["file"])
+
+
+def models_of(session: Session) -> dict[str, tuple[Role, str]]:
+    """Return the models to be drawn: a diagnosis that names nothing has only one."""
+    named = session.verdict is None or bool(session.verdict["causes"])
+    return {name: told for name, told in MODELS.items() if named or name == "baseline"}
+
+
+def torque_charts(session: Session) -> Iterator[Chart]:
+    """Yield a chart for each run and joint: torque, and what each model leaves of it."""
+    if session.residuals is None:
+        return
+    frame, floors = session.residuals.frame, (session.verdict or {}).get("noise_floor_nm", {})
+    for run in run_names(session):
+        of_run = frame[frame["file"] == run]
+        for joint in session.joints:
+            yield _torque_chart(session, run, joint, of_run, floors.get(joint.name))
+
+
+def _torque_chart(session: Session, run: str, joint: Joint, frame: pd.DataFrame, floor: float | None) -> Chart:
+    quantity, unit = joint.effort, joint.unit("torque")
+    first = frame[frame["model"] == frame["model"].iloc[0]]
+    torques, errors = [], []
+    for model, (role, words) in models_of(session).items():
+        rows = frame[frame["model"] == model]
+        if len(rows) != len(first):
+            continue
+        torques.append(Series(words, rows[joint.column("predicted")].to_numpy(), role))
+        left = rows[joint.column("residual")].where(rows["scored"]).to_numpy()
+        errors.append(Series(words, left, role))
+    torques.append(Series("measured", first[joint.column("torque")].to_numpy(), Role.MEASURED))
+    return Chart(
+        key=f"torque-{_stem(run)}-{joint.name}",
+        title=f"{joint.name} {quantity}",
+        caption=f"Measured and computed from the motion, in the blocks that were fitted; below, what each model leaves "
+        f"away from reversals{', on the band of the noise floor' if floor else ''}.",
+        x_label="time, s",
+        x=first["time_s"].to_numpy(),
+        panels=(
+            Panel(f"{quantity}, {unit}", tuple(torques)),
+            Panel(f"error, {unit}", tuple(errors), band=floor),
+        ),
+        group=run,
+    )  # fmt: skip
+
+
+def angle_charts(session: Session) -> Iterator[Chart]:
+    """Yield a chart for each replayed run and joint: the angle in simulations of a second under the recorded torque."""
+    for run, replays in replayed(session).items():
+        tables = {model: session.table(one).frame for model, one in replays.items()}
+        for joint in session.joints:
+            yield _angle_chart(run, joint, tables)
+
+
+def replayed(session: Session, what: str = "windows") -> dict[str, dict[str, Artifact]]:
+    """Return the replays of a kind (see ``session.simulated``), by run and model that is to be drawn."""
+    found: dict[str, dict[str, Artifact]] = {}
+    for model, replays in session.simulations_by_model(what).items():
+        for one in replays if model in models_of(session) else ():
+            source = session.recorded(one)
+            run = source.path.name if source else one.inputs[-1]["name"]
+            found.setdefault(run, {}).setdefault(model, one)
+    return found
+
+
+@dataclass(frozen=True)
+class Score:
+    """How far off the replays of a run are, in one respect."""
+
+    words: str
+    values: tuple[float | None, ...]
+    """One a model, in the order of ``MODELS``; None where there is no such replay."""
+    note: str = ""
+    """What is to be said of the row, in few words."""
+
+
+LARGER = "larger with the causes"
+STANDS = "no model of speed can tell what holds a joint that stands"
+SCORES = {
+    "windows": (("simulation_rmse_rad", "angle", "1 s under the recorded {drive}", 1e3, "m"),),
+    "drives": (
+        ("closed_loop_rmse_rad", "angle", "in the drives' own loop", 1e3, "m"),
+        ("closed_loop_rmse_nm", "torque", "in the drives' own loop", 1.0, ""),
+    ),
+}
+"""Of each kind of replay: the metadata's key, what it is about, in words, and in which multiple of the unit."""
+
+
+def scores(session: Session, run: str) -> list[Score]:
+    """Return how far off each model is in a run: its torque, and what the replays' files say, joint by joint."""
+    found = [score for joint in session.joints for score in _torque_scores(session, run, joint)]
+    for what, rows in SCORES.items():
+        replays = replayed(session, what).get(run, {})
+        for key, quantity, words, times, prefix in rows if replays else ():
+            for joint in session.joints:
+                told = [replays[model].metadata.get(key, {}).get(joint.name) if model in replays else None
+                        for model in models_of(session)]  # fmt: skip
+                name = joint.place if quantity == "angle" else joint.effort
+                where = f"{joint.name} {name}, {words.format(drive=joint.effort)}, {prefix}{joint.unit(quantity)}"
+                values = tuple(None if value is None else times * value for value in told)
+                found.append(Score(where, values, LARGER if strays_further(*values) else ""))
+                if what == "windows":
+                    found += _while_moving(session, replays, joint, where)
+    return [score for score in found if any(value is not None for value in score.values)]
+
+
+def _torque_scores(session: Session, run: str, joint: Joint) -> Iterator[Score]:
+    """Yield a run's rms torque error away from reversals, and in all blocks that were fitted."""
+    if session.residuals is None:
+        return
+    rows = session.residuals.frame
+    rows = rows[rows["file"] == run]
+    floor = (session.verdict or {}).get("noise_floor_nm", {}).get(joint.name)
+    grew_away = False
+    for words, chosen in (("away from reversals", rows[rows["scored"]]), ("reversals included", rows)):
+        left = [chosen.loc[chosen["model"] == model, joint.column("residual")] for model in models_of(session)]
+        values = tuple(float(np.sqrt(np.mean(e**2))) if len(e) else None for e in left)
+        grew = floor is not None and torque_error_grew(*values, floor=floor)
+        about = "" if grew_away or words == "away from reversals" else f"; only about reversals, where {STANDS}"
+        yield Score(
+            f"{joint.name} {joint.effort}, computed, {words}, {joint.unit('torque')}", values,
+            LARGER + about if grew else "",
+        )  # fmt: skip
+        grew_away = grew
+
+
+def _while_moving(session: Session, replays: dict[str, Artifact], joint: Joint, where: str) -> Iterator[Score]:
+    """Yield the error in those seconds in which the joint never stands, where there are such and others."""
+    values: list[float | None] = []
+    kept = of = 0
+    for model in models_of(session):
+        frame = session.table(replays[model]).frame if model in replays else None
+        chosen = frame[moving(frame, joint)] if frame is not None else None
+        if frame is None or chosen is None or not len(chosen):
+            values.append(None)
+            continue
+        values.append(1e3 * float(np.sqrt(np.mean(chosen[joint.column("error")] ** 2))))
+        kept, of = chosen["window"].nunique(), frame["window"].nunique()
+    if 0 < kept < of:
+        yield Score(f"{where}: of these the {kept} of {of} in which it never stands", tuple(values))
+
+
+def _angle_chart(run: str, joint: Joint, tables: dict[str, pd.DataFrame]) -> Chart:
+    first = next(iter(tables.values()))
+    where, drive = joint.place, joint.effort
+    angles, errors = [], []
+    for model, frame in tables.items():
+        if len(frame) != len(first):
+            continue
+        role, words = MODELS[model]
+        angles.append(Series(words, broken(frame, joint.column("angle")), role))
+        errors.append(Series(words, 1e3 * broken(frame, joint.column("error")), role))
+    angles.append(Series("measured", first[joint.column("reference")].to_numpy(), Role.MEASURED))
+    unit = joint.unit("angle")
+    return Chart(
+        key=f"angle-{_stem(run)}-{joint.name}",
+        title=f"{joint.name} {where} in simulations of one second",
+        caption=f"Each second the model starts where the machine was and gets the recorded {drive}; below, how far it "
+        "strays.",
+        x_label="time, s",
+        x=first["time_s"].to_numpy(),
+        panels=(Panel(f"{where}, {unit}", tuple(angles)), Panel(f"error, m{unit}", tuple(errors))),
+        group=run,
+    )
+
+
+def broken(frame: pd.DataFrame, column: str) -> NDArray:
+    """Return a column (n,) with a gap where a window begins: no line may join two simulations."""
+    begins = frame["window"].diff().fillna(0) != 0
+    return frame[column].where(~begins, np.nan).to_numpy()
+
+
+def _stem(run: str) -> str:
+    return run.removesuffix(".parquet")

@@ -1,0 +1,108 @@
+"""The numbers of the first screen: how sure, how much, how much is left, and what simulations make of it."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from pipelines.contracts import Joint
+from pipelines.contracts.joints import the
+from pipelines.report.numbers import digits
+from pipelines.report.sections.error_budget import cause_in_words, falls, ties_of, torque_unit
+from pipelines.report.sections.fit_quality import replayed
+from pipelines.report.sections.standstill import strays_further
+from pipelines.report.session import Session
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One number."""
+
+    title: str
+    big: str
+    unit: str
+    small: str
+    is_worse: bool = False
+    """Whether the number speaks against naming the causes."""
+
+
+def tiles(session: Session) -> list[Tile]:
+    """Return what a hurried reader wants to know; nothing without a verdict."""
+    verdict = session.verdict
+    if not verdict:
+        return []
+    # The tree of findings tells how probable each cause is; older verdicts have none.
+    skipped = bool(verdict.get("findings"))
+    found = [tile for cause in verdict["causes"][:2] for tile in _cause_tiles(verdict, cause)[skipped:]]
+    for fall in falls(verdict):
+        if fall.unexplained is not None:
+            after = "" if fall.after is None else f" → {digits(fall.after / fall.floor)}"
+            big = f"{digits(fall.before / fall.floor)}{after}"
+            found.append(Tile(f"{fall.joint} error", big, "× floor", "1 would be noise alone"))
+    return [*found, *_simulation_tiles(session, verdict), *_loop_tiles(session)]
+
+
+def worst_joint(session: Session) -> Joint | None:
+    """Return the joint that the first cause gains most at, or that is furthest above its floor."""
+    verdict = session.verdict
+    if not verdict:
+        return None
+    before, floor = verdict["baseline_rmse_nm"], verdict["noise_floor_nm"]
+    name = verdict["causes"][0]["gain"]["joint"] if verdict["causes"] else None
+    name = name or max(before, key=lambda joint: before[joint] / floor[joint])
+    return next((joint for joint in session.joints if joint.name == name), None)
+
+
+def _cause_tiles(verdict: dict[str, Any], cause: dict[str, Any]) -> list[Tile]:
+    gain, (low, high) = cause["gain"]["rmse_reduction_nm"], cause["gain"]["ci95"]
+    joint = cause["gain"]["joint"]
+    left = verdict["extended_rmse_nm"][joint]
+    beside = ", beside the other causes" if len(verdict["causes"]) > 1 else ""
+    unit, ties = torque_unit(verdict, joint), len(ties_of(cause))
+    words = cause_in_words(cause)
+    return [
+        Tile(
+            "probability" + (", with its ties" if ties else ""),
+            f"{100 * cause['probability']:.0f}",
+            "%",
+            words + (f", or one of {ties} that these data cannot tell from it" if ties else ""),
+        ),
+        Tile(
+            f"gain of {words}",
+            digits(gain),
+            unit,
+            f"{digits(left + gain)} → {digits(left)} {unit} at {the(joint)}{beside}; 95 %: "
+            f"{digits(low)} … {digits(high)}",
+        ),
+    ]
+
+
+def _simulation_tiles(session: Session, verdict: dict[str, Any]) -> list[Tile]:
+    """Return how far simulations of a second stray, at the joint that matters most."""
+    joint = worst_joint(session)
+    before = verdict["baseline_simulation_rmse_rad"].get(joint.name) if joint else None
+    if not joint or before is None:
+        return []
+    after = verdict["extended_simulation_rmse_rad"][joint.name] if verdict["causes"] else None
+    big = digits(1e3 * before) + ("" if after is None else f" → {digits(1e3 * after)}")
+    is_worse = strays_further(before, after)
+    small = "rms of all runs, as the diagnosis fits them"
+    if verdict["causes"] and after is None:
+        small = "without the causes; with them it cannot be simulated"
+    elif is_worse:
+        small = "worse with the causes; why is said below"
+    return [Tile(f"{joint.name}, simulated for 1 s", big, f"m{joint.unit('angle')}", small, is_worse)]
+
+
+def _loop_tiles(session: Session) -> list[Tile]:
+    """Return how far the drives' simulated torque is off, of the run where naming the causes gains most."""
+    joint, key = worst_joint(session), "closed_loop_rmse_nm"
+    pairs = [
+        [one[model].metadata[key][joint.name] for model in ("baseline", "extended")]
+        for one in replayed(session, "drives").values()
+        if joint and len(one) == 2 and all(joint.name in made.metadata.get(key, {}) for made in one.values())
+    ]
+    if not joint or not pairs:
+        return []
+    before, after = max(pairs, key=lambda pair: pair[0] - pair[1])
+    small = "worse with the causes" if after > before else f"rms error of the simulated {joint.effort}"
+    title = f"{joint.name}, in the drives' loop"
+    return [Tile(title, f"{digits(before)} → {digits(after)}", joint.unit("torque"), small, after > before)]

@@ -1,0 +1,51 @@
+"""What each run has for itself of a named cause: an offset that is set anew at its start, an onset, a phase."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from pipelines.report.sections.parameters import Estimate
+
+
+@dataclass(frozen=True)
+class RunValues:
+    """One run's row."""
+
+    file: str
+    purpose: str
+    estimates: tuple[Estimate | None, ...]
+    """One a parameter; None where the cause never came in this run."""
+
+
+@dataclass(frozen=True)
+class OwnValues:
+    """A table of all runs."""
+
+    headings: tuple[str, ...]
+    """Each parameter with its unit."""
+    runs: tuple[RunValues, ...]
+
+
+def own_values(cause: dict[str, Any]) -> OwnValues | None:
+    """Return what each run has of a verdict's cause; None where all share everything, or an older file lacks it."""
+    runs = cause.get("each_run") or []
+    if not runs:
+        return None
+    units = {one["name"]: "" if one["unit"] == "1" else one["unit"] for one in cause["parameters"]}
+    names = tuple(runs[0]["values"])
+    return OwnValues(
+        tuple(", ".join(filter(None, (name.replace("_", " "), units.get(name, "")))) for name in names),
+        tuple(
+            RunValues(run["file"], run["purpose"], tuple(_estimate(cause, run, name, units) for name in names))
+            for run in runs
+        ),
+    )
+
+
+def _estimate(cause: dict[str, Any], run: dict[str, Any], name: str, units: dict[str, str]) -> Estimate | None:
+    value = run["values"].get(name)
+    low, high = run.get("ci95", {}).get(name) or (None, None)
+    if value is None:
+        return None
+    return Estimate(
+        cause["effect"], name, name, cause["joint"] or "", run["file"], units.get(name, ""), value, low, high
+    )

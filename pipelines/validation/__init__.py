@@ -1,0 +1,1 @@
+"""Explains what is wrong in a file that a user wrote."""

@@ -1,0 +1,1 @@
+"""How verdicts are worded: labels of causes, unlisted laws, findings."""

@@ -1,0 +1,89 @@
+"""A cause's label, ``effect@joint`` (see ``Effect.label``): whose it is, and how sentences say it."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from pipelines.contracts.joints import the
+from pipelines.effects import EFFECTS, Effect
+from pipelines.errors import InputError, about
+from pipelines.mechanics.machine import Machine
+from pipelines.model import effect_named
+from pipelines.wording.law import LAW, law_in_words
+
+NAMES = ("Coulomb", "Stribeck")
+"""Of people, whose capital stays."""
+
+SHARES = {
+    "noise_floor": "noise floor",
+    "repeatable_unexplained": "unexplained, repeats every period",
+    "not_repeatable": "unexplained, does not repeat",
+    "unexplained": "unexplained",
+}
+"""Shares of the verdict's ``error_budget`` that are no cause, in words."""
+
+
+def cause_label(cause: Mapping[str, Any]) -> str:
+    """Return the label of a cause, or of a rival, as a verdict has it."""
+    return f"{cause['effect']}@{cause['joint']}" if cause["joint"] else str(cause["effect"])
+
+
+def effect_labelled(label: str) -> Effect:
+    """Return the effect that ``cogging@knee`` is the label of."""
+    name, _, joint = label.partition("@")
+    return effect_named(name)(joint=joint or None)
+
+
+def effect_at(
+    label: str, machine: Machine, fits: Callable[[type[Effect]], bool], setting: str, why: str = ""
+) -> Effect:
+    """Return the effect of a label at a machine, if it ``fits`` what a ``setting`` may hold; ``why`` others do not.
+
+    Raises
+    ------
+    InputError
+        Where there is none of this name or at this joint, or it does not fit.
+    """
+    with about(setting):
+        told = effect_labelled(label)
+    if fits(type(told)) and told.joint in told.possible(machine):
+        return type(told)(joint=told.joint, on=machine)
+    can_be = [one(joint=place, on=machine) for one in EFFECTS if fits(one) for place in one.possible(machine)]
+    expected = [one.label for one in can_be if one.name == told.name] or [one.label for one in can_be]
+    raise InputError(
+        f"{setting}: found {label}, expected {' or '.join(expected) or 'nothing'}"
+        f"{f' ({why})' if why else ''}; correct it or leave it out"
+    )
+
+
+def effect_told(cause: Mapping[str, Any]) -> Effect:
+    """Return the effect of a cause, or of a rival, as a verdict tells it."""
+    effect = effect_named(cause["effect"])
+    differs = cause.get("each_run") or cause.get("per_run")
+    return effect(joint=cause["joint"], each_run=bool(effect.may_differ and differs))
+
+
+def number(machine: Machine, torque: float) -> str:
+    """Return a torque or force at a joint of a machine as text: hundredths of a newton metre do for an exoskeleton."""
+    return f"{torque:.2f}" if machine.is_exoskeleton else f"{torque:.3g}"
+
+
+def amount(machine: Machine, joint: str, torque: float) -> str:
+    """Return a torque or force at a joint with its unit."""
+    return f"{number(machine, torque)} {machine.joint(joint).unit('torque')}"
+
+
+def title_in_words(effect: Effect) -> str:
+    """Return an effect's title as it stands within a sentence."""
+    return effect.title if effect.title.startswith(NAMES) else effect.title.lower()
+
+
+def in_words(effect: Effect) -> str:
+    """Return an effect and where it is: ``cogging at the knee``."""
+    title = title_in_words(effect)
+    title = f"per-run {title}" if effect.each_run else title
+    return f"{title} at {the(effect.joint)}" if effect.joint else title
+
+
+def label_in_words(label: str, machine: Machine | None = None) -> str:
+    """Return a cause, or an unlisted law, as a sentence says it; the machine tells which of its joints slide."""
+    return law_in_words(label, machine) if label.startswith(LAW) else in_words(effect_labelled(label))

@@ -1,0 +1,197 @@
+"""A journal that is damaged anywhere, in any way a disk damages a file, never gives wrong numbers for right ones."""
+
+import numpy as np
+import pytest
+
+from pipelines.acquisition.acquire import _recorded
+from pipelines.acquisition.modbus.file_lock import locked
+from pipelines.acquisition.recording.journal import Journal, JournalFile, refuse_leftover
+from pipelines.acquisition.recording.recording import place_for
+from pipelines.acquisition.recording.recover import recover
+from pipelines.contracts import RECORDING
+from pipelines.contracts.beside import journal_of
+from pipelines.errors import DeviceError, InputError
+from tests.acquisition.recording.test_recover import COLUMNS, METADATA
+
+SAMPLES, BATCH = 160, 20
+SECTOR = 512
+VALUES = np.random.default_rng(11).normal(size=(SAMPLES, 4))
+"""Of the columns between time and counter: none can be guessed from its neighbours."""
+
+
+def row(index):
+    return [index / 200.0, *VALUES[index], 7000 + index]
+
+
+class Written:
+    """A journal's bytes, and where each of its batches of samples begins and ends."""
+
+    def __init__(self, folder, *, ended, run="exo_alone", why=None):
+        self.path = journal_of(folder / "one.parquet")
+        self.places = []
+        journal = Journal(self.path, COLUMNS, METADATA | {"run": run, "subject": "x" * 2000})
+        for index in range(SAMPLES):
+            journal.append(row(index))
+            if index % BATCH == BATCH - 1:
+                begin = journal._file.tell()
+                journal.flush()
+                self.places.append((begin, journal._file.tell()))
+        if ended:
+            journal.end(why)
+            journal.close()
+        else:
+            journal._file.close()  # as the system does for a process that is no more
+        self.bytes = self.path.read_bytes()
+
+    def untouched(self, begin, end):
+        """Return the samples of all batches outside of some bytes."""
+        kept = [k for k, place in enumerate(self.places) if place[1] <= begin or place[0] >= end]
+        return {BATCH * k + i for k in kept for i in range(BATCH)}
+
+    def recovered(self, damaged, output):
+        """Recover a damaged journal; return its samples' numbers after it was found that no value is wrong."""
+        self.path.write_bytes(damaged)
+        try:
+            made = recover(self.path, output)
+        except InputError as error:  # nothing is recovered, nothing lost, and both are told
+            assert str(error).startswith(f"{self.path}: ")
+            assert "delete" not in str(error)
+            assert self.path.read_bytes() == damaged
+            return set()
+        frame = RECORDING.read(output).frame
+        output.unlink()
+        found = frame["sequence"].to_numpy() - 7000
+        assert np.array_equal(frame[COLUMNS].to_numpy(), [row(k) for k in found])
+        account = made.account
+        assert len(found) == account.samples == SAMPLES - account.missed - (account.cut_off - (200 - SAMPLES))
+        if account.damaged:
+            assert self.path.read_bytes() == damaged
+        else:
+            assert not self.path.exists()
+            assert len(found) == SAMPLES
+        return set(found)
+
+
+@pytest.fixture(params=[False, True], ids=["killed", "ended"])
+def written(request, tmp_path):
+    return Written(tmp_path, ended=request.param)
+
+
+def spoil(whole, rng, how, begin, end, stale):
+    """Return a file of which the bytes between two places are damaged."""
+    lost = {
+        "zeroed": lambda: bytes(end - begin),
+        "erased": lambda: b"\xff" * (end - begin),
+        "random": lambda: rng.bytes(end - begin),
+        "left out": lambda: b"",
+        "twice": lambda: 2 * whole[begin:end],
+        "stale": lambda: stale[begin:end],
+        "inserted": lambda: rng.bytes(end - begin) + whole[begin:end],
+        "flipped": lambda: bytes([whole[begin] ^ 1 << rng.integers(8)]) + whole[begin + 1 : end],
+    }
+    return whole[:begin] + lost[how]() + whole[end:]
+
+
+HOW = ("zeroed", "erased", "random", "left out", "twice", "stale", "inserted", "flipped")
+
+
+@pytest.mark.parametrize("how", HOW)
+def test_whatever_sector_is_damaged_each_row_recovered_is_one_recorded_and_the_rest_is_told(written, tmp_path, how):
+    (tmp_path / "other").mkdir()
+    stale = Written(tmp_path / "other", ended=True, run="with_human").bytes
+    rng = np.random.default_rng(5)
+    for begin in range(0, len(written.bytes), SECTOR):
+        end = min(begin + SECTOR, len(written.bytes))
+        damaged = spoil(written.bytes, rng, how, begin, end, stale)
+        found = written.recovered(damaged, tmp_path / "made.parquet")
+        assert written.untouched(begin, end) <= found, (how, begin)
+
+
+def test_whatever_bytes_are_damaged_each_row_recovered_is_one_recorded_and_the_rest_is_told(written, tmp_path):
+    (tmp_path / "other").mkdir()
+    stale = Written(tmp_path / "other", ended=True, run="with_human").bytes
+    rng = np.random.default_rng(6)
+    for _ in range(200):
+        begin = int(rng.integers(len(written.bytes)))
+        end = min(begin + int(2 ** rng.uniform(0, 11)), len(written.bytes))
+        damaged = spoil(written.bytes, rng, rng.choice(HOW), begin, end, stale)
+        assert written.untouched(begin, end) <= written.recovered(damaged, tmp_path / "made.parquet")
+
+
+def flipped(whole, at, bit):
+    return whole[:at] + bytes([whole[at] ^ 1 << bit]) + whole[at + 1 :]
+
+
+def test_a_flipped_bit_of_a_batch_is_never_taken_for_a_number_and_costs_no_other_batch(written, tmp_path):
+    begin, end = written.places[3]
+    for at in range(begin, end, 7):
+        found = written.recovered(flipped(written.bytes, at, at % 8), tmp_path / "made.parquet")
+        assert found == written.untouched(begin, end), at
+
+
+def test_no_batch_is_read_by_a_head_that_it_was_not_written_after(written, tmp_path):
+    lost = written.bytes.replace(b"exoid-head:", b"other-head:")
+    assert written.recovered(lost, tmp_path / "made.parquet") == set(range(SAMPLES))
+    for at in range(0, written.bytes.index(b"exoid-head:") - 1000, 13):
+        assert written.recovered(flipped(lost, at, at % 8), tmp_path / "made.parquet") == set()
+
+
+def test_where_nothing_can_be_read_any_more_the_journal_is_not_said_to_be_of_no_use(written):
+    begin, end = written.places[0][0], written.places[-1][1]
+    written.path.write_bytes(written.bytes[:begin] + bytes(end - begin) + written.bytes[end:])
+    with pytest.raises(InputError) as refused:
+        recover(written.path)
+    assert str(refused.value) == (
+        f"{written.path}: no sample in it can be read, it is damaged; nothing was changed; keep it, and check the disk"
+    )
+    with pytest.raises(InputError, match=r"holds 0 samples .* or move it away, it is damaged"):
+        refuse_leftover(written.path)
+
+
+@pytest.mark.parametrize("why", ["stopped by Ctrl-C; the leg was stopped", None])
+@pytest.mark.parametrize("lost", [3, 8])
+def test_a_run_whose_journal_the_disk_damaged_tells_how_many_samples_are_left_and_where(tmp_path, why, lost):
+    """Eight batches are all that it had: then there is no recording, and none is named."""
+    written, output = Written(tmp_path, ended=True, why=why), tmp_path / "one.parquet"
+    begin, end = written.places[0][0], written.places[lost - 1][1]
+    written.path.write_bytes(written.bytes[:begin] + bytes(end - begin) + written.bytes[end:])
+    told = why or "the run is complete"
+    with locked(written.path) as lock, pytest.raises(DeviceError) as raised:
+        _recorded(output, lock, DeviceError, told, None)
+    place = place_for(output, why) if lost == 8 else next(tmp_path.glob("*.parquet"))
+    left = "no sample of it can be read, since" if lost == 8 else f"100 samples are in {place}, but"
+    assert str(raised.value) == (
+        f"{told}; {left} the disk did not give back all that was written; check the disk, {written.path} is kept"
+    )
+    assert place.exists() == (lost < 8)
+    assert written.path.exists()
+
+
+@pytest.fixture
+def unchecked(tmp_path):
+    """A journal as an older exoid wrote it, without checksums."""
+    made = Written(tmp_path, ended=True)
+    made.bytes = made.bytes.replace(b"exoid-batch:", b"other-batch:")
+    made.path.write_bytes(made.bytes)
+    return made
+
+
+def test_a_journal_without_checksums_is_read_as_ever_and_that_is_told(unchecked, exoid, tmp_path):
+    said = exoid("recover", unchecked.path, "-o", tmp_path / "made.parquet")
+    assert said.code == 0
+    assert "; its numbers were not checked, an older exoid wrote it without checksums; " in said.out
+    table = RECORDING.read(tmp_path / "made.parquet")
+    assert table.metadata["unchecked"] is True
+    assert np.array_equal(table.frame[COLUMNS].to_numpy(), [row(k) for k in range(SAMPLES)])
+    assert not unchecked.path.exists()
+
+
+def test_no_flipped_bit_in_a_batchs_header_asks_for_more_memory_than_there_is(unchecked):
+    begin, end = unchecked.places[3]
+    header = 8 + int.from_bytes(unchecked.bytes[begin + 4 : begin + 8], "little")
+    assert header < end - begin
+    for at in range(begin, begin + header):
+        for bit in range(8):
+            unchecked.path.write_bytes(flipped(unchecked.bytes, at, bit))
+            rows = sum(batch.rows.num_rows for batch in JournalFile(unchecked.path).batches())
+            assert rows >= 3 * BATCH  # all that comes before

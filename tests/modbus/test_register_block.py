@@ -1,0 +1,151 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from pydantic import ValidationError
+
+from pipelines.modbus.register_block import Block
+from pipelines.settings.rig import REGISTERS, Register, SensorMap
+
+patient = settings(deadline=None)  # a busy computer is no fault of a block's
+INTEGERS = [name for name in REGISTERS if not name.startswith("float")]
+
+
+@pytest.mark.parametrize(
+    ("kind", "order", "words", "value"),
+    [
+        # IEEE 754: 1.0 is 3F800000; the Modbus specification sends high bytes first.
+        ("float32", "big", [0x3F80, 0x0000], 1.0),
+        ("float32", "little", [0x0000, 0x3F80], 1.0),
+        ("int32", "big", [0xFFFF, 0xFFFE], -2.0),
+        ("int32", "little", [0xFFFE, 0xFFFF], -2.0),
+        ("uint16", "big", [0xFFFF], 65535.0),
+        ("int16", "big", [0xFFFF], -1.0),
+        ("int64", "little", [0x0002, 0x0000, 0x0000, 0x0000], 2.0),
+        ("float64", "big", [0x4000, 0x0000, 0x0000, 0x0000], 2.0),
+    ],
+)
+def test_words_mean_what_the_standards_say(kind, order, words, value):
+    block = Block({"x": Register(address=10, type=kind, word_order=order)})
+    assert block.decode(words) == {"x": value}
+    assert block.encode({"x": value}) == words
+
+
+@pytest.mark.parametrize(
+    ("word_order", "byte_order", "words"),
+    [
+        # The four orders that makers write as ABCD, CDAB, BADC and DCBA.
+        ("big", "big", [0x0A0B, 0x0C0D]),
+        ("little", "big", [0x0C0D, 0x0A0B]),
+        ("big", "little", [0x0B0A, 0x0D0C]),
+        ("little", "little", [0x0D0C, 0x0B0A]),
+    ],
+)
+def test_words_and_bytes_can_come_in_any_order(word_order, byte_order, words):
+    block = Block({"x": Register(address=7, type="uint32", word_order=word_order, byte_order=byte_order)})
+    assert block.decode(words) == {"x": float(0x0A0B0C0D)}
+    assert block.encode({"x": float(0x0A0B0C0D)}) == words
+
+
+def raws(kind):
+    """Return every value that a register can hold."""
+    if kind.startswith("float"):
+        return st.floats(allow_nan=False, allow_infinity=False, width=int(kind[5:]))
+    low, high = Register(address=0, type=kind).counts
+    return st.integers(low, high)
+
+
+@st.composite
+def blocks(draw):
+    """Return a block of registers of any type, order, scale and distance, and a raw count or float for each."""
+    registers, address = {}, draw(st.integers(0, 65000))
+    for i, kind in enumerate(draw(st.lists(st.sampled_from(list(REGISTERS)), min_size=1, max_size=6))):
+        orders = {key: draw(st.sampled_from(["big", "little"])) for key in ("word_order", "byte_order")}
+        address += draw(st.integers(0, 3))
+        registers[f"v{i}"] = Register(address=address, type=kind, **orders)
+        address += REGISTERS[kind]
+    names = draw(st.permutations(list(registers)))
+    return {name: registers[name] for name in names}, {name: draw(raws(registers[name].type)) for name in names}
+
+
+@patient
+@given(blocks())
+def test_whatever_a_register_can_hold_comes_back_in_any_type_and_order(drawn):
+    registers, values = drawn
+    block = Block(registers)
+    words = block.encode(values)
+    assert len(words) == block.count and all(0 <= word <= 0xFFFF for word in words)
+    # As a double: of a 64-bit count above 2**53 the last bits are beyond it.
+    assert block.decode(words) == {name: float(value) for name, value in values.items()}
+
+
+@patient
+@given(blocks(), st.data())
+def test_a_value_is_where_its_register_is_and_nowhere_else(drawn, data):
+    registers, values = drawn
+    block, name = Block(registers), data.draw(st.sampled_from(list(registers)))
+    before, after = block.encode(values), block.encode({**values, name: data.draw(raws(registers[name].type))})
+    first = registers[name].address - block.address
+    changed = {place for place in range(block.count) if before[place] != after[place]}
+    assert changed <= set(range(first, first + registers[name].registers))
+
+
+@patient
+@given(blocks(), st.lists(st.integers(0, 0xFFFF), min_size=60, max_size=60))
+def test_any_words_at_all_decode_to_something_for_each_register(drawn, words):
+    registers, _ = drawn
+    block = Block(registers)
+    assert list(block.decode((words * 2)[: block.count])) == list(registers)
+
+
+@patient
+@given(
+    kind=st.sampled_from(INTEGERS),
+    scale=st.floats(1e-9, 1e3).map(lambda scale: float(f"{scale:.6g}")),
+    negative=st.booleans(),
+    offset=st.floats(-1e3, 1e3),
+    share=st.floats(0, 1),
+)
+def test_a_scaled_value_comes_back_to_half_a_count(kind, scale, negative, offset, share):
+    scale = -scale if negative else scale
+    low, high = Register(address=0, type=kind).counts
+    value = (low + share * (min(high, 2**40) - low)) * scale + offset
+    block = Block({"x": Register(address=0, type=kind, scale=scale, offset=offset)})
+    rounding = 4 * np.finfo(float).eps * (abs(value) + abs(offset))
+    assert_allclose(block.decode(block.encode({"x": value}))["x"], value, rtol=0, atol=0.500001 * abs(scale) + rounding)
+
+
+@patient
+@given(st.integers(0, 10), st.integers(0, 10))
+def test_registers_that_overlap_are_refused_and_others_are_not(first, second):
+    wide = {"type": "int32", "unit": "N"}
+    told = {
+        "sequence": {"address": 100, "type": "uint16"}, "force_x": {"address": first, **wide},
+        "force_y": {"address": second, **wide}, "force_z": {"address": 50, **wide},
+    }  # fmt: skip
+    if abs(first - second) >= 2:
+        assert SensorMap.model_validate({"read": told}).read.force_y.address == second
+    else:
+        with pytest.raises(ValidationError, match=rf"register {max(first, second)} is part of force_x too"):
+            SensorMap.model_validate({"read": told})
+
+
+def test_a_value_too_large_saturates_as_in_a_device():
+    block = Block({"x": Register(address=0, type="int16", scale=0.001, unit="rad")})
+    assert block.decode(block.encode({"x": 50.0}))["x"] == pytest.approx(32.767)
+    assert block.registers["x"].holds(-32.0, 32.0)
+    assert not block.registers["x"].holds(-33.0, 0.0)
+
+
+def test_units_become_si():
+    block = Block(
+        {"time": Register(address=0, type="uint32", unit="us"), "f": Register(address=2, type="int16", unit="kN")}
+    )
+    assert block.decode([0x000F, 0x4240, 2]) == {"time": pytest.approx(1.0), "f": 2000.0}
+
+
+def test_an_unsigned_counter_begins_anew_after_its_span():
+    block = Block({"time": Register(address=0, type="uint32", unit="us"), "n": Register(address=2, type="int32")})
+    assert block.span("time") == pytest.approx(2**32 * 1e-6)
+    assert block.span("n") == 0.0
